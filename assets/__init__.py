@@ -1,0 +1,1 @@
+"""Data: parameters with their sources, calibration sheets, scene pieces."""

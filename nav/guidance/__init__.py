@@ -1,0 +1,1 @@
+"""What to do next: the phase of the docking and the command."""

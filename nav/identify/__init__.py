@@ -1,0 +1,1 @@
+"""From blobs to named LEDs."""

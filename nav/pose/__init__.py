@@ -1,0 +1,1 @@
+"""From named LEDs to the relative pose."""

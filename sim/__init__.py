@@ -1,0 +1,1 @@
+"""The world: physics and sensors. It knows everything and decides nothing."""

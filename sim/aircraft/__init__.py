@@ -1,0 +1,1 @@
+"""The aircraft: receiver and its flight control, tanker."""

@@ -1,0 +1,1 @@
+"""The near-infrared camera, from radiance to digital numbers."""

@@ -1,0 +1,54 @@
+"""Dockair: a test bed for autonomous aerial refuelling by vision.
+
+Importing this package makes the gymnasium environments known by *string* entry points and loads nothing else:
+neither gymnasium itself nor MuJoCo. When gymnasium is imported later, the registration happens then.
+"""
+
+import sys
+from collections.abc import Sequence
+from importlib.abc import MetaPathFinder
+from importlib.machinery import ModuleSpec, PathFinder
+from types import ModuleType
+
+__version__ = "0.1.0"
+
+ENVIRONMENTS = {"dockair/Dock-v0": "dockair.scenarios.envs:DockEnv"}
+
+
+def _register_environments() -> None:
+    from gymnasium.envs.registration import register, registry
+
+    for environment_id, entry_point in ENVIRONMENTS.items():
+        if environment_id not in registry:
+            register(environment_id, entry_point=entry_point)
+
+
+class _RegisterWhenGymnasiumIsImported(MetaPathFinder):
+    """Finds `gymnasium` as usual, once, and registers our environments after it has been executed.
+
+    Importing gymnasium here instead would load it into every process that only wants `dockair.nav`.
+    """
+
+    def find_spec(
+        self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
+    ) -> ModuleSpec | None:
+        if fullname != "gymnasium":
+            return None
+        sys.meta_path.remove(self)
+        spec = PathFinder.find_spec(fullname, path, target)
+        if spec is None or spec.loader is None:
+            return None
+        execute = spec.loader.exec_module
+
+        def execute_and_register(module: ModuleType) -> None:
+            execute(module)
+            _register_environments()
+
+        spec.loader.exec_module = execute_and_register  # type: ignore[method-assign]
+        return spec
+
+
+if "gymnasium" in sys.modules:
+    _register_environments()
+else:
+    sys.meta_path.insert(0, _RegisterWhenGymnasiumIsImported())

@@ -1,0 +1,174 @@
+"""Nominal calibration sheets: what the navigation is told about its own hardware.
+
+Pinhole, camera axes x forward (boresight), y left, z up; pixel (0, 0) is the centre of the top left pixel:
+
+    u = c_u - f y/x,    v = c_v - f z/x      (f in pixels)                    [Yoon 2018, eqs 41-44]
+
+Distortion is Brown-Conrady on (a, b) = (-y/x, -z/x), coefficients k1, k2, p1, p2, k3 in OpenCV's order:
+
+    r2 = a^2 + b^2,  s = 1 + k1 r2 + k2 r2^2 + k3 r2^3
+    a' = a s + 2 p1 a b + p2 (r2 + 2 a^2),   b' = b s + p1 (r2 + 2 b^2) + 2 p2 a b          (1)
+
+The simulator draws *as-built* values around these; they are other objects and never reach `nav`.
+"""
+
+import tomllib
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+
+from dockair.errors import DockairError
+from dockair.messages import Window
+from dockair.rotations import Array
+
+_INVERSE_DISTORTION_ITERATIONS = 20  # fixed point; contracts by about 0.1 a step for lenses of this class
+
+
+def _from_toml(cls: type[Any], path: str | Path) -> Any:
+    path = Path(path)
+    if not path.is_file():
+        raise DockairError(str(path), expected="a calibration file", got="no such file")
+    try:
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
+    except tomllib.TOMLDecodeError as error:
+        raise DockairError(str(path), expected="TOML", got=str(error)) from None
+    names = [f.name for f in fields(cls)]
+    unknown = sorted(set(table) - set(names))
+    if unknown:
+        raise DockairError(f"{path}: {unknown[0]}", expected="a known key", got=unknown[0], exists=names)
+    return cls(**{k: tuple(v) if isinstance(v, list) else v for k, v in table.items()})
+
+
+@dataclass(frozen=True, slots=True)
+class Camera:
+    """Pinhole with Brown-Conrady distortion. Defaults: CMV2000 sensor, 16 mm lens [Yoon 2018, tables 4-5]."""
+
+    focal_length_m: float = 0.016
+    pixel_pitch_m: float = 5.5e-6
+    width_px: int = 2048
+    height_px: int = 1088
+    principal_point_px: tuple[float, float] = (1023.5, 543.5)
+    distortion: tuple[float, float, float, float, float] | None = None  #: k1, k2, p1, p2, k3
+
+    def __post_init__(self) -> None:
+        for name in ("focal_length_m", "pixel_pitch_m", "width_px", "height_px"):
+            if not getattr(self, name) > 0:
+                raise DockairError(f"camera.{name}", expected="a number > 0", got=getattr(self, name))
+        if self.distortion is not None and len(self.distortion) != 5:
+            raise DockairError("camera.distortion", expected="5 numbers k1, k2, p1, p2, k3", got=self.distortion)
+
+    @classmethod
+    def from_toml(cls, path: str | Path) -> Self:
+        """Read the sheet from a TOML file whose keys are the fields."""
+        return _from_toml(cls, path)  # type: ignore[no-any-return]
+
+    @property
+    def focal_length_px(self) -> float:
+        """Focal length in pixels."""
+        return self.focal_length_m / self.pixel_pitch_m
+
+    @property
+    def full_window(self) -> Window:
+        """The window that is the whole sensor."""
+        return Window(0, self.height_px, 0, self.width_px)
+
+    def pixels_from_points(self, p_C: Array) -> Array:
+        """(n, 2) pixels (u, v) of points p_C (n, 3) [m] in camera axes; NaN where x <= 0 (behind the camera)."""
+        p_C = np.asarray(p_C, dtype=float).reshape(-1, 3)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ab = np.where(p_C[:, :1] > 0.0, -p_C[:, 1:] / p_C[:, :1], np.nan)
+        if self.distortion is not None:
+            ab = _distort(ab, self.distortion)
+        return np.asarray(self.focal_length_px * ab + np.array(self.principal_point_px))
+
+    def rays_from_pixels(self, pixels: Array) -> Array:
+        """(n, 3) unit vectors in camera axes toward pixels (n, 2) (u, v)."""
+        pixels = np.asarray(pixels, dtype=float).reshape(-1, 2)
+        ab = (pixels - np.array(self.principal_point_px)) / self.focal_length_px
+        if self.distortion is not None:
+            target = ab
+            for _ in range(_INVERSE_DISTORTION_ITERATIONS):
+                ab = ab + target - _distort(ab, self.distortion)
+        rays = np.column_stack([np.ones(len(ab)), -ab])
+        return np.asarray(rays / np.linalg.norm(rays, axis=1, keepdims=True))
+
+
+def _distort(ab: Array, coefficients: tuple[float, ...]) -> Array:
+    k1, k2, p1, p2, k3 = coefficients  # Eq. (1)
+    a, b = ab[:, 0], ab[:, 1]
+    r2 = a * a + b * b
+    s = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
+    return np.column_stack(
+        [a * s + 2 * p1 * a * b + p2 * (r2 + 2 * a * a), b * s + p1 * (r2 + 2 * b * b) + 2 * p2 * a * b]
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class LedRing:
+    """LEDs on the drogue's rim: in the drogue's y-z plane, LED k at 45 deg k from +y toward +z, shining aft (-x)."""
+
+    diameter_m: float = 0.5
+    count: int = 8
+
+    def __post_init__(self) -> None:
+        if not self.diameter_m > 0:
+            raise DockairError("ring.diameter_m", expected="a number > 0", got=self.diameter_m)
+        if self.count < 3:
+            raise DockairError("ring.count", expected="at least 3 LEDs", got=self.count)
+
+    @classmethod
+    def from_toml(cls, path: str | Path) -> Self:
+        """Read the sheet from a TOML file whose keys are the fields."""
+        return _from_toml(cls, path)  # type: ignore[no-any-return]
+
+    @property
+    def positions_D(self) -> Array:
+        """(count, 3) LED positions in drogue axes [m]."""
+        angle = 2.0 * np.pi * np.arange(self.count) / self.count
+        radius = 0.5 * self.diameter_m
+        return np.column_stack([np.zeros(self.count), radius * np.cos(angle), radius * np.sin(angle)])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Mounting:
+    """Where things sit on the receiver, in body axes B (origin at the centre of gravity)."""
+
+    R_BC: Array  #: (3, 3) camera axes in body axes
+    p_BC: Array  #: (3,) camera [m]
+    p_BP: Array  #: (3,) probe tip [m]
+    R_BI: Array = field(default_factory=lambda: np.eye(3))  #: (3, 3) gyro axes in body axes
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class StartGeometry:
+    """Nominal pre-contact geometry and how far it may be off: all that the navigation knows before its first frame."""
+
+    p_PD_B: Array  #: (3,) drogue ring centre from the probe's tip, body axes [m]
+    sigma_p_m: Array  #: (3,) its standard deviation
+    R_BD: Array  #: (3, 3) drogue axes in body axes
+    sigma_R_rad: float  #: its standard deviation about each axis
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class GyroSheet:
+    """The gyro's data sheet."""
+
+    rate_hz: int
+    noise_density_rad_s_rthz: float
+    bias_sigma_rad_s: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class NavigationSheets:
+    """Everything the navigation is given at construction; there is no other way in but the two sensor messages."""
+
+    camera: Camera
+    ring: LedRing
+    mounting: Mounting
+    start: StartGeometry
+    gyro: GyroSheet
+    camera_rate_hz: int
+    control_rate_hz: int
+    coupling_depth_m: float  #: from the ring's plane forward to where the probe's tip latches, along the drogue's x

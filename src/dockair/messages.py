@@ -1,0 +1,93 @@
+"""What crosses between the world, the navigation and the command: frozen, stamped, no more than a sensor could send.
+
+| message         | producer   | consumer            | rate            | frame |
+|-----------------|------------|---------------------|-----------------|-------|
+| CameraFrame     | sim/camera | nav                 | camera rate     | C     |
+| ImuSample       | sim/imu    | nav                 | gyro rate       | I     |
+| ReceiverCommand | nav        | sim flight control  | control rate    | B     |
+| NavSolution     | nav        | loop, log, gymnasium| control rate    | B, C  |
+
+A test freezes the fields of the two sensor messages: no LED index, visibility, pose or gust may ever enter them.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dockair.rotations import Array
+
+
+@dataclass(frozen=True, slots=True)
+class Window:
+    """Rows [row_start, row_stop) and columns [column_start, column_stop) of the sensor."""
+
+    row_start: int
+    row_stop: int
+    column_start: int
+    column_stop: int
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """(rows, columns)."""
+        return self.row_stop - self.row_start, self.column_stop - self.column_start
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class CameraFrame:
+    """One exposure, as read out."""
+
+    time_stamp_s: float  #: middle of the exposure, on the clock that also stamps the gyro
+    pixels: NDArray[np.uint8]  #: (rows, columns) of the window
+    window: Window  #: which part of the sensor was read
+    exposure_s: float
+    gain: float  #: digital numbers of the output per electron [1/e-]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ImuSample:
+    """One gyro sample."""
+
+    time_stamp_s: float
+    angular_rate_rad_s: Array  #: (3,) w_WI_I, as measured
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ReceiverCommand:
+    """An increment on the receiver's own trim flight path, in body axes B (forward, left, up)."""
+
+    velocity_m_s: Array = field(default_factory=lambda: np.zeros(3))  #: (3,) velocity beyond trim
+    acceleration_m_s2: Array = field(default_factory=lambda: np.zeros(3))  #: (3,) feed-forward
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class NavSolution:
+    """What the navigation believes and wants, at one control tick.
+
+    `valid` says whether the relative state is usable; when it is not, the arrays still hold the prediction
+    and the covariance is NaN.
+    """
+
+    time_stamp_s: float
+    valid: bool
+    phase: str  #: name of the docking phase
+    status: str  #: outcome of the last frame: what the pose solver or the stage before it said
+    p_PD_B: Array  #: (3,) drogue ring centre from the probe's tip, body axes [m]
+    v_PD_B: Array  #: (3,) its velocity relative to the receiver, body axes [m/s]
+    R_BD: Array  #: (3, 3) drogue axes in body axes
+    covariance: Array  #: (9, 9) of (phi, p_PD_B, v_PD_B): R_BD <- exp(phi) R_BD [rad, m, m/s]
+    command: ReceiverCommand
+    window: Window | None  #: what the camera should read next; None for the full frame
+    frame_time_stamp_s: float  #: stamp of the newest frame used, NaN before the first
+    candidates_px: Array  #: (n, 2) centroids of the newest frame, full-frame coordinates
+    led_pixels_px: Array  #: (8, 2) where each LED was seen; NaN where it was not
+
+
+class Navigates(Protocol):
+    """Anything that can stand where `nav.navigator.Navigator` stands; a scenario may name any such class."""
+
+    def step(self, imu: Sequence[ImuSample], frame: CameraFrame | None) -> NavSolution:
+        """Take what arrived since the last control tick; return what is believed and commanded now."""
+        ...
