@@ -1,0 +1,88 @@
+"""The closed loop, one control tick at a time: world, sensors, navigation, command.
+
+A command decided at one control tick reaches the flight control at the next: that is the time it takes to compute.
+A frame reaches the navigation when it has been exposed, read out and transferred; its stamp is the exposure's middle.
+"""
+
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from dockair.messages import CameraFrame, ImuSample, NavSolution, ReceiverCommand
+from dockair.scenarios.build import build
+from dockair.scenarios.metrics import Result
+from dockair.scenarios.referee import Outcome, Referee
+from dockair.scenarios.schema import Scenario
+from dockair.scenarios.truth_navigation import TruthNavigator
+from dockair.sim.truth import Truth
+
+Progress = Callable[[Truth, NavSolution], None]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Tick:
+    """What one control tick brought."""
+
+    truth: Truth
+    imu: tuple[ImuSample, ...]
+    frame: CameraFrame | None
+    solution: NavSolution
+    outcome: Outcome | None
+
+
+class Flight:
+    """A scenario in flight.
+
+    Args:
+        scenario: what to fly.
+        seed: of every random stream.
+        full_frames: read the whole sensor whatever window the navigation asks for.
+    """
+
+    def __init__(self, scenario: Scenario, seed: int, *, full_frames: bool = False) -> None:
+        parts = build(scenario, seed)
+        self.scenario, self.clock, self.sheets = scenario, parts.clock, parts.sheets
+        self.world, self.camera, self.gyro, self.navigator = parts.world, parts.camera, parts.gyro, parts.navigator
+        self.referee = Referee()
+        self._full_frames = full_frames
+        self._ticks = parts.ticks
+        self._command = self._next_command = ReceiverCommand()
+        self._window = parts.sheets.camera.full_window
+        self._in_transfer: deque[tuple[float, CameraFrame]] = deque()
+        self._frame_number = 0
+
+    @property
+    def truth(self) -> Truth:
+        """The world now."""
+        return self.world.truth
+
+    def step(self, command: ReceiverCommand | None = None) -> Tick:
+        """Advance by one control tick.
+
+        Args:
+            command: flown instead of the navigation's own.
+        """
+        self._command = self._next_command if command is None else command
+        imu: list[ImuSample] = []
+        for _ in range(self._ticks.control):
+            truth = self.world.step(self._command)
+            self.referee.watch(truth)
+            if truth.tick % self._ticks.gyro == 0:
+                imu.append(self.gyro.step(truth.time_s, truth.w_WB_B))
+            if self.camera is not None and truth.tick % self._ticks.camera == 0:
+                self._expose(truth.time_s)
+        frame = self._delivered(truth.time_s)
+        if isinstance(self.navigator, TruthNavigator):
+            self.navigator.truth = truth
+        solution = self.navigator.step(tuple(imu), frame)
+        self._next_command = solution.command
+        self._window = solution.window or self.sheets.camera.full_window
+        outcome = self.referee.judge(truth, solution.phase, self.scenario.flight.duration_s)
+        return Tick(truth=truth, imu=tuple(imu), frame=frame, solution=solution, outcome=outcome)
+
+    def close(self) -> None:
+        """Free the camera's off-screen context."""
+        if self.camera is not None:
+            self.camera.close()

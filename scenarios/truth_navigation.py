@@ -1,0 +1,60 @@
+"""Perfect navigation: the truth in place of `nav`, to see what vision costs.
+
+The same guidance flies on it. A scenario names it `navigator = "truth"`; every result of such a flight is marked
+`truth_navigation: true`, and reports refuse to pool it with others.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from dockair.calibration import NavigationSheets
+from dockair.messages import CameraFrame, ImuSample, NavSolution
+from dockair.nav.guidance.approach import Guidance, GuidanceSettings, RelativeState
+from dockair.rotations import Array
+from dockair.sim.truth import Truth
+
+
+class TruthNavigator:
+    """Stands where `nav.navigator.Navigator` stands; the loop sets `truth` before each step."""
+
+    def __init__(self, sheets: NavigationSheets, settings: GuidanceSettings) -> None:
+        self._sheets = sheets
+        self._guidance = Guidance(settings, sheets.control_rate_hz)
+        self.truth: Truth | None = None
+
+    def step(self, imu: Sequence[ImuSample], frame: CameraFrame | None) -> NavSolution:
+        """Return the true relative state and what the guidance commands on it."""
+        truth = self.truth
+        assert truth is not None, "the loop sets the truth before each step"
+        R_BD = truth.R_WB.T @ truth.R_WD
+        p_PD_B = truth.p_PD_B
+        v_PD_B = truth.R_WB.T @ (truth.v_WD - truth.v_WP)
+        rate_PD_B = v_PD_B - np.cross(truth.w_WB_B, p_PD_B)
+        state = RelativeState(
+            usable=True,
+            p_PD_B=p_PD_B,
+            rate_PD_B=rate_PD_B,
+            p_PK_B=p_PD_B + R_BD[:, 0] * self._sheets.coupling_depth_m,
+            sigma_lateral_m=0.0,
+        )
+        command = self._guidance.step(state)
+        return NavSolution(
+            time_stamp_s=truth.time_s,
+            valid=True,
+            phase=self._guidance.phase.value,
+            status="truth",
+            p_PD_B=p_PD_B,
+            v_PD_B=v_PD_B,
+            R_BD=R_BD,
+            covariance=np.zeros((9, 9)),
+            command=command,
+            window=None,
+            frame_time_stamp_s=float("nan"),
+            candidates_px=np.empty((0, 2)),
+            led_pixels_px=_not_seen(len(self._sheets.ring.positions_D)),
+        )
+
+
+def _not_seen(count: int) -> Array:
+    return np.full((count, 2), np.nan)

@@ -1,0 +1,72 @@
+"""The referee on hand-made truths: a probe tip led through the ring's plane."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from dockair.rotations import exp
+from dockair.scenarios.referee import Outcome, Referee
+from dockair.sim.truth import Truth
+
+
+def truth_at(time_s, tip_D, v_tip=(1.2, 0.0, 0.0), *, latched=False, touches=False, hit="", R_WB=None):
+    """Drogue at rest at the world's origin, so that the tip in drogue axes is the tip in W."""
+    zero, unit = np.zeros(3), np.eye(3)
+    values = {f.name: 0.0 for f in dataclasses.fields(Truth)}
+    values |= {name: zero for name in values if name[:2] in ("p_", "v_", "w_", "a_") or name.startswith("gust")}
+    values |= {"R_WB": unit if R_WB is None else R_WB, "R_WD": unit, "R_WT": unit, "p_WH": np.zeros((2, 3))}
+    values |= {"tick": round(time_s * 1000), "time_s": time_s, "p_WP": np.array(tip_D), "v_WP": np.array(v_tip)}
+    values |= {"latched": latched, "probe_touches_drogue": touches, "receiver_touches": hit}
+    return Truth(**values)
+
+
+def through(referee, lateral, *, latch=False, touches=False, speed=1.2):
+    for k, x in enumerate(np.arange(-0.5, 1.2, 0.01)):
+        held = latch and x > 0.3
+        truth = truth_at(k * 0.01 / speed, (x, lateral, 0.0), (speed, 0, 0), latched=held, touches=touches and x > 0)
+        referee.watch(truth)
+        if held:
+            return truth
+    return truth
+
+
+def test_contact_reports_offset_and_speed_at_the_ring_and_the_angle_at_the_latch():
+    referee = Referee()
+    for k, x in enumerate(np.arange(-0.5, 0.31, 0.01)):
+        speed = 1.3 if x < 0.005 else 0.2  # slowed by the funnel afterwards
+        referee.watch(truth_at(k * 0.01, (x, 0.06, 0.08), (speed, 0, 0), touches=x > 0))
+    referee.watch(truth_at(5.0, (0.3, 0, 0), latched=True, R_WB=exp(np.radians([0, 0, 5.0]))))
+    assert referee.contact is not None
+    assert referee.contact.radial_offset_m == pytest.approx(0.1)
+    assert referee.contact.closure_speed_m_s == pytest.approx(1.3)
+    assert referee.contact.angle_deg == pytest.approx(5.0)
+    assert referee.contact.time_s == 5.0
+
+
+def test_outcomes():
+    held = Referee()
+    assert held.judge(through(held, 0.05, latch=True), "clear", 60.0) is Outcome.CONTACT
+    missed = Referee()
+    assert missed.judge(through(missed, 0.4), "approach", 60.0) is Outcome.MISS
+    struck = Referee()
+    assert struck.judge(through(struck, 0.25, touches=True), "approach", 60.0) is Outcome.RIM_STRIKE
+    collided = Referee()
+    collided.watch(truth_at(1.0, (-3.0, 0, 0), hit="hose_3"))
+    assert collided.judge(truth_at(1.1, (-3.0, 0, 0)), "approach", 60.0) is Outcome.COLLISION
+    assert Referee().judge(truth_at(20.0, (-3.0, 0, 0)), "clear", 60.0) is Outcome.ABORT
+    assert Referee().judge(truth_at(60.0, (-3.0, 0, 0)), "pre_contact", 60.0) is Outcome.TIMEOUT
+
+
+def test_a_flight_goes_on_until_something_ends_it():
+    referee = Referee()
+    assert referee.judge(truth_at(20.0, (-3.0, 0, 0)), "approach", 60.0) is None
+    assert referee.judge(truth_at(20.0, (0.3, 0, 0), latched=True), "hold", 60.0) is None
+
+
+def test_release_and_the_deepest_take_in_are_noted():
+    referee = Referee()
+    for k, (reel, latched) in enumerate([(0.2, True), (1.4, True), (0.9, True), (0.5, False)]):
+        referee.watch(dataclasses.replace(truth_at(float(k), (0.3, 0, 0), latched=latched), reel_position_m=reel))
+    assert referee.take_in_max_m == 1.4
+    assert referee.release_time_s == 3.0
