@@ -4,9 +4,8 @@ Keys carry their unit. Degrees and other units of people stop here: properties w
 Only `name` is required; every other key has the default written below.
 """
 
-import tomllib
-from collections.abc import Iterator, Mapping
-from importlib.resources import files
+from collections.abc import Mapping
+from dataclasses import make_dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -15,14 +14,12 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationEr
 
 from dockair.clock import Clock
 from dockair.errors import DockairError
-from dockair.parameters import check_overrides
+from dockair.parameters import load_parameters, read_sheet
 from dockair.rotations import Array
 from dockair.scenarios.refusal import Expected, refusal
+from dockair.scenarios.scenario_file import ScenarioFile
 
 OutcomeName = Literal["contact", "miss", "rim_strike", "abort", "collision", "timeout"]
-
-#: `--set` of the one replaces the other, which the file may have given.
-_ALTERNATIVES = {"turbulence.sigma_m_s": "turbulence.intensity", "turbulence.intensity": "turbulence.sigma_m_s"}
 
 
 def _tuple_from_list(value: Any) -> Any:
@@ -42,12 +39,12 @@ class _Table(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 
 
-class Flight(_Table):
+class FlightConditions(_Table):
     """The tanker's steady flight, and how long an attempt may take."""
 
-    airspeed_m_s: float = Field(180.0, ge=100.0, le=250.0)  #: true airspeed
-    altitude_m: float = Field(6000.0, ge=0.0, le=15000.0)
-    duration_s: float = Field(60.0, gt=0.0, le=600.0)
+    airspeed_m_s: float = Field(default=180.0, ge=100.0, le=250.0)  #: true airspeed
+    altitude_m: float = Field(default=6000.0, ge=0.0, le=15000.0)
+    duration_s: float = Field(default=60.0, gt=0.0, le=600.0)
 
 
 class Rates(_Table):
@@ -76,7 +73,7 @@ class Turbulence(_Table):
     """Gusts. One of `sigma_m_s` and `intensity`; without either the air is still."""
 
     model: Literal["none", "dryden"] = "none"  #: "dryden" as soon as one of the others is given; "none" overrules them
-    sigma_m_s: float | None = Field(None, ge=0.0, le=15.0)
+    sigma_m_s: float | None = Field(default=None, ge=0.0, le=15.0)
     intensity: Literal["light", "moderate", "severe"] | None = None  #: MIL-F-8785C, at the flight's altitude
 
     @model_validator(mode="before")
@@ -103,8 +100,8 @@ class Sun(_Table):
     """Where the Sun stands, seen from the receiver in level flight."""
 
     present: bool = True
-    azimuth_deg: float = Field(180.0, ge=-360.0, le=360.0)  #: 0 straight ahead, positive to the left
-    elevation_deg: float = Field(35.0, ge=-10.0, le=90.0)
+    azimuth_deg: float = Field(default=180.0, ge=-360.0, le=360.0)  #: 0 straight ahead, positive to the left
+    elevation_deg: float = Field(default=35.0, ge=-10.0, le=90.0)
 
     @property
     def direction_W(self) -> Array | None:
@@ -119,11 +116,11 @@ class Sun(_Table):
 class Start(_Table):
     """Where the probe's tip starts from the ring's centre, and how far off the navigation is told it may be."""
 
-    aft_m: float = Field(4.0, ge=0.5, le=40.0)  #: behind
-    left_m: float = Field(0.0, ge=-20.0, le=20.0)
-    up_m: float = Field(0.0, ge=-20.0, le=20.0)
+    aft_m: float = Field(default=4.0, ge=0.5, le=40.0)  #: behind
+    left_m: float = Field(default=0.0, ge=-20.0, le=20.0)
+    up_m: float = Field(default=0.0, ge=-20.0, le=20.0)
     sigma_m: _ThreeSigmas = (0.3, 0.3, 0.3)  #: forward, left, up
-    sigma_attitude_deg: float = Field(5.0, ge=0.0, le=30.0)  #: of the drogue, about each axis
+    sigma_attitude_deg: float = Field(default=5.0, ge=0.0, le=30.0)  #: of the drogue, about each axis
 
     @property
     def p_PD_B(self) -> Array:
@@ -159,10 +156,10 @@ class Navigation(_Table):
 class Guidance(_Table):
     """How the receiver docks."""
 
-    closure_speed_m_s: float = Field(1.2, ge=0.3, le=2.6)  #: 2.6 m/s (5 kt) is the service limit
-    hold_s: float = Field(5.0, ge=0.0, le=300.0)
-    take_in_m: float = Field(1.5, ge=0.0, le=6.0)  #: hose pushed in before holding
-    stabilise_s: float = Field(3.0, ge=0.0, le=60.0)  #: steady in pre-contact before closing
+    closure_speed_m_s: float = Field(default=1.2, ge=0.3, le=2.6)  #: 2.6 m/s (5 kt) is the service limit
+    hold_s: float = Field(default=5.0, ge=0.0, le=300.0)
+    take_in_m: float = Field(default=1.5, ge=0.0, le=6.0)  #: hose pushed in before holding
+    stabilise_s: float = Field(default=3.0, ge=0.0, le=60.0)  #: steady in pre-contact before closing
 
 
 class Hardware(_Table):
@@ -171,14 +168,26 @@ class Hardware(_Table):
     camera: str | None = None
     ring: str | None = None
 
+    @model_validator(mode="after")
+    def _exist(self) -> Self:
+        for key, path in (("camera", self.camera), ("ring", self.ring)):
+            if path is not None and not Path(path).is_file():
+                raise DockairError(f"hardware.{key}", expected="the path of a calibration sheet", got=path)
+        return self
+
 
 class Accept(_Table):
     """What a flight must show for its claim to hold; empty when the scenario claims nothing in figures."""
 
     outcome: OutcomeName | None = None
-    radial_offset_max_m: float | None = Field(None, gt=0.0)
-    closure_speed_min_m_s: float | None = Field(None, ge=0.0)
-    closure_speed_max_m_s: float | None = Field(None, gt=0.0)
+    radial_offset_max_m: float | None = Field(default=None, gt=0.0)
+    closure_speed_min_m_s: float | None = Field(default=None, ge=0.0)
+    closure_speed_max_m_s: float | None = Field(default=None, gt=0.0)
+
+    @property
+    def claims_figures(self) -> bool:
+        """Whether anything is asked for."""
+        return any(value is not None for value in self.model_dump().values())
 
     def shortfalls(self, outcome: str, radial_offset_m: float | None, closure_speed_m_s: float | None) -> list[str]:
         """Return a line for each figure that the flight did not reach; the two figures are None without contact."""
@@ -201,10 +210,10 @@ class Accept(_Table):
 class Scenario(_Table):
     """One flight as data."""
 
-    name: Annotated[str, Field(pattern=r"^\w[\w.-]*$"), Expected("letters, digits, _ . -")]
+    name: Annotated[str, Field(pattern=r"^\w[\w.-]*$"), Expected("a name of letters, digits, _ . -")]
     claim: str = ""  #: the sentence that the flight is there to show
-    seed: int = Field(0, ge=0, le=2**63 - 1)
-    flight: Flight = Flight()
+    seed: int = Field(default=0, ge=0, le=2**63 - 1)
+    flight: FlightConditions = FlightConditions()
     rates: Rates = Rates()
     turbulence: Turbulence = Turbulence()
     sun: Sun = Sun()
@@ -218,10 +227,26 @@ class Scenario(_Table):
     @model_validator(mode="after")
     def _parameters_fit(self) -> Self:
         for sheet, overrides in self.parameters.items():
-            check_overrides(sheet, overrides)
+            load_parameters(sheet, make_dataclass(sheet, sorted(read_sheet(sheet))), overrides)  # checks only
         return self
 
 
-def scenario_names() -> list[str]:
-    """Names in the library, the default first."""
-    return sorted(_library(), key=lambda name: (name != "default", name))
+def load_scenario(name_or_path: str | Path, overrides: Mapping[str, object] | None = None) -> Scenario:
+    """Read a scenario and check it.
+
+    Args:
+        name_or_path: a name in the library, or the path of a TOML file.
+        overrides: dotted key -> value instead of the file's. A string is read as a TOML value, and is the string
+            itself when it is none.
+
+    Raises:
+        DockairError: no such scenario; not TOML; unknown key, wrong type or value out of range.
+    """
+    source = ScenarioFile(name_or_path, overrides or {})
+    try:
+        return Scenario.model_validate(source.table)
+    except ValidationError as error:
+        raise refusal(error, Scenario, source.place) from None
+    except DockairError as error:
+        where = source.place(error.where)
+        raise DockairError(where, expected=error.expected, got=error.got, exists=error.exists) from None

@@ -1,0 +1,191 @@
+"""The command line: `dockair fly`, `scenarios`, `replay`, `bench`, `doctor`.
+
+Exit status: 0 done as asked, whatever the flight's outcome; 1 a replay that was not identical; 2 bad input;
+3 the machine lacks something. With `--json` one object goes to stdout and nothing else; progress and errors go to
+stderr. Modules that are slow to import are imported by the command that needs them.
+"""
+
+import json
+import sys
+from enum import Enum
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+import dockair
+from dockair.errors import DockairError
+
+app = typer.Typer(
+    name="dockair",
+    help="Autonomous aerial refuelling by vision: simulated, closed-loop.",
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+
+
+class Record(Enum):
+    """Which pixels of the camera are kept."""
+
+    FULL = "full"
+    WINDOW = "window"
+    NONE = "none"
+
+
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout and nothing else.")]
+ScenarioName = Annotated[str, typer.Argument(metavar="SCENARIO", help="A name in the library or a TOML path.")]
+Settings = Annotated[
+    list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Dotted key and TOML value; may be repeated.")
+]
+Seed = Annotated[
+    int | None, typer.Option(min=0, max=2**63 - 1, help="Seed of every random stream; the scenario's by default.")
+]
+
+
+@app.callback(invoke_without_command=True)
+def root(
+    context: typer.Context,
+    version: Annotated[bool, typer.Option("--version", help="Print the version and exit.")] = False,
+) -> None:
+    """Autonomous aerial refuelling by vision: simulated, closed-loop."""
+    if version:
+        print(dockair.__version__)
+        raise typer.Exit
+    if context.invoked_subcommand is None:
+        print(context.get_help())
+        raise typer.Exit
+
+
+@app.command()
+def fly(
+    scenario: ScenarioName = "default",
+    seed: Seed = None,
+    settings: Settings = None,
+    out: Annotated[Path | None, typer.Option(help="Folder to write to; out/<scenario>-<seed> by default.")] = None,
+    record: Annotated[Record, typer.Option(help="Frames to keep: whole, as navigated on, or none.")] = Record.WINDOW,
+    as_json: Json = False,
+) -> None:
+    """Fly a scenario and write result.json and episode.rrd."""
+    from dockair.scenarios.doctor import require_rendering
+    from dockair.scenarios.output import FlightProgress, show_result
+    from dockair.scenarios.output_folder import default_output_folder, prepare_output_folder
+    from dockair.scenarios.schema import load_scenario
+
+    chosen = load_scenario(scenario, _overrides(settings))
+    seed = chosen.seed if seed is None else seed
+    if not chosen.navigation.is_truth:
+        require_rendering()
+    folder = out or default_output_folder(chosen.name, seed)
+    prepare_output_folder(folder)
+    from dockair.scenarios.loop import fly as fly_scenario
+
+    with FlightProgress(chosen.flight.duration_s) as progress:
+        result = fly_scenario(chosen, seed, folder, record=record.value, progress=progress)
+    contact = result.contact
+    offset, speed = (contact.radial_offset_m, contact.closure_speed_m_s) if contact else (None, None)
+    shortfalls = chosen.accept.shortfalls(result.outcome, offset, speed)
+    if as_json:
+        _print_json(result.to_dict())
+    else:
+        show_result(result.to_dict(), shortfalls if chosen.accept.claims_figures else None, folder)
+
+
+@app.command()
+def scenarios(as_json: Json = False) -> None:
+    """List the library's scenarios and what each is there to show."""
+    from dockair.scenarios.output import show_scenarios
+    from dockair.scenarios.scenario_file import scenario_names
+    from dockair.scenarios.schema import load_scenario
+
+    library = [load_scenario(name) for name in scenario_names()]
+    if as_json:
+        _print_json({"scenarios": [scenario.model_dump(mode="json") for scenario in library]})
+    else:
+        show_scenarios(library)
+
+
+@app.command()
+def replay(
+    out: Annotated[Path, typer.Argument(metavar="OUT", help="Folder of a recorded flight.")],
+    as_json: Json = False,
+) -> None:
+    """Feed a flight's recorded frames and gyro to the navigation, without a simulator; compare every bit."""
+    from dockair.scenarios.replay import replay as replay_flight
+
+    if not out.is_dir():
+        raise DockairError(str(out), expected="the folder of a recorded flight", got="no such folder")
+    report = replay_flight(out)
+    if as_json:
+        _print_json(json.loads(report.to_json()))
+    else:
+        print(report)
+    if not report.identical:
+        raise typer.Exit(1)
+
+
+@app.command()
+def bench(
+    scenario: ScenarioName = "default",
+    settings: Settings = None,
+    seconds: Annotated[float, typer.Option(min=1.0, max=600.0, help="Simulated time at most.")] = 20.0,
+    as_json: Json = False,
+) -> None:
+    """Say how fast the closed loop runs here and where its time goes."""
+    from dockair.scenarios.doctor import require_rendering
+    from dockair.scenarios.output import show_bench
+    from dockair.scenarios.schema import load_scenario
+
+    chosen = load_scenario(scenario, _overrides(settings))
+    require_rendering()
+    from dockair.scenarios.bench import bench as bench_scenario
+
+    report = bench_scenario(chosen, seconds)
+    if as_json:
+        _print_json(report.to_json())
+    else:
+        show_bench(report)
+
+
+@app.command()
+def doctor(as_json: Json = False) -> None:
+    """Check the machine: Python, links, off-screen OpenGL, cores, memory, disk, packages."""
+    from dockair.scenarios.doctor import examine, is_fit, package_versions, to_json
+    from dockair.scenarios.output import show_checks
+
+    checks = examine(Path("out"))
+    if as_json:
+        _print_json(to_json(checks))
+    else:
+        show_checks(checks, package_versions())
+    if not is_fit(checks):
+        raise typer.Exit(3)
+
+
+def _overrides(settings: list[str] | None) -> dict[str, str]:
+    overrides = {}
+    for setting in settings or ():
+        key, equals, value = setting.partition("=")
+        if not equals or not key.strip():
+            raise DockairError("--set", expected="key=value, as in turbulence.sigma_m_s=1.1", got=setting)
+        overrides[key.strip()] = value.strip()
+    return overrides
+
+
+def _print_json(table: Any) -> None:
+    print(json.dumps(table, allow_nan=False))
+
+
+def main() -> None:
+    """Run a command; what a person did wrong ends in one line on stderr, not in a traceback."""
+    try:
+        status = app(standalone_mode=False)
+    except DockairError as error:
+        print(f"dockair: {error}", file=sys.stderr)
+        sys.exit(error.exit_code)
+    except typer.TyperException as error:
+        print(f"dockair: {error.format_message()}", file=sys.stderr)
+        sys.exit(2)
+    except (typer.Abort, KeyboardInterrupt):
+        print("dockair: stopped", file=sys.stderr)
+        sys.exit(130)
+    sys.exit(status if isinstance(status, int) else 0)

@@ -1,0 +1,255 @@
+"""What the navigation received, exactly as delivered, and what it answered: enough to run it again, and nothing else.
+
+| file               | one row a control tick                                                             |
+|--------------------|------------------------------------------------------------------------------------|
+| messages.parquet   | gyro samples and, if one arrived, the frame: lossless PNG, window, stamp, exposure, gain |
+| estimates.parquet  | every field of `NavSolution`; all numbers as 64-bit floats                         |
+| navigator.json     | the navigator's class, its calibration sheets and settings, floats to the last bit |
+
+Frames are encoded in a thread of their own: OpenCV releases the interpreter lock meanwhile, so that the control loop
+waits only when the encoder is more than `QUEUE_TICKS` behind. No truth enters these files.
+"""
+
+import json
+import queue
+import threading
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, fields, is_dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import cv2
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from dockair.calibration import NavigationSheets
+from dockair.errors import DockairError
+from dockair.messages import CameraFrame, ImuSample, Navigates, NavSolution, Window
+from dockair.rotations import Array
+from dockair.scenarios.exact_json import decode, encode, import_by_name
+
+QUEUE_TICKS = 200  # ticks waiting for the encoder; at 50 frames/s of 2.2 MB full frames at most 220 MB
+ROW_GROUP_TICKS = 100
+MESSAGES, ESTIMATES, NAVIGATOR = "messages.parquet", "estimates.parquet", "navigator.json"
+_PNG = [cv2.IMWRITE_PNG_COMPRESSION, 1]
+
+_FLOATS = pa.list_(pa.float64())
+_WINDOW_COLUMNS = [f.name for f in fields(Window)]
+_MESSAGE_SCHEMA = pa.schema(
+    [
+        ("gyro_time_stamp_s", _FLOATS),
+        ("gyro_angular_rate_rad_s", _FLOATS),
+        ("frame_time_stamp_s", pa.float64()),
+        *[(name, pa.int32()) for name in _WINDOW_COLUMNS],
+        ("exposure_s", pa.float64()),
+        ("gain", pa.float64()),
+        ("png", pa.binary()),
+    ]
+)
+_ESTIMATE_SCHEMA = pa.schema([(f.name, pa.string() if f.type is str else _FLOATS) for f in fields(NavSolution)])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class NavigatorRecipe:
+    """How to make the navigator that flew."""
+
+    class_name: str  #: "module:Class"
+    sheets: NavigationSheets
+    settings: Any = None  #: second argument of the constructor; None leaves it to the class
+
+    def build(self) -> Navigates:
+        """Return a new navigator in its first state."""
+        navigator_class = import_by_name(self.class_name)
+        made = navigator_class(self.sheets) if self.settings is None else navigator_class(self.sheets, self.settings)
+        return made  # type: ignore[no-any-return]
+
+    def write(self, out_dir: Path) -> None:
+        """Write `navigator.json`."""
+        table = {"navigator": self.class_name, "sheets": encode(self.sheets), "settings": encode(self.settings)}
+        (out_dir / NAVIGATOR).write_text(json.dumps(table, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+
+    @classmethod
+    def read(cls, out_dir: Path) -> Self:
+        """Read `navigator.json`."""
+        table = json.loads(_existing(out_dir, NAVIGATOR).read_text(encoding="utf-8"))
+        sheets, settings = decode(table["sheets"]), decode(table["settings"])
+        return cls(class_name=table["navigator"], sheets=sheets, settings=settings)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class TickMessages:
+    """What one control tick delivered."""
+
+    imu: tuple[ImuSample, ...]
+    frame: CameraFrame | None
+    png: bytes | None  #: the frame's pixels as stored
+
+
+def numbers(value: Any) -> Array:
+    """(n,) 64-bit floats of a number, an array, a message of such, or nothing (None)."""
+    if value is None:
+        return np.empty(0)
+    if is_dataclass(value):
+        return np.concatenate([numbers(getattr(value, f.name)) for f in fields(value)])
+    return np.asarray(value, dtype=np.float64).ravel()
+
+
+def estimate_row(solution: NavSolution) -> dict[str, Array | str]:
+    """Return every field of a solution as text or as (n,) floats."""
+    values = {f.name: getattr(solution, f.name) for f in fields(solution)}
+    return {name: value if isinstance(value, str) else numbers(value) for name, value in values.items()}
+
+
+class MessageLog:
+    """Writes the three files while a flight goes on; use it in a `with` statement."""
+
+    def __init__(self, out_dir: str | Path, recipe: NavigatorRecipe) -> None:
+        folder = Path(out_dir)
+        recipe.write(folder)
+        self._messages = pq.ParquetWriter(
+            folder / MESSAGES, _MESSAGE_SCHEMA, compression={"png": "NONE"} | dict.fromkeys(_compressed(), "ZSTD")
+        )
+        self._estimates = pq.ParquetWriter(folder / ESTIMATES, _ESTIMATE_SCHEMA, compression="ZSTD")
+        self._queue: queue.Queue[tuple[tuple[ImuSample, ...], CameraFrame | None, NavSolution] | None] = queue.Queue(
+            QUEUE_TICKS
+        )
+        self._failure: BaseException | None = None
+        self._thread = threading.Thread(target=self._work, name="message log", daemon=True)
+        self._thread.start()
+
+    def append(self, imu: Sequence[ImuSample], frame: CameraFrame | None, solution: NavSolution) -> None:
+        """Take one control tick; blocks while the encoder is too far behind.
+
+        Raises:
+            OSError: the disk refused an earlier tick.
+        """
+        if self._failure is not None:
+            raise self._failure
+        self._queue.put((tuple(imu), frame, solution))
+
+    def close(self) -> None:
+        """Write what is still waiting and close the files.
+
+        Raises:
+            OSError: the disk refused it.
+        """
+        if self._thread.is_alive():
+            self._queue.put(None)
+            self._thread.join()
+        self._messages.close()
+        self._estimates.close()
+        if self._failure is not None:
+            raise self._failure
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _work(self) -> None:
+        messages: list[dict[str, Any]] = []
+        estimates: list[dict[str, Any]] = []
+        while (entry := self._queue.get()) is not None:
+            if self._failure is not None:
+                continue  # keep taking, so that the flight is not blocked before it is told
+            try:
+                messages.append(_message_row(entry[0], entry[1]))
+                estimates.append(estimate_row(entry[2]))
+                if len(messages) == ROW_GROUP_TICKS:
+                    self._flush(messages, estimates)
+            except BaseException as failure:  # noqa: B036 - handed to the flight's thread
+                self._failure = failure
+        try:
+            self._flush(messages, estimates)
+        except BaseException as failure:  # noqa: B036
+            self._failure = self._failure or failure
+
+    def _flush(self, messages: list[dict[str, Any]], estimates: list[dict[str, Any]]) -> None:
+        if messages:
+            self._messages.write_table(pa.Table.from_pylist(messages, _MESSAGE_SCHEMA))
+            self._estimates.write_table(pa.Table.from_pylist(estimates, _ESTIMATE_SCHEMA))
+        messages.clear()
+        estimates.clear()
+
+
+def _compressed() -> list[str]:
+    leaves = ["gyro_time_stamp_s.list.element", "gyro_angular_rate_rad_s.list.element"]
+    return leaves + [f.name for f in _MESSAGE_SCHEMA if f.type != _FLOATS and f.name != "png"]
+
+
+def _message_row(imu: tuple[ImuSample, ...], frame: CameraFrame | None) -> dict[str, Any]:
+    row: dict[str, Any] = {
+        "gyro_time_stamp_s": [sample.time_stamp_s for sample in imu],
+        "gyro_angular_rate_rad_s": [float(rate) for sample in imu for rate in sample.angular_rate_rad_s],
+    }
+    if frame is not None:
+        done, png = cv2.imencode(".png", frame.pixels, _PNG)
+        if not done:
+            raise OSError("a camera frame could not be encoded as PNG")
+        row |= {name: getattr(frame.window, name) for name in _WINDOW_COLUMNS}
+        row |= {"frame_time_stamp_s": frame.time_stamp_s, "exposure_s": frame.exposure_s, "gain": frame.gain}
+        row["png"] = png.tobytes()
+    return row
+
+
+def _existing(out_dir: Path, name: str) -> Path:
+    path = out_dir / name
+    if not path.is_file():
+        raise DockairError(str(path), expected="a flight recorded with --record window or full", got="no such file")
+    return path
+
+
+def read_messages(out_dir: str | Path, *, pixels: bool = True) -> Iterator[TickMessages]:
+    """Yield what each control tick delivered, in order.
+
+    Args:
+        out_dir: a flight's folder.
+        pixels: decode the frames; without, `frame.pixels` is empty and only `png` holds them.
+
+    Raises:
+        DockairError: nothing was recorded there.
+    """
+    with pq.ParquetFile(_existing(Path(out_dir), MESSAGES)) as file:
+        for group in range(file.num_row_groups):
+            for row in file.read_row_group(group).to_pylist():
+                yield _tick_from_row(row, pixels)
+
+
+def _tick_from_row(row: dict[str, Any], pixels: bool) -> TickMessages:
+    rates = np.array(row["gyro_angular_rate_rad_s"], dtype=np.float64).reshape(-1, 3)
+    stamps = row["gyro_time_stamp_s"]
+    imu = tuple(ImuSample(time_stamp_s=t, angular_rate_rad_s=rate) for t, rate in zip(stamps, rates, strict=True))
+    png = row["png"]
+    if png is None:
+        return TickMessages(imu=imu, frame=None, png=None)
+    window = Window(*(row[name] for name in _WINDOW_COLUMNS))
+    frame = CameraFrame(
+        time_stamp_s=row["frame_time_stamp_s"],
+        pixels=pixels_from_png(png) if pixels else np.empty((0, 0), np.uint8),
+        window=window,
+        exposure_s=row["exposure_s"],
+        gain=row["gain"],
+    )
+    return TickMessages(imu=imu, frame=frame, png=png)
+
+
+def pixels_from_png(png: bytes) -> Array:
+    """(rows, columns) pixels of a stored frame."""
+    return np.asarray(cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_UNCHANGED))
+
+
+def read_estimates(out_dir: str | Path) -> Iterator[dict[str, Array | str]]:
+    """Yield the recorded answer of each control tick as `estimate_row` gives it.
+
+    Raises:
+        DockairError: nothing was recorded there.
+    """
+    with pq.ParquetFile(_existing(Path(out_dir), ESTIMATES)) as file:
+        for group in range(file.num_row_groups):
+            for row in file.read_row_group(group).to_pylist():
+                yield {name: v if isinstance(v, str) else np.array(v, np.float64) for name, v in row.items()}

@@ -1,0 +1,162 @@
+"""What the command line shows to people: tables on stdout, progress on stderr."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+if TYPE_CHECKING:  # the progress of a flight is told in these; importing them here would slow `--help` down
+    from dockair.messages import NavSolution
+    from dockair.scenarios.bench import BenchReport
+    from dockair.scenarios.doctor import Check
+    from dockair.scenarios.schema import Scenario
+    from dockair.sim.truth import Truth
+
+_PLAIN_INTERVAL_S = 5.0  # of simulated time between two lines where stderr is no terminal
+_BAR_INTERVAL_S = 0.1
+
+#: Key of `result.json` (dotted) -> what people call it, unit, decimals.
+_FIGURES = {
+    "contact.time_s": ("contact after", "s", 2),
+    "contact.radial_offset_m": ("off the basket's centre", "m", 3),
+    "contact.closure_speed_m_s": ("closing speed", "m/s", 2),
+    "contact.angle_deg": ("probe against drogue axis", "deg", 1),
+    "hold.duration_s": ("held for", "s", 1),
+    "hold.take_in_max_m": ("hose taken in", "m", 2),
+    "nav.range_rmse_m": ("navigation, range error (RMS)", "m", 4),
+    "nav.lateral_rmse_m": ("navigation, lateral error (RMS)", "m", 4),
+    "nav.availability": ("navigation, valid", "of the time", 3),
+    "frames": ("camera frames", "", 0),
+    "wall_time_s": ("wall time", "s", 1),
+    "real_time_factor": ("simulated time per wall time", "", 2),
+}
+
+
+class FlightProgress:
+    """Shows simulated time, phase and range: a bar on a terminal, else a line every few simulated seconds.
+
+    Args:
+        duration_s: the longest the flight may take.
+        console: where to; stderr by default.
+    """
+
+    def __init__(self, duration_s: float, console: Console | None = None) -> None:
+        self._console = console or Console(stderr=True, highlight=False)
+        self._duration_s, self._next_s = duration_s, 0.0
+        self._bar = Progress(
+            TextColumn("{task.description:<12}"),
+            BarColumn(),
+            TaskProgressColumn("{task.completed:5.1f} of {task.total:.0f} s"),
+            TextColumn("range {task.fields[range_m]:6.2f} m"),
+            TimeElapsedColumn(),
+            console=self._console,
+            transient=True,
+        )
+        self._task = self._bar.add_task("building", total=duration_s, range_m=float("nan"))
+
+    def __enter__(self) -> Self:
+        if self._console.is_terminal:
+            self._bar.start()
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        if self._console.is_terminal:
+            self._bar.stop()
+
+    def __call__(self, truth: "Truth", solution: "NavSolution") -> None:
+        """Take note of one control tick."""
+        if truth.time_s < self._next_s:
+            return
+        range_m = float(np.linalg.norm(truth.p_PD_B))
+        if self._console.is_terminal:
+            self._next_s = truth.time_s + _BAR_INTERVAL_S
+            self._bar.update(self._task, completed=truth.time_s, description=solution.phase, range_m=range_m)
+        else:
+            self._next_s = truth.time_s + _PLAIN_INTERVAL_S
+            self._console.print(f"{truth.time_s:6.1f} s  {solution.phase:<12} range {range_m:6.2f} m")
+
+
+def show_result(result: Mapping[str, Any], shortfalls: Sequence[str] | None, folder: Path) -> None:
+    """Print a flight's outcome, figures and files.
+
+    Args:
+        result: as in `result.json`.
+        shortfalls: what the scenario's `accept` asks for and the flight did not show; None when it asks for nothing.
+        folder: where the flight was written.
+    """
+    console = Console(highlight=False)
+    colour = "green" if result["outcome"] == "contact" else "yellow"
+    mark = "  (perfect navigation: the truth in place of the camera)" if result.get("truth_navigation") else ""
+    console.print(f"[bold {colour}]{result['outcome']}[/]  {result['scenario']}, seed {result['seed']}{mark}")
+    table = Table(show_header=False, box=None, padding=(0, 1))
+    table.add_column()
+    table.add_column(justify="right")
+    table.add_column()
+    for key, (label, unit, decimals) in _FIGURES.items():
+        value = _at(result, key)
+        if value is not None:
+            table.add_row(label, f"{value:.{decimals}f}", unit)
+    console.print(table)
+    if shortfalls is not None:
+        console.print("; ".join(shortfalls) or "as the scenario claims", style="yellow" if shortfalls else "green")
+    for path in sorted(folder.iterdir()):
+        console.print(f"  {path}  [dim]{path.stat().st_size / 1e6:.2f} MB[/]", soft_wrap=True)
+    if (folder / "episode.rrd").exists():
+        console.print(f"look at it: rerun --bind 127.0.0.1 {folder / 'episode.rrd'}", soft_wrap=True)
+
+
+def show_scenarios(scenarios: Sequence["Scenario"]) -> None:
+    """Print the library."""
+    table = Table(box=None, padding=(0, 1))
+    for heading in ("scenario", "gusts", "claim"):
+        table.add_column(heading)
+    for scenario in scenarios:
+        table.add_row(scenario.name, gusts_in_words(scenario), scenario.claim)
+    Console(highlight=False).print(table)
+
+
+def gusts_in_words(scenario: "Scenario") -> str:
+    """Return "still", the standard deviation, or the intensity's name."""
+    turbulence = scenario.turbulence
+    if turbulence.model == "none":
+        return "still"
+    return turbulence.intensity or f"{turbulence.sigma_m_s:g} m/s"
+
+
+def show_checks(checks: Sequence["Check"], versions: Mapping[str, str]) -> None:
+    """Print what the doctor found."""
+    console = Console(highlight=False)
+    table = Table(show_header=False, box=None, padding=(0, 1))
+    for check in checks:
+        word = "[green]ok[/]" if check.ok else "[red]missing[/]" if check.needed else "[yellow]low[/]"
+        table.add_row(word, check.name, check.found if check.ok else f"{check.found}: {check.remedy}")
+    console.print(table)
+    console.print(", ".join(f"{name} {version}" for name, version in versions.items()), style="dim")
+
+
+def show_bench(report: "BenchReport") -> None:
+    """Print where a flight's time goes."""
+    figures = report.to_json()
+    console = Console(highlight=False)
+    console.print(
+        f"{figures['frames_per_second']:.1f} frames per second, {figures['real_time_factor']:.2f} of real time"
+    )
+    table = Table(box=None, padding=(0, 1))
+    for heading in ("part", "share", "ms a call"):
+        table.add_column(heading, justify="left" if heading == "part" else "right")
+    for part, share in figures["share"].items():
+        milliseconds = figures["milliseconds_per_call"].get(part)
+        table.add_row(part, f"{share:.1%}", "" if milliseconds is None else f"{milliseconds:.3f}")
+    console.print(table)
+
+
+def _at(table: Mapping[str, Any], key: str) -> Any:
+    value: Any = table
+    for name in key.split("."):
+        value = value.get(name) if isinstance(value, Mapping) else None
+    return value

@@ -1,0 +1,44 @@
+"""Where a flight is written: a folder that is empty or holds an earlier flight, and nobody else's files."""
+
+from pathlib import Path
+
+from dockair.errors import DockairError
+
+#: What a flight writes; only these are ever replaced.
+FLIGHT_FILES = (
+    "result.json",
+    "episode.rrd",
+    "flight.parquet",
+    "flight.png",
+    "messages.parquet",
+    "estimates.parquet",
+    "navigator.json",
+)
+
+
+def default_output_folder(scenario_name: str, seed: int) -> Path:
+    """Return out/<scenario>-<seed>."""
+    return Path("out") / f"{scenario_name}-{seed}"
+
+
+def prepare_output_folder(folder: Path) -> None:
+    """Make the folder, and remove an earlier flight's files from it; other files stay.
+
+    Raises:
+        DockairError: it is not a folder, holds files but no flight, or cannot be written.
+    """
+    expected = "a new or empty folder, or one with an earlier flight"
+    if folder.exists() and not folder.is_dir():
+        raise DockairError(f"--out {folder}", expected=expected, got="a file")
+    try:
+        present = sorted(path.name for path in folder.iterdir()) if folder.is_dir() else []
+        if present and not set(present) & set(FLIGHT_FILES):
+            raise DockairError(f"--out {folder}", expected=expected, got=f"a folder with {present[0]}")
+        for name in FLIGHT_FILES:
+            (folder / name).unlink(missing_ok=True)
+        folder.mkdir(parents=True, exist_ok=True)
+        probe = folder / "result.json"
+        probe.touch()
+        probe.unlink()
+    except OSError as error:
+        raise DockairError(f"--out {folder}", expected="a folder that can be written", got=error.strerror) from None

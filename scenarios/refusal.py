@@ -1,0 +1,108 @@
+"""Turns what pydantic says about a wrong table into the one line of a `DockairError`: where, expected, got, exists."""
+
+import types
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, Union, get_args, get_origin
+
+from pydantic import BaseModel, ValidationError
+from pydantic.fields import FieldInfo
+
+from dockair.errors import DockairError
+
+_WORDS = {float: "a number", int: "an integer", bool: "true or false", str: "a string", dict: "a table"}
+
+
+@dataclass(frozen=True, slots=True)
+class Expected:
+    """Says in a field's annotation what is expected where type and range alone do not."""
+
+    text: str
+
+
+def refusal(error: ValidationError, model: type[BaseModel], place: Callable[[str], str]) -> DockairError:
+    """Return the first of the errors in one line, with the number of the others.
+
+    Args:
+        error: what pydantic raised on validating `model`.
+        model: the outermost model.
+        place: from a dotted key to what its writer would call the place (file and key).
+    """
+    errors = error.errors(include_url=False)
+    first = errors[0]
+    where = place(_dotted(first["loc"]))
+    if first["type"] == "extra_forbidden":
+        owner = _model_at(model, first["loc"][:-1])
+        refused = DockairError(where, expected="a known key", got=first["loc"][-1], exists=sorted(owner.model_fields))
+    elif first["type"] == "missing":
+        refused = DockairError(where, expected=_expected(_field_at(model, first["loc"])), got=None)
+    else:
+        field = _field_at(model, first["loc"])
+        refused = DockairError(where, expected=_expected(field), got=first["input"], exists=_choices(field))
+    if len(errors) > 1:
+        refused.args = (f"{refused}; and {len(errors) - 1} more",)
+    return refused
+
+
+def _dotted(location: Sequence[int | str]) -> str:
+    text = ""
+    for part in location:
+        text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else part
+    return text
+
+
+def _model_at(model: type[BaseModel], location: Sequence[int | str]) -> type[BaseModel]:
+    for part in location:
+        annotation = model.model_fields[str(part)].annotation
+        assert isinstance(annotation, type) and issubclass(annotation, BaseModel)
+        model = annotation
+    return model
+
+
+def _field_at(model: type[BaseModel], location: Sequence[int | str]) -> FieldInfo:
+    """Return the field of the location; of an element (or of what lies deeper) the field that holds it."""
+    field = model.model_fields[str(location[0])]
+    inner = field.annotation
+    if len(location) > 1 and isinstance(inner, type) and issubclass(inner, BaseModel):
+        return _field_at(inner, location[1:])
+    return field
+
+
+def _alternatives(annotation: Any) -> list[Any]:
+    """Return the types of a union without None, or the one type."""
+    if get_origin(annotation) in (Union, types.UnionType):
+        return [kind for kind in get_args(annotation) if kind is not type(None)]
+    return [annotation]
+
+
+def _choices(field: FieldInfo) -> tuple[str, ...]:
+    kind = _alternatives(field.annotation)[0]
+    return tuple(str(value) for value in get_args(kind)) if get_origin(kind) is Literal else ()
+
+
+def _expected(field: FieldInfo) -> str:
+    for item in field.metadata:
+        if isinstance(item, Expected):
+            return item.text
+    kind = _alternatives(field.annotation)[0]
+    if get_origin(kind) is Literal:
+        return "one of the names that exist"
+    if isinstance(kind, type) and issubclass(kind, BaseModel):
+        return "a table"
+    word = _WORDS.get(get_origin(kind) or kind, str(kind))
+    return " ".join([word, *_bounds(field)])
+
+
+def _bounds(field: FieldInfo) -> list[str]:
+    """Return the range in words, from the constraints among the field's metadata."""
+    limits = {
+        name: getattr(item, name) for item in field.metadata for name in ("gt", "ge", "lt", "le") if hasattr(item, name)
+    }
+    words = []
+    if "gt" in limits:
+        words.append(f"above {limits['gt']}")
+    if "ge" in limits:
+        words.append(f"from {limits['ge']}" if "le" in limits else f"of at least {limits['ge']}")
+    if "le" in limits:
+        words.append(f"to {limits['le']}" if "ge" in limits else f"up to {limits['le']}")
+    return words

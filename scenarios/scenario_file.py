@@ -1,0 +1,103 @@
+"""Finds and reads a scenario's TOML and lays the settings of `--set` over it; what the keys mean is the schema's."""
+
+import os
+import tomllib
+from collections.abc import Mapping
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from dockair.errors import DockairError
+
+#: Setting the one replaces the other, which the file may have given.
+_ALTERNATIVES = {"turbulence.sigma_m_s": "intensity", "turbulence.intensity": "sigma_m_s"}
+
+
+def scenario_names() -> list[str]:
+    """Names in the library, the default first."""
+    return sorted(_library(), key=lambda name: (name != "default", name))
+
+
+class ScenarioFile:
+    """A scenario's table as its writers gave it.
+
+    Args:
+        name_or_path: a name in the library, or the path of a TOML file.
+        settings: dotted key -> value instead of the file's; strings are read as TOML values.
+
+    Attributes:
+        table: keys and values, not checked.
+
+    Raises:
+        DockairError: no such scenario, or not TOML.
+    """
+
+    def __init__(self, name_or_path: str | Path, settings: Mapping[str, object]) -> None:
+        path = _find(name_or_path)
+        self._shown = path.name if path.parent == _folder() else str(path)
+        self._settings = tuple(settings)
+        self.table = _read(path)
+        _resolve_hardware(self.table, path.parent)
+        for key, value in settings.items():
+            _set(self.table, key, _value(value) if isinstance(value, str) else value)
+
+    def place(self, where: str) -> str:
+        """Return where a dotted key was written: `--set key`, or file and key."""
+        for key in self._settings:
+            if where == key or where.startswith((f"{key}.", f"{key}[")) or key.startswith(f"{where}."):
+                return f"--set {where}"
+        return f"{self._shown}: {where}"
+
+
+def _folder() -> Path:
+    return Path(str(files("dockair.scenarios"))) / "library"
+
+
+def _library() -> dict[str, Path]:
+    return {path.stem: path for path in _folder().glob("*.toml")}
+
+
+def _find(name_or_path: str | Path) -> Path:
+    path = Path(name_or_path)
+    if isinstance(name_or_path, str) and path.suffix != ".toml" and os.sep not in name_or_path:
+        if name_or_path not in _library():
+            expected = "a scenario of the library, or the path of a TOML file"
+            raise DockairError("scenario", expected=expected, got=name_or_path, exists=scenario_names())
+        return _library()[name_or_path]
+    if not path.exists():
+        raise DockairError(str(path), expected="a scenario file", got="no such file")
+    return path
+
+
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise DockairError(str(path), expected="TOML", got=str(error)) from None
+    except OSError as error:
+        raise DockairError(str(path), expected="a file that can be read", got=error.strerror) from None
+
+
+def _resolve_hardware(table: dict[str, Any], folder: Path) -> None:
+    """Take the file's paths from its own folder; those of `--set` are taken from where one stands."""
+    hardware = table.get("hardware")
+    if isinstance(hardware, dict):
+        hardware.update({key: str(folder / path) for key, path in hardware.items() if isinstance(path, str)})
+
+
+def _value(text: str) -> object:
+    try:
+        table = tomllib.loads(f"value = {text}")
+    except tomllib.TOMLDecodeError:
+        return text  # a shell has eaten the quotes, or a name that needs none
+    return table["value"] if len(table) == 1 else text
+
+
+def _set(table: dict[str, Any], key: str, value: object) -> None:
+    *names, last = key.split(".")
+    for name in names:
+        table = table.setdefault(name, {})
+        if not isinstance(table, dict):
+            raise DockairError(f"--set {key}", expected="a known key", got=key)
+    table.pop(_ALTERNATIVES.get(key, ""), None)
+    table[last] = value

@@ -1,0 +1,54 @@
+"""Receiver's control surfaces and engine lever: first-order lags with limits of position and rate.
+
+    d(surface)/dt = sat(a (sat(command) - surface)),     dT/dt = (sat(T_c) - T) / tau          (1)
+
+advanced exactly over a tick while no rate limit is met.
+Not modelled: dead zones, hysteresis, hinge moments.
+Source: Stevens, Lewis & Johnson, Aircraft Control and Simulation, chapters 4 and 5.
+"""
+
+import numpy as np
+from numba import njit
+
+from dockair.rotations import Array
+from dockair.sim.aircraft.aerodynamics import AirframeParameters
+from dockair.sim.aircraft.trim import Trim
+
+
+class Actuators:
+    """Surfaces and thrust, from trim on.
+
+    Args:
+        parameters: lags and limits.
+        trim: where they start, and the thrust range.
+        step_s: length of a tick.
+    """
+
+    def __init__(self, parameters: AirframeParameters, trim: Trim, step_s: float) -> None:
+        self._limits_rad = np.array(parameters.surface_limits_rad)
+        self._largest_step_rad = np.array(parameters.surface_rate_limits_rad_s) * step_s
+        self._surface_share = -float(np.expm1(-parameters.actuator_bandwidth_rad_s * step_s))
+        self._thrust_share = -float(np.expm1(-step_s / parameters.engine_time_constant_s))
+        self._range = trim.thrust_range
+        self.surfaces_rad: Array = trim.surfaces_rad  #: (3,) elevator, aileron, rudder
+        self.thrust_n = trim.thrust_n
+        self.throttle = trim.thrust_range.throttle(trim.thrust_n)  #: as commanded, after its limits
+
+    def step(self, surfaces_command_rad: Array, thrust_command_n: float) -> None:
+        """Advance by one tick toward the commands (3,) [rad] and [N]."""
+        self.surfaces_rad = _follow(
+            self.surfaces_rad, surfaces_command_rad, self._limits_rad, self._largest_step_rad, self._surface_share
+        )
+        command_n = min(max(thrust_command_n, self._range.idle_n), self._range.military_n)
+        self.thrust_n += self._thrust_share * (command_n - self.thrust_n)
+        self.throttle = self._range.throttle(command_n)
+
+
+@njit(cache=True)
+def _follow(surfaces, commands, limits, largest_step, share):  # type: ignore[no-untyped-def]
+    out = np.empty(3)
+    for i in range(3):
+        command = min(max(commands[i], -limits[i]), limits[i])
+        move = share * (command - surfaces[i])
+        out[i] = surfaces[i] + min(max(move, -largest_step[i]), largest_step[i])
+    return out

@@ -1,0 +1,93 @@
+"""Sheets of the hose and the drogue, and what follows from them: a chain of straight links.
+
+Full trail is the hose drawn out as far as it goes. Link 0 begins at the pod's exit, link i at joint i; the drogue hangs
+on the last joint. Axes of a link H: x along it toward the tanker; of the drogue D: origin in the LED ring's centre, x
+forward along the hose.
+
+Not modelled: stretch, twist.
+Source: the ball-and-rod chain of Ro and Kamman, J. Guidance 33(5), 2010, as in RflySim/RflySimAAR.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from dockair.rotations import Array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HoseParameters:
+    """assets/parameters/hose.toml."""
+
+    length_m: float
+    links: int
+    line_density_kg_m: float
+    radius_m: float
+    bending_stiffness_n_m2: float
+    bending_damping_n_m2_s: float
+    normal_drag_coefficient: float
+    supercritical_drag_coefficient: float
+    crisis_reynolds: float
+    crisis_width_ratio: float
+    friction_coefficient: float
+    reflectance: float
+
+    @property
+    def link_length_m(self) -> float:
+        """Length of one link [m]."""
+        return self.length_m / self.links
+
+    @property
+    def link_mass_kg(self) -> float:
+        """Mass of one link [kg]."""
+        return self.line_density_kg_m * self.link_length_m
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class DrogueParameters:
+    """assets/parameters/drogue.toml. Axes D: origin in the LED ring's centre, x forward along the hose."""
+
+    mass_kg: float
+    drag_diameter_m: float
+    drag_coefficient: float
+    drag_centre_x_m: float
+    rate_damping_coefficient: float
+    centre_of_mass_x_m: float
+    inertia_kg_m2: Array
+    hose_joint_x_m: float
+    hinge_damping_n_m_s: float
+    ring_diameter_m: float
+    rim_x_m: float
+    rim_tube_radius_m: float
+    ribs: int
+    rib_radius_m: float
+    throat_x_m: float
+    canopy_diameter_m: float
+    canopy_length_m: float
+    led_housing_radius_m: float
+    friction: float
+    contact_time_constant_s: float
+    reflectance: float
+    canopy_reflectance: float
+
+    @property
+    def drag_area_m2(self) -> float:
+        """Reference area S of the drag coefficient [m^2]."""
+        return 0.25 * np.pi * self.drag_diameter_m**2
+
+
+@njit(cache=True)
+def velocities_at(places: Array, spatial: Array, reference: Array) -> Array:
+    """(n, 3) velocities of points fixed in n bodies.
+
+    Args:
+        places: (n, 3) the points in W [m].
+        spatial: (n, 6) angular velocity and velocity of each body's material at `reference`, in W.
+        reference: (3,) point of W.
+    """
+    v = np.empty((places.shape[0], 3))
+    for i in range(places.shape[0]):
+        r = places[i] - reference
+        v[i] = spatial[i, 3:] + np.cross(spatial[i, :3], r)
+    return v

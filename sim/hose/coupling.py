@@ -1,0 +1,70 @@
+"""When the coupling takes the probe and when it lets go.
+
+The coupling decides once, when the tip comes within capture distance of the coupling point:
+
+    READY   -> LATCHED   angle between probe and drogue axis and closing speed within limits
+    READY   -> BARRED    either is not: it bounces, and does not latch in the rebound
+    LATCHED -> BARRED    the pull out of the coupling exceeds the release force (soft disconnect)
+    BARRED  -> READY     the tip has left by the re-arm distance
+
+Why a release force of 1.9 kN can be reached: at rest the hose carries the drogue's drag (1.7 kN) by itself and the
+coupling feels nothing. A receiver that backs off takes the hose out to its outer stop; there the hose is taut, and all
+further pull goes through the coupling, over and above the drogue's drag: the root then carries some 3.8 kN.
+
+Not modelled: the toggles' friction, wear, a coupling that fails to let go.
+Source of the limits: assets/parameters/coupling.toml.
+"""
+
+from dataclasses import dataclass
+from enum import Enum
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CouplingParameters:
+    """assets/parameters/coupling.toml."""
+
+    depth_m: float
+    capture_distance_m: float
+    angle_limit_rad: float
+    closing_speed_min_m_s: float
+    closing_speed_max_m_s: float
+    release_force_n: float
+    rearm_distance_m: float
+    latch_time_constant_s: float
+    socket_radius_m: float
+    socket_wall_m: float
+    stop_gap_m: float
+    probe_tip_radius_m: float
+    probe_boom_radius_m: float
+
+
+class CouplingState(Enum):
+    """What the coupling does."""
+
+    READY = "ready"
+    LATCHED = "latched"
+    BARRED = "barred"  #: until the tip has left
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ProbeInCoupling:
+    """Where the probe is, seen from the coupling."""
+
+    distance_m: float  #: tip to coupling point
+    angle_rad: float  #: between the axes of probe and drogue
+    closing_speed_m_s: float  #: of the tip into the coupling, along the drogue's axis
+    pull_n: float  #: with which the held probe is drawn out of the coupling, along the drogue's axis
+
+
+def next_coupling_state(state: CouplingState, probe: ProbeInCoupling, parameters: CouplingParameters) -> CouplingState:
+    """State after this tick."""
+    if state is CouplingState.LATCHED:
+        return CouplingState.BARRED if probe.pull_n > parameters.release_force_n else state
+    if state is CouplingState.BARRED:
+        return CouplingState.READY if probe.distance_m > parameters.rearm_distance_m else state
+    if probe.distance_m > parameters.capture_distance_m:
+        return state
+    fast_enough = probe.closing_speed_m_s >= parameters.closing_speed_min_m_s
+    slow_enough = probe.closing_speed_m_s <= parameters.closing_speed_max_m_s
+    aligned = probe.angle_rad <= parameters.angle_limit_rad
+    return CouplingState.LATCHED if fast_enough and slow_enough and aligned else CouplingState.BARRED

@@ -1,0 +1,140 @@
+"""The reel: holds a tension, within limits of speed and stroke; and the tube that leads the hose inside the pod.
+
+    tau dF/dt = T_s + k (T_s - T) - F                                                                    (1)
+    F_hose    = F g(v) + F_b b(v) - d v                                                                  (2)
+
+F is the motor's pull on the hose (positive winds in), T the hose's tension at the exit, T_s the set-point, a fraction
+of the static tension at full trail. g falls from 1 to 0 as the winding speed v comes within a band of the take-up
+limit; b rises from 0 to 1 beyond the pay-out limit: a brake. With T_s below the static tension the hose rests on its
+outer stop and runs out again by itself after the receiver has left; with T_s equal to it, it would not.
+
+Inside the pod the hose lies straight in a tube. A link that is half drawn in, a length s of its l, must turn the hose
+at the exit and not at its own front joint: with the outer hose at an angle theta to the pod's axis, its own angle has
+to be (1 - s/l) theta. Under a tension T a torsion spring against the axis does precisely that:
+
+    k_t(s) = T l (s/l) / (1 - s/l)                                                                       (3)
+
+capped where it is as stiff as the tube. So the drogue moves smoothly while joint after joint passes the exit.
+
+Not modelled: the drum's changing diameter, friction of the hose in the tube, slack on the drum.
+Sources: RflySim/RflySimAAR (gain); limits in assets/parameters/reel.toml; Eq. (3) derived from the link's balance.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from dockair.rotations import Array
+from dockair.sim.air.atmosphere import STANDARD_GRAVITY_M_S2
+from dockair.sim.hose.chain import HoseParameters
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReelParameters:
+    """assets/parameters/reel.toml."""
+
+    set_point_fraction: float
+    tension_gain: float
+    response_time_s: float
+    range_m: float
+    take_up_speed_m_s: float
+    pay_out_speed_m_s: float
+    speed_band_m_s: float
+    brake_force_n: float
+    drum_mass_kg: float
+    drum_damping_n_s_m: float
+    stop_time_constant_s: float
+    guide_stiffness_n_m: float
+    guide_damping_ratio: float
+
+
+class Reel:
+    """Motor of the reel, Eqs. (1) and (2).
+
+    Args:
+        parameters: the reel's sheet.
+        static_root_tension_n: tension at the exit at rest at full trail.
+        step_s: physics step.
+    """
+
+    def __init__(self, parameters: ReelParameters, static_root_tension_n: float, step_s: float) -> None:
+        self._parameters = parameters
+        self.set_point_n = parameters.set_point_fraction * static_root_tension_n
+        self._blend = 1.0 - np.exp(-step_s / parameters.response_time_s)
+        self.motor_force_n = self._wanted(static_root_tension_n)
+
+    def step(self, tension_n: float, rate_m_s: float) -> float:
+        """Advance by one tick; return the force on the hose [N], positive winds in.
+
+        Args:
+            tension_n: at the exit.
+            rate_m_s: of winding, positive in.
+        """
+        p = self._parameters
+        self.motor_force_n += self._blend * (self._wanted(tension_n) - self.motor_force_n)  # Eq. (1)
+        drive = min(max((p.take_up_speed_m_s - rate_m_s) / p.speed_band_m_s, 0.0), 1.0)
+        brake = min(max((-rate_m_s - p.pay_out_speed_m_s) / p.speed_band_m_s, 0.0), 1.0)
+        return self.motor_force_n * drive + p.brake_force_n * brake - p.drum_damping_n_s_m * rate_m_s  # Eq. (2)
+
+    def _wanted(self, tension_n: float) -> float:
+        """Motor's pull asked for; it cannot push the hose out."""
+        return max(self.set_point_n + self._parameters.tension_gain * (self.set_point_n - tension_n), 0.0)
+
+
+def guide_coefficients(hose: HoseParameters, reel: ReelParameters, static_root_tension_n: float) -> Array:
+    """(6,) vector that `guide_loads` needs: link length and mass, T l, tube stiffness and damping, damping ratio."""
+    length, mass = hose.link_length_m, hose.link_mass_kg
+    damping = 2.0 * reel.guide_damping_ratio * np.sqrt(reel.guide_stiffness_n_m * mass)
+    k = np.array(
+        [length, mass, static_root_tension_n * length, reel.guide_stiffness_n_m, damping, reel.guide_damping_ratio]
+    )
+    k.setflags(write=False)
+    return k
+
+
+@njit(cache=True)
+def guide_loads(position: Array, R: Array, v: Array, w: Array, drawn_in: float, k: Array) -> Array:
+    """What the tube in the pod does to the hose's links, Eq. (3).
+
+    Args:
+        position: (n, 3) the links' middles in W [m].
+        R: (n, 3, 3) their axes in W, x along the link toward the tanker.
+        v: (n, 3) velocities of the middles in W [m/s].
+        w: (n, 3) angular velocities in W [rad/s].
+        drawn_in: length of hose inside the pod [m].
+        k: vector of `guide_coefficients`.
+
+    Returns:
+        (n, 6) force [N] and moment about the middle [N m], in W.
+    """
+    n = position.shape[0]
+    length, mass, tension_length, stiffness, damping, ratio = k[0], k[1], k[2], k[3], k[4], k[5]
+    stiffest = stiffness * length * length
+    inertia = mass * length * length / 3.0
+    wrench = np.zeros((n, 6))
+    for i in range(n):
+        s = min((drawn_in - i * length) / length, 1.0)
+        if s <= 0.0:
+            break
+        t = R[i, :, 0]
+        torsion = stiffest
+        if tension_length * s < stiffest * (1.0 - s):
+            torsion = tension_length * s / (1.0 - s)  # Eq. (3)
+        turning = 2.0 * ratio * np.sqrt(torsion * inertia)
+        # t x e_x turns the link onto the tube's axis; twist about x has no joint and no load
+        wrench[i, 4] += torsion * t[2] - turning * w[i, 1]
+        wrench[i, 5] += -torsion * t[1] - turning * w[i, 2]
+        wrench[i, 2] += s * mass * STANDARD_GRAVITY_M_S2  # the tube carries what lies in it
+        wrench[i, 4] += -0.5 * (1.0 - s) * length * t[0] * s * mass * STANDARD_GRAVITY_M_S2
+        if i > 0:  # joint i, at the rear end of link i - 1, is held to the axis
+            j = i - 1
+            arm = -0.5 * length * R[j, :, 0]
+            velocity = v[j] + np.cross(w[j], arm)
+            held = min(s, 1.0)
+            force = np.zeros(3)
+            for axis in (1, 2):
+                force[axis] = -held * (stiffness * (position[j, axis] + arm[axis]) + damping * velocity[axis])
+            wrench[j, :3] += force
+            wrench[j, 3:] += np.cross(arm, force)
+    return wrench

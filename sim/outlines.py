@@ -1,0 +1,127 @@
+"""Outlines of tanker and receiver in MuJoCo's primitives: what the camera sees of them and what they strike with.
+
+A drawing, not physics: masses, inertias and forces come from the parameter sheets. Proportions are those of a
+narrow-body transport with pods under its wings, and of a light single-engined fighter; the tanker's scale with its
+sheet, the receiver's nose and probe with the mounting.
+
+Each piece lies in its aircraft's axes, x forward, y left, z up, origin in the centre of gravity (receiver) or at the
+middle of the wing's root (tanker). `yaw_rad` turns it about z, then `pitch_rad` about y and `roll_rad` about x.
+Not drawn: control surfaces, undercarriage, markings. Lofted meshes may take the place of these pieces.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dockair.calibration import Mounting
+from dockair.rotations import matrix_from_yaw_pitch_roll, quaternion_from_matrix
+
+Point = tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TankerParameters:
+    """assets/parameters/tanker.toml."""
+
+    mass_kg: float
+    span_m: float
+    length_m: float
+    fuselage_radius_m: float
+    exit_m: np.ndarray  # type: ignore[type-arg]
+    pod_length_m: float
+    pod_radius_m: float
+    reflectance: float
+
+
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """One primitive. Kinds: ellipsoid and box with half-sizes, capsule from `at` to `to` with radius size[0]."""
+
+    name: str
+    kind: str
+    at: Point
+    size: Point
+    to: Point | None = None
+    yaw_rad: float = 0.0
+    pitch_rad: float = 0.0
+    roll_rad: float = 0.0
+    shade: float = 1.0  #: reflectance over the aircraft's own
+
+    @property
+    def q_wxyz(self) -> list[float]:
+        """Orientation in the aircraft's axes."""
+        R = matrix_from_yaw_pitch_roll(self.yaw_rad, self.pitch_rad, self.roll_rad)
+        return [float(c) for c in quaternion_from_matrix(R)]
+
+
+def _pair(name: str, kind: str, at: Point, size: Point, *, yaw: float, roll: float, shade: float = 1.0) -> list[Piece]:
+    """The piece on the left and its mirror image on the right."""
+    x, y, z = at
+    left = Piece(f"{name}_left", kind, at, size, yaw_rad=yaw, roll_rad=roll, shade=shade)
+    right = Piece(f"{name}_right", kind, (x, -y, z), size, yaw_rad=-yaw, roll_rad=-roll, shade=shade)
+    return [left, right]
+
+
+def tanker_pieces(tanker: TankerParameters) -> list[Piece]:
+    """Outline of the tanker in its own axes T, pod at the hose's exit included."""
+    r, length, half_span = tanker.fuselage_radius_m, tanker.length_m, 0.5 * tanker.span_m
+    sweep = np.deg2rad(28.0)  # tips aft
+    dihedral = np.deg2rad(5.0)
+    tail_x = -0.47 * length
+    exit_x, exit_y, exit_z = (float(c) for c in tanker.exit_m)
+    wing_at = (3.0 - 0.5 * half_span * np.tan(sweep), 0.5 * half_span, -0.45 * r + 0.5 * half_span * np.tan(dihedral))
+    wing_half_length = 0.5 * half_span / np.cos(sweep)
+    pod_x = exit_x + 0.5 * tanker.pod_length_m
+    pod_half = 0.5 * tanker.pod_length_m - tanker.pod_radius_m
+    wing_over_pod_z = -0.45 * r + abs(exit_y) * np.tan(dihedral)
+    return [
+        Piece("fuselage", "capsule", (0.36 * length, 0.0, 0.0), (r, 0.0, 0.0), to=(-0.22 * length, 0.0, 0.0)),
+        Piece("tailcone", "ellipsoid", (-0.24 * length, 0.0, 0.12 * r), (0.28 * length, 0.9 * r, 0.8 * r)),
+        *_pair("wing", "ellipsoid", wing_at, (2.9, wing_half_length, 0.33), yaw=sweep, roll=dihedral),
+        *_pair(
+            "tailplane",
+            "ellipsoid",
+            (tail_x - 0.6, 0.17 * half_span + r, 0.5 * r),
+            (1.8, 0.2 * half_span, 0.16),
+            yaw=sweep,
+            roll=dihedral,
+        ),
+        Piece("fin", "ellipsoid", (tail_x, 0.0, 3.2 * 0.5 * r + r), (2.2, 0.18, 3.4), pitch_rad=np.deg2rad(-32.0)),
+        *_pair(
+            "engine", "ellipsoid", (2.2, 0.36 * half_span, -1.25 * r), (2.3, 1.0, 1.0), yaw=0.0, roll=0.0, shade=0.7
+        ),
+        *_pair("pylon", "box", (1.0, 0.36 * half_span, -0.72 * r), (1.4, 0.12, 0.5), yaw=0.0, roll=0.0, shade=0.8),
+        Piece(
+            "pod",
+            "capsule",
+            (pod_x + pod_half, exit_y, exit_z),
+            (tanker.pod_radius_m, 0.0, 0.0),
+            to=(pod_x - pod_half, exit_y, exit_z),
+            shade=0.8,
+        ),
+        Piece(
+            "pod_pylon",
+            "box",
+            (pod_x + 0.2, exit_y, 0.5 * (exit_z + wing_over_pod_z)),
+            (0.9, 0.09, 0.5 * abs(wing_over_pod_z - exit_z)),
+            shade=0.8,
+        ),
+    ]
+
+
+def receiver_pieces(mounting: Mounting) -> list[Piece]:
+    """Outline of the receiver in body axes B, without its probe. The nose ends 1.2 m behind the probe's tip."""
+    nose_x = float(mounting.p_BP[0]) - 1.2
+    sweep = np.deg2rad(32.0)
+    return [
+        Piece("fuselage_middle", "capsule", (1.6, 0.0, -0.1), (0.62, 0.0, 0.0), to=(-4.6, 0.0, -0.1)),
+        # Three ellipsoids, slender toward the tip, so that the camera beside the nose looks past it
+        Piece("fuselage_front", "ellipsoid", (1.4, 0.0, -0.05), (nose_x - 2.3, 0.52, 0.52)),
+        Piece("fuselage_nose", "ellipsoid", (nose_x - 1.6, 0.0, -0.05), (1.6, 0.26, 0.26)),
+        Piece("fuselage_intake", "ellipsoid", (0.6, 0.0, -0.75), (2.2, 0.45, 0.42), shade=0.8),
+        Piece("canopy", "ellipsoid", (1.1, 0.0, 0.42), (1.5, 0.36, 0.5), shade=0.4),
+        Piece("nozzle", "capsule", (-5.0, 0.0, -0.1), (0.5, 0.0, 0.0), to=(-5.6, 0.0, -0.1), shade=0.4),
+        *_pair("wing", "ellipsoid", (-1.6, 2.5, -0.1), (1.4, 2.35, 0.09), yaw=0.5 * sweep, roll=0.0),
+        *_pair("tailplane", "ellipsoid", (-5.4, 1.6, -0.1), (0.9, 1.2, 0.06), yaw=0.5 * sweep, roll=0.0),
+        Piece("fin", "ellipsoid", (-4.9, 0.0, 1.5), (1.1, 0.07, 1.5), pitch_rad=-sweep),
+    ]

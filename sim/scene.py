@@ -1,0 +1,305 @@
+"""The MuJoCo model of the world, built by MjSpec: tanker, hose on its reel, drogue, receiver with probe, light.
+
+Frame W: origin at the hose's exit from the pod, x forward, z up; it moves with the tanker's trim velocity, so that the
+tanker stands still and the air blows. Bodies "tanker", "hose_0" ... "hose_{n-1}", "drogue", "receiver"; geoms
+"probe_...", "basket_...", "coupling_...", "hose_...", "fuselage_..." and so on; sites "led_0" ... "led_7", "coupling",
+"probe_tip".
+
+Who touches whom: the probe touches basket, coupling and hose; every other part of the receiver touches hose, drogue and
+tanker. Hose and drogue touch nothing of the tanker. Grey values are reflectances near 850 nm.
+
+Joints: "reel" slides link 0 along the pod's axis, 0 at full trail, positive wound in; each link, and the drogue on the
+last one, has two hinges "<body>_y", "<body>_z" at its front end, and no twist.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from dockair.calibration import Camera, LedRing, Mounting
+from dockair.rotations import Array
+from dockair.sim.air.atmosphere import STANDARD_GRAVITY_M_S2
+from dockair.sim.hose.chain import DrogueParameters, HoseParameters
+from dockair.sim.hose.coupling import CouplingParameters
+from dockair.sim.hose.reel import ReelParameters
+from dockair.sim.outlines import Piece, TankerParameters, receiver_pieces, tanker_pieces
+
+# Contact bits
+_PROBE, _RECEIVER = 1, 2
+
+_RECEIVER_REFLECTANCE = 0.4  # grey paint near 850 nm; drawing only
+_SOCKET_STAVES = 12  # capsules around the coupling's mouth
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SceneParameters:
+    """Everything the model is built from."""
+
+    hose: HoseParameters
+    drogue: DrogueParameters
+    reel: ReelParameters
+    coupling: CouplingParameters
+    tanker: TankerParameters
+    mounting: Mounting
+    receiver_mass_kg: float
+    receiver_inertia_B: Array  #: (3, 3) about the centre of gravity [kg m^2]
+    sun_direction_W: Array  #: (3,) unit vector from the scene to the Sun
+    step_s: float
+
+
+def build_scene(parameters: SceneParameters) -> mujoco.MjModel:
+    """Compile the model."""
+    spec = mujoco.MjSpec()
+    spec.modelname = "dockair"
+    _set_options(spec, parameters.step_s)
+    _add_sky_and_sun(spec, parameters.sun_direction_W)
+    _add_tanker(spec, parameters.tanker)
+    drogue = _add_hose(spec, parameters)
+    _add_drogue(drogue, parameters)
+    _add_receiver(spec, parameters)
+    latch = spec.add_equality(
+        name="latch", type=mujoco.mjtEq.mjEQ_CONNECT, objtype=mujoco.mjtObj.mjOBJ_SITE, name1="probe_tip"
+    )
+    latch.name2, latch.active = "coupling", False
+    latch.solref[:] = parameters.coupling.latch_time_constant_s, 1.0
+    return spec.compile()
+
+
+def _set_options(spec: Any, step_s: float) -> None:
+    spec.option.timestep = step_s
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    spec.option.gravity = [0.0, 0.0, -STANDARD_GRAVITY_M_S2]
+    spec.compiler.degree = False
+    spec.compiler.autolimits = False
+    sensor = Camera()
+    spec.visual.global_.offwidth, spec.visual.global_.offheight = sensor.width_px, sensor.height_px
+    spec.visual.quality.offsamples = 0  # multisampling costs tenfold off-screen and is the camera model's business
+    spec.visual.quality.shadowsize = 0
+    spec.stat.extent, spec.stat.center = 40.0, [-15.0, 0.0, -2.0]
+    spec.visual.map.znear, spec.visual.map.zfar = 0.0025, 50.0  # times the extent: 0.1 m to 2 km
+
+
+def _add_sky_and_sun(spec: Any, sun_direction_W: Array) -> None:
+    headlight = spec.visual.headlight
+    headlight.active, headlight.ambient[:], headlight.diffuse[:], headlight.specular[:] = 0, 0.0, 0.0, 0.0
+    sun = np.asarray(sun_direction_W, dtype=float)
+    light = spec.worldbody.add_light(name="sun", type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL, castshadow=False)
+    light.dir = -sun / np.linalg.norm(sun)
+    light.ambient, light.diffuse, light.specular = [0.25] * 3, [0.75] * 3, [0.1] * 3
+    spec.add_texture(
+        name="sky",
+        type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,
+        rgb1=[0.10] * 3,  # zenith: dark in the near infrared
+        rgb2=[0.35] * 3,  # ground and haze
+        width=64,
+        height=384,
+    )
+
+
+def _grey(reflectance: float) -> list[float]:
+    return [reflectance, reflectance, reflectance, 1.0]
+
+
+def _add_pieces(body: Any, pieces: list[Piece], prefix: str, reflectance: float, contact: dict[str, Any]) -> None:
+    kinds = {
+        "ellipsoid": mujoco.mjtGeom.mjGEOM_ELLIPSOID,
+        "box": mujoco.mjtGeom.mjGEOM_BOX,
+        "capsule": mujoco.mjtGeom.mjGEOM_CAPSULE,
+    }
+    for piece in pieces:
+        placed = {"fromto": [*piece.at, *piece.to]} if piece.to is not None else {"pos": piece.at, "quat": piece.q_wxyz}
+        body.add_geom(
+            name=prefix + piece.name,
+            type=kinds[piece.kind],
+            size=list(piece.size),
+            rgba=_grey(min(reflectance * piece.shade, 1.0)),
+            mass=0.0,
+            **placed,
+            **contact,
+        )
+
+
+def _add_tanker(spec: Any, tanker: TankerParameters) -> None:
+    body = spec.worldbody.add_body(name="tanker", pos=-np.asarray(tanker.exit_m))
+    contact = {"contype": 0, "conaffinity": _RECEIVER}
+    _add_pieces(body, tanker_pieces(tanker), "tanker_", tanker.reflectance, contact)
+
+
+def _add_hose(spec: Any, parameters: SceneParameters) -> Any:
+    """Add reel and links; return the drogue's body, hinged on the last one."""
+    hose, drogue, reel = parameters.hose, parameters.drogue, parameters.reel
+    length, mass = hose.link_length_m, hose.link_mass_kg
+    across = mass * (length**2 / 12.0 + hose.radius_m**2 / 4.0)
+    parent, joint_at = spec.worldbody, [0.0, 0.0, 0.0]
+    stiffness = hose.bending_stiffness_n_m2 / length
+    damping = hose.bending_damping_n_m2_s / length
+    for i in range(hose.links):
+        body = parent.add_body(name=f"hose_{i}", pos=joint_at)
+        body.explicitinertial, body.mass = True, mass
+        body.ipos = [-0.5 * length, 0.0, 0.0]
+        body.inertia = [0.5 * mass * hose.radius_m**2, across, across]
+        if i == 0:
+            _add_reel(body, reel)
+        _add_hinges(body, f"hose_{i}", [0.0, 0.0, 0.0], stiffness if i else 0.0, damping)
+        body.add_geom(
+            name=f"hose_{i}",
+            type=mujoco.mjtGeom.mjGEOM_CAPSULE,
+            fromto=[0.0, 0.0, 0.0, -length, 0.0, 0.0],
+            size=[hose.radius_m, 0.0, 0.0],
+            rgba=_grey(hose.reflectance),
+            contype=0,
+            conaffinity=_PROBE | _RECEIVER,
+            friction=[drogue.friction, 0.005, 0.0001],
+        )
+        parent, joint_at = body, [-length, 0.0, 0.0]
+    body = parent.add_body(name="drogue", pos=[-length - drogue.hose_joint_x_m, 0.0, 0.0])
+    _add_hinges(body, "drogue", [drogue.hose_joint_x_m, 0.0, 0.0], 0.0, drogue.hinge_damping_n_m_s)
+    return body
+
+
+def _add_reel(body: Any, reel: ReelParameters) -> None:
+    joint = body.add_joint(name="reel", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[1.0, 0.0, 0.0])
+    joint.limited, joint.range = mujoco.mjtLimited.mjLIMITED_TRUE, [0.0, reel.range_m]
+    joint.armature = reel.drum_mass_kg
+    joint.solref_limit[:] = reel.stop_time_constant_s, 1.0
+
+
+def _add_hinges(body: Any, name: str, at: list[float], stiffness: float, damping: float) -> None:
+    for axis, letter in ([0.0, 1.0, 0.0], "y"), ([0.0, 0.0, 1.0], "z"):
+        joint = body.add_joint(name=f"{name}_{letter}", type=mujoco.mjtJoint.mjJNT_HINGE, axis=axis, pos=at)
+        joint.stiffness[0], joint.damping[0] = stiffness, damping
+
+
+def _add_drogue(body: Any, parameters: SceneParameters) -> None:
+    drogue, coupling = parameters.drogue, parameters.coupling
+    body.explicitinertial, body.mass = True, drogue.mass_kg
+    body.ipos, body.inertia = [drogue.centre_of_mass_x_m, 0.0, 0.0], drogue.inertia_kg_m2
+    solid = {
+        "contype": 0,
+        "conaffinity": _PROBE | _RECEIVER,
+        "friction": [drogue.friction, 0.005, 0.0001],
+        "solref": [drogue.contact_time_constant_s, 1.0],
+        "rgba": _grey(drogue.reflectance),
+    }
+    _add_basket(body, drogue, coupling, solid)
+    _add_socket(body, drogue, coupling, solid)
+    _add_canopy(body, drogue)
+    ring = LedRing(diameter_m=drogue.ring_diameter_m)
+    drawn = {"contype": 0, "conaffinity": 0}
+    for k, (_, y, z) in enumerate(ring.positions_D):
+        body.add_site(name=f"led_{k}", pos=[0.0, y, z], size=[0.004] * 3)
+        body.add_geom(
+            name=f"led_housing_{k}",
+            type=mujoco.mjtGeom.mjGEOM_CYLINDER,
+            fromto=[0.002, y, z, drogue.rim_x_m, y, z],  # behind the LED, which lies on the housing's face
+            size=[drogue.led_housing_radius_m, 0.0, 0.0],
+            rgba=_grey(0.04),
+            **drawn,
+        )
+    body.add_site(name="coupling", pos=[coupling.depth_m, 0.0, 0.0], size=[0.01] * 3)
+
+
+def _circle(count: int, radius: float) -> Array:
+    """(count, 2) points (y, z) on a circle."""
+    angle = 2.0 * np.pi * np.arange(count) / count
+    return radius * np.column_stack([np.cos(angle), np.sin(angle)])
+
+
+def _add_basket(body: Any, drogue: DrogueParameters, coupling: CouplingParameters, solid: dict[str, Any]) -> None:
+    """Rim of capsules; ribs from the rim to the coupling's mouth, too close together for a probe's tip."""
+    rim = _circle(drogue.ribs, 0.5 * drogue.ring_diameter_m)
+    throat = _circle(drogue.ribs, coupling.socket_radius_m + drogue.rib_radius_m)
+    for k in range(drogue.ribs):
+        here, there = rim[k], rim[(k + 1) % drogue.ribs]
+        for name, to, radius in (
+            ("rim", [drogue.rim_x_m, *there], drogue.rim_tube_radius_m),
+            ("rib", [drogue.throat_x_m, *throat[k]], drogue.rib_radius_m),
+        ):
+            body.add_geom(
+                name=f"basket_{name}_{k}",
+                type=mujoco.mjtGeom.mjGEOM_CAPSULE,
+                fromto=[drogue.rim_x_m, *here, *to],
+                size=[radius, 0.0, 0.0],
+                **solid,
+            )
+
+
+def _add_socket(body: Any, drogue: DrogueParameters, coupling: CouplingParameters, solid: dict[str, Any]) -> None:
+    """Mouth of the coupling as a bundle of staves around its bore; a solid body from its bottom to the hose."""
+    bottom = coupling.depth_m + coupling.stop_gap_m
+    half_wall = 0.5 * coupling.socket_wall_m
+    outside = coupling.socket_radius_m + coupling.socket_wall_m
+    for k, (y, z) in enumerate(_circle(_SOCKET_STAVES, coupling.socket_radius_m + half_wall)):
+        body.add_geom(
+            name=f"coupling_stave_{k}",
+            type=mujoco.mjtGeom.mjGEOM_CAPSULE,
+            fromto=[drogue.throat_x_m, y, z, bottom, y, z],
+            size=[half_wall, 0.0, 0.0],
+            **solid,
+        )
+    body.add_geom(
+        name="coupling_body",
+        type=mujoco.mjtGeom.mjGEOM_CYLINDER,
+        fromto=[bottom, 0.0, 0.0, drogue.hose_joint_x_m, 0.0, 0.0],
+        size=[outside, 0.0, 0.0],
+        **solid,
+    )
+
+
+def _add_canopy(body: Any, drogue: DrogueParameters) -> None:
+    """A skirt of flat panels from the rim outward and forward; drawn only."""
+    inner, outer, panels = 0.5 * drogue.ring_diameter_m, 0.5 * drogue.canopy_diameter_m, 24
+    slant = np.hypot(outer - inner, drogue.canopy_length_m)
+    lean = np.arctan2(outer - inner, drogue.canopy_length_m)
+    half_width = np.pi * outer / panels
+    for k in range(panels):
+        angle = 2.0 * np.pi * k / panels
+        middle = 0.5 * (inner + outer)
+        x = drogue.rim_x_m + drogue.rim_tube_radius_m + 0.5 * drogue.canopy_length_m
+        out = np.array([0.0, np.cos(angle), np.sin(angle)])
+        along = np.cos(lean) * np.array([1.0, 0.0, 0.0]) + np.sin(lean) * out
+        sideways = np.array([0.0, -np.sin(angle), np.cos(angle)])
+        quat = np.empty(4)
+        mujoco.mju_mat2Quat(quat, np.column_stack([along, sideways, np.cross(along, sideways)]).ravel())
+        body.add_geom(
+            name=f"canopy_{k}",
+            type=mujoco.mjtGeom.mjGEOM_BOX,
+            pos=np.array([x, 0.0, 0.0]) + middle * out,
+            quat=quat,
+            size=[0.5 * slant, half_width, 0.002],
+            rgba=_grey(drogue.canopy_reflectance),
+            contype=0,
+            conaffinity=0,
+        )
+
+
+def _add_receiver(spec: Any, parameters: SceneParameters) -> None:
+    mounting, coupling = parameters.mounting, parameters.coupling
+    inertia = np.asarray(parameters.receiver_inertia_B, dtype=float)
+    body = spec.worldbody.add_body(name="receiver")
+    body.add_freejoint(name="receiver")
+    body.explicitinertial, body.mass = True, parameters.receiver_mass_kg
+    body.fullinertia = [*np.diag(inertia), inertia[0, 1], inertia[0, 2], inertia[1, 2]]
+    contact = {"contype": _RECEIVER, "conaffinity": 0}
+    _add_pieces(body, receiver_pieces(mounting), "", _RECEIVER_REFLECTANCE, contact)
+    _add_probe(body, mounting, coupling)
+    body.add_site(name="probe_tip", pos=mounting.p_BP, size=[0.01] * 3)
+
+
+def _add_probe(body: Any, mounting: Mounting, coupling: CouplingParameters) -> None:
+    """Tip sphere whose foremost point is P, a straight boom, and a mast from it to the nose's side."""
+    x, y, z = (float(c) for c in mounting.p_BP)
+    tip, boom = coupling.probe_tip_radius_m, coupling.probe_boom_radius_m
+    elbow, foot = [x - 1.7, y, z], [x - 3.2, 0.35 * y, 0.2 * z]
+    contact = {"contype": _PROBE, "conaffinity": 0, "rgba": _grey(0.3)}
+    capsule = mujoco.mjtGeom.mjGEOM_CAPSULE
+    sphere = mujoco.mjtGeom.mjGEOM_SPHERE
+    body.add_geom(name="probe_tip", type=sphere, pos=[x - tip, y, z], size=[tip, 0.0, 0.0], **contact)
+    for name, end, start, radius in (
+        ("probe_boom", [x - tip, y, z], elbow, boom),
+        ("probe_mast", elbow, foot, 1.3 * boom),
+    ):
+        body.add_geom(name=name, type=capsule, fromto=[*end, *start], size=[radius, 0.0, 0.0], **contact)

@@ -1,0 +1,23 @@
+"""Starts the command line: `dockair …` and `python -m dockair …`.
+
+It lies outside the linked folders, so that it can still say what is wrong when a zip tool has made text of the links.
+"""
+
+import sys
+from pathlib import Path
+
+
+def main() -> None:
+    """Run the command line, or say in one line that the package is not whole."""
+    here = Path(__file__).parent
+    text = [name for name in ("sim", "nav", "scenarios", "assets") if not (here / name).is_dir()]
+    if text:
+        print(f"dockair: links not restored ({', '.join(text)}): clone with git", file=sys.stderr)
+        sys.exit(3)
+    from dockair.scenarios.cli import main as command_line
+
+    command_line()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,142 @@
+"""What is read back from a message log is what was delivered, to the last bit."""
+
+from dataclasses import dataclass, field, fields
+
+import numpy as np
+import pytest
+
+from dockair.errors import DockairError
+from dockair.messages import NavSolution
+from dockair.scenarios import message_log
+from dockair.scenarios.exact_json import decode, encode
+from dockair.scenarios.message_log import (
+    MessageLog,
+    NavigatorRecipe,
+    TickMessages,
+    estimate_row,
+    read_estimates,
+    read_messages,
+)
+
+
+@dataclass(frozen=True)
+class Settings:
+    gain: float = 0.1 + 0.2
+    limits: tuple[float, float] = (float("-inf"), 1e-308)
+    table: dict[str, float] = field(default_factory=lambda: {"a": float("nan")})
+
+
+def _same_messages(delivered, read: TickMessages) -> bool:
+    _, imu, frame, _ = delivered
+    gyro_same = [s.time_stamp_s for s in imu] == [s.time_stamp_s for s in read.imu] and all(
+        np.array_equal(a.angular_rate_rad_s, b.angular_rate_rad_s) for a, b in zip(imu, read.imu, strict=True)
+    )
+    if frame is None or read.frame is None:
+        return gyro_same and frame is read.frame
+    scalars = ("time_stamp_s", "window", "exposure_s", "gain")
+    return (
+        gyro_same
+        and read.frame.pixels.dtype == frame.pixels.dtype
+        and np.array_equal(read.frame.pixels, frame.pixels)
+        and all(getattr(frame, name) == getattr(read.frame, name) for name in scalars)
+    )
+
+
+def test_messages_are_read_back_as_they_were_delivered(hand_made, tmp_path):
+    ticks = hand_made.ticks(230)  # more than two row groups
+    with MessageLog(tmp_path, NavigatorRecipe(class_name="a:B", sheets=hand_made.sheets)) as log:
+        for _, imu, frame, solution in ticks:
+            log.append(imu, frame, solution)
+    read = list(read_messages(tmp_path))
+    assert len(read) == 230
+    assert all(_same_messages(delivered, messages) for delivered, messages in zip(ticks, read, strict=True))
+
+
+def test_estimates_are_read_back_to_the_last_bit(hand_made, tmp_path):
+    ticks = hand_made.ticks(12)
+    with MessageLog(tmp_path, NavigatorRecipe(class_name="a:B", sheets=hand_made.sheets)) as log:
+        for _, imu, frame, solution in ticks:
+            log.append(imu, frame, solution)
+    for (_, _, _, solution), row in zip(ticks, read_estimates(tmp_path), strict=True):
+        assert set(row) == {f.name for f in fields(NavSolution)}
+        for name, value in estimate_row(solution).items():
+            np.testing.assert_array_equal(row[name], value)
+            if not isinstance(value, str):
+                assert row[name].tobytes() == value.tobytes()
+
+
+def test_every_number_of_a_solution_reaches_its_row(hand_made):
+    """Were a field left out of the row, changing it would not show: each single change must change the row."""
+    from dataclasses import replace
+
+    solution = hand_made.tick(2)[3]
+    changes = {
+        "time_stamp_s": 9.0,
+        "valid": False,
+        "phase": "hold",
+        "status": "lost",
+        "p_PD_B": solution.p_PD_B + 1e-16 * np.array([0, 1, 0]) + np.array([0, 0, 1e-12]),
+        "v_PD_B": solution.v_PD_B + 1e-12,
+        "R_BD": solution.R_BD.T,
+        "covariance": solution.covariance * 2,
+        "command": replace(solution.command, acceleration_m_s2=np.array([0.0, 0.0, 1e-9])),
+        "window": None,
+        "frame_time_stamp_s": 8.0,
+        "candidates_px": solution.candidates_px[:-1],
+        "led_pixels_px": np.full((8, 2), np.nan),
+    }
+    assert set(changes) == {f.name for f in fields(NavSolution)}
+    before = estimate_row(solution)
+    for name, value in changes.items():
+        after = estimate_row(replace(solution, **{name: value}))
+        assert not np.array_equal(before[name], after[name], equal_nan=not isinstance(value, str)), name
+
+
+def test_the_log_holds_no_field_of_the_truth(hand_made, tmp_path):
+    """Two flights with the same messages and other truths write the same files."""
+    for name, shift in (("a", 0.0), ("b", 1.0)):
+        folder = tmp_path / name
+        folder.mkdir()
+        with MessageLog(folder, NavigatorRecipe(class_name="a:B", sheets=hand_made.sheets)) as log:
+            for truth, imu, frame, solution in hand_made.ticks(6):
+                truth.p_WD[:] += shift
+                log.append(imu, frame, solution)
+    for file in (message_log.MESSAGES, message_log.ESTIMATES, message_log.NAVIGATOR):
+        assert (tmp_path / "a" / file).read_bytes() == (tmp_path / "b" / file).read_bytes()
+
+
+def test_sheets_and_settings_come_back_bit_for_bit(hand_made):
+    sheets = decode(encode(hand_made.sheets))
+    for part in ("R_BC", "p_BC", "p_BP", "R_BI"):
+        assert getattr(sheets.mounting, part).tobytes() == getattr(hand_made.sheets.mounting, part).tobytes()
+    assert (sheets.camera, sheets.ring) == (hand_made.sheets.camera, hand_made.sheets.ring)
+    settings = decode(encode(Settings()))
+    assert (settings.gain, settings.limits) == (Settings().gain, Settings().limits)
+    assert np.isnan(settings.table["a"])
+
+
+def test_what_has_no_exact_form_is_refused():
+    with pytest.raises(DockairError, match="got 'object'"):
+        encode(object())
+
+
+def test_a_class_that_is_no_dataclass_is_refused():
+    with pytest.raises(DockairError, match="dataclass or an enumeration"):
+        decode({"class": "subprocess:Popen", "fields": {"args": "true"}})
+
+
+def test_a_full_disk_reaches_the_flight(hand_made, tmp_path, monkeypatch):
+    def refuse(*_):
+        raise OSError("no space left on device")
+
+    monkeypatch.setattr(message_log, "_message_row", refuse)
+    log = MessageLog(tmp_path, NavigatorRecipe(class_name="a:B", sheets=hand_made.sheets))
+    _, imu, frame, solution = hand_made.tick(1)
+    log.append(imu, frame, solution)
+    with pytest.raises(OSError, match="no space left"):
+        log.close()
+
+
+def test_a_folder_without_recording_says_what_is_missing(tmp_path):
+    with pytest.raises(DockairError, match=r"messages\.parquet: expected a flight recorded with --record"):
+        next(read_messages(tmp_path))

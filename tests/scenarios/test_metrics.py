@@ -1,0 +1,140 @@
+"""Figures of a flight against errors put in by hand."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from dockair.rotations import exp
+from dockair.scenarios import metrics
+from dockair.scenarios.flight_log import FlightLog
+from dockair.scenarios.referee import Contact
+
+
+def _log(flight, count: int) -> FlightLog:
+    log = FlightLog()
+    for entry in flight.ticks(count):
+        log.append(*entry)
+    return log
+
+
+def _summary(flight, log: FlightLog, **changes):
+    values = dict(
+        scenario="hand_made", seed=3, outcome="contact", contact=None,
+        collided_with="", truths=log.truths, solutions=log.solutions, frames=log.frames,
+        mounting=flight.sheets.mounting, truth_navigation=False, wall_time_s=2.0, out_dir=None,
+    )  # fmt: skip
+    return metrics.summarise(**(values | changes))
+
+
+def test_an_error_is_split_into_along_and_across_the_line_of_sight():
+    """True point at (3, 4, 0): along is (0.6, 0.8, 0). An error of 0.1 along and (0, 0, 0.02) across."""
+    true = np.array([[3.0, 4.0, 0.0]])
+    along, across = metrics.line_of_sight_errors(true + [[0.06, 0.08, 0.02]], true)
+    assert along[0] == pytest.approx(0.1, abs=1e-15)
+    assert across[0] == pytest.approx(0.02, abs=1e-15)
+
+
+def test_errors_of_a_flight_are_those_put_in(make_hand_made):
+    """e = (5, 2, 0) mm in body axes; range and lateral error together have its length at every tick."""
+    flight = make_hand_made()
+    log = _log(flight, 100)
+    nav = metrics.navigation_figures(log.solutions, log.truths, flight.sheets.mounting)
+    assert np.hypot(nav.range_rmse_m, nav.lateral_rmse_m) == pytest.approx(np.hypot(5e-3, 2e-3), rel=1e-9)
+    assert nav.attitude_rmse_deg == pytest.approx(np.degrees(0.01), rel=1e-9)
+    assert nav.velocity_rmse_m_s == pytest.approx(0.0, abs=1e-15)
+    assert nav.frames_used == 50
+
+
+def test_nees_counts_errors_in_standard_deviations(make_hand_made):
+    """x = (0.01, 0, 0 | 5 mm, 2 mm, 0 | 0): with sigma 0.01 on every state x'P^-1x = 1 + 0.25 + 0.04."""
+    flight = make_hand_made(sigma_m=0.01)
+    log = _log(flight, 20)
+    nav = metrics.navigation_figures(log.solutions, log.truths, flight.sheets.mounting)
+    assert nav.nees_mean == pytest.approx(1.29, rel=1e-9)
+
+
+def test_nees_of_gaussian_errors_is_chi_square():
+    """Mean of 2000 draws of chi2(9): standard deviation sqrt(18/2000) = 0.095; 4.5 sigma fail once in 1.5e5."""
+    rng = np.random.default_rng(5)
+    root = rng.normal(size=(9, 9))
+    covariance = root @ root.T + np.eye(9)
+    draws = rng.multivariate_normal(np.zeros(9), covariance, size=2000)
+    mean = np.mean([metrics.normalised_error_squared(x, covariance) for x in draws])
+    assert abs(mean - 9.0) < 4.5 * 0.095
+
+
+@pytest.mark.parametrize("angle", [1e-9, 0.3, np.pi - 1e-6])
+def test_the_attitude_error_is_the_rotation_that_mends_the_estimate(hand_made, angle):
+    truth, _, _, solution = hand_made.tick(2)
+    R_BD = truth.R_WB.T @ truth.R_WD
+    axis = np.array([2.0, -1.0, 2.0]) / 3.0
+    error = metrics.state_error(replace(solution, R_BD=exp(-angle * axis) @ R_BD), truth)
+    np.testing.assert_allclose(error[:3], angle * axis, atol=1e-9)
+
+
+def test_ticks_without_a_new_frame_or_a_valid_solution_do_not_count(hand_made):
+    log = _log(hand_made, 10)
+    solutions = [replace(s, valid=k != 5) for k, s in enumerate(log.solutions)]
+    assert metrics.fresh_and_valid(solutions) == [1, 3, 7, 9]
+
+
+def test_availability_is_counted_from_the_first_valid_tick():
+    assert metrics.availability([False, False, True, True, False, True]) == 0.75
+    assert metrics.availability([False, False]) == 0.0
+
+
+def test_a_second_approach_is_a_second_attempt():
+    phases = ["pre_contact", "approach", "approach", "breakaway", "pre_contact", "approach"]
+    assert metrics.attempts(phases) == 2
+    assert metrics.attempts([]) == 0
+
+
+def test_hold_and_disconnect_are_read_from_the_latch(hand_made):
+    """Latched from 6.55 to 8.49 s, so that the first free control tick is at 8.5 s."""
+    truths = [hand_made.truth(10 * k) for k in range(1, 900)]
+    hold, disconnect = metrics.hold_of(truths)
+    assert hold is not None and disconnect is not None
+    assert hold.duration_s == pytest.approx(8.49 - 6.55)
+    assert hold.take_in_max_m == pytest.approx(1.2)
+    assert hold.coupling_force_max_n == 700.0
+    assert disconnect.time_s == 8.5
+
+
+def test_a_probe_still_held_at_the_end_was_not_disconnected(hand_made):
+    _, disconnect = metrics.hold_of([hand_made.truth(10 * k) for k in range(600, 700)])
+    assert disconnect is None
+
+
+def test_result_json_has_the_documented_keys(hand_made, tmp_path):
+    contact = Contact(time_s=6.55, radial_offset_m=0.03, closure_speed_m_s=1.2, angle_deg=2.0)
+    result = _summary(hand_made, _log(hand_made, 20), contact=contact, out_dir=tmp_path)
+    written = json.loads(result.write(tmp_path).read_text())
+    assert list(written) == [
+        "schema_version", "scenario", "seed", "outcome", "attempts", "contact", "hold", "disconnect", "collided_with",
+        "truth_navigation", "nav", "frames", "duration_s", "real_time_factor", "wall_time_s", "versions", "out_dir",
+    ]  # fmt: skip
+    assert list(written["contact"]) == ["time_s", "radial_offset_m", "closure_speed_m_s", "angle_deg"]
+    assert written["real_time_factor"] == pytest.approx(0.1)
+    assert written["versions"]["dockair"]
+
+
+def test_what_could_not_be_measured_is_null_and_not_nan(hand_made):
+    blind = _log(hand_made, 1)  # no frame yet
+    text = _summary(hand_made, blind).to_json()
+    assert "NaN" not in text
+    assert json.loads(text)["nav"]["range_rmse_m"] is None
+    assert json.loads(text)["contact"] is None
+
+
+def test_flight_parquet_holds_truth_and_belief_side_by_side(hand_made, tmp_path):
+    log = _log(hand_made, 30)
+    table = pq.read_table(log.write_parquet(tmp_path))
+    assert table.num_rows == 30
+    error = table["nav_p_PD_B_x_m"].to_numpy() - table["truth_p_PD_B_x_m"].to_numpy()
+    np.testing.assert_allclose(error, 0.005, atol=1e-12)
+    np.testing.assert_allclose(table["nav_sigma_p_PD_B_y_m"].to_numpy(), 0.01)
+    assert table["nav_leds_named"].to_pylist()[-1] == 8
+    assert len(table["truth_p_WH_m"][0].as_py()) == 3 * 17

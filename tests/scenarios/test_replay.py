@@ -1,0 +1,147 @@
+"""A replay gives the flight's estimates bit for bit, or says where it does not, and no simulator can help it."""
+
+import json
+import subprocess
+import sys
+import textwrap
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from dockair.errors import DockairError
+from dockair.scenarios.message_log import ESTIMATES, MESSAGES, MessageLog, NavigatorRecipe
+from dockair.scenarios.replay import FORBIDDEN, replay, same_bits
+
+NAVIGATOR = '''
+import numpy as np
+from dockair.messages import NavSolution, ReceiverCommand
+{imports}
+
+class Sums:
+    """Believes the running sum of everything it was told: every bit of every message matters."""
+
+    def __init__(self, sheets):
+        self.sheets, self.total = sheets, np.zeros(3)
+
+    def step(self, imu, frame):
+        for sample in imu:
+            self.total = self.total * 0.9 + sample.angular_rate_rad_s + sample.time_stamp_s
+        if frame is not None:
+            self.total = self.total + np.sqrt(frame.pixels.astype(float)).mean() / (1.0 + frame.window.row_start)
+        return NavSolution(
+            time_stamp_s=imu[-1].time_stamp_s, valid=True, phase="approach", status="summed", p_PD_B=self.total,
+            v_PD_B=imu[-1].angular_rate_rad_s / 3.0, R_BD=np.eye(3), covariance=np.full((9, 9), np.nan), command=ReceiverCommand(),
+            window=None if frame is None else frame.window, frame_time_stamp_s=float("nan"),
+            candidates_px=np.empty((0, 2)), led_pixels_px=np.full((8, 2), np.nan),
+        )
+'''
+
+
+@pytest.fixture
+def record(hand_made, tmp_path, monkeypatch):
+    """Record a flight of a navigator that is a module of the user's own."""
+
+    def recorded(imports: str = "", ticks: int = 40):
+        module = f"users_navigator_{abs(hash(imports))}"
+        (tmp_path / f"{module}.py").write_text(textwrap.dedent(NAVIGATOR.replace("{imports}", imports)))
+        monkeypatch.syspath_prepend(str(tmp_path))
+        recipe = NavigatorRecipe(class_name=f"{module}:Sums", sheets=hand_made.sheets)
+        navigator = recipe.build()
+        out = tmp_path / "flight"
+        out.mkdir()
+        with MessageLog(out, recipe) as log:
+            for _, imu, frame, _ in hand_made.ticks(ticks):
+                log.append(imu, frame, navigator.step(imu, frame))
+        return out
+
+    return recorded
+
+
+def _edit(path, column: str, row: int, value) -> None:
+    table = pq.read_table(path)
+    entries = table[column].to_pylist()
+    entries[row] = value(entries[row])
+    index = table.schema.get_field_index(column)
+    pq.write_table(table.set_column(index, table.schema.field(column), pa.array(entries, table[column].type)), path)
+
+
+def test_a_recorded_flight_replays_bit_for_bit(record):
+    report = replay(record())
+    assert report.identical
+    assert (report.ticks, report.frames) == (40, 20)
+    assert report.first_difference is None
+
+
+def test_a_gyro_sample_changed_in_its_last_bit_is_found(record):
+    out = record()
+    _edit(out / MESSAGES, "gyro_angular_rate_rad_s", 25, lambda v: [*v[:-1], np.nextafter(v[-1], 1.0)])
+    report = replay(out)
+    assert not report.identical
+    assert report.first_difference is not None
+    assert (report.first_difference.tick, report.first_difference.field) == (25, "v_PD_B")
+
+
+def test_an_estimate_changed_in_its_last_bit_is_found(record):
+    out = record()
+    _edit(out / ESTIMATES, "v_PD_B", 7, lambda v: [np.nextafter(v[0], 1e9), *v[1:]])
+    report = replay(out)
+    assert report.first_difference is not None
+    assert (report.first_difference.tick, report.first_difference.field) == (7, "v_PD_B")
+
+
+def test_a_recording_that_was_cut_off_is_refused(record):
+    out = record()
+    pq.write_table(pq.read_table(out / ESTIMATES).slice(0, 39), out / ESTIMATES)
+    with pytest.raises(DockairError, match="cut-off recording"):
+        replay(out)
+
+
+@pytest.mark.parametrize(
+    ("imports", "refused"),
+    [
+        ("import dockair.sim.truth", "dockair.sim"),
+        ("import mujoco", "mujoco"),
+        ("import dockair.parameters", "dockair.parameters"),
+    ],
+)
+def test_a_navigator_that_reads_the_simulator_cannot_be_replayed(record, imports, refused):
+    with pytest.raises(DockairError, match=f"{refused} must not be imported in a replay"):
+        replay(record(imports=imports))
+
+
+def test_the_replaying_process_refuses_to_start_with_a_simulator_loaded(record):
+    out = record()
+    code = f"import mujoco, sys; from dockair.scenarios.replay import main; sys.exit(main([{str(out)!r}]))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert "mujoco is already imported" in done.stderr
+
+
+def test_replaying_loads_no_forbidden_module(record):
+    """Looked at from inside the process, after a replay."""
+    out = record()
+    code = textwrap.dedent(f"""
+        import json, sys
+        from dockair.scenarios.replay import main
+        assert main([{str(out)!r}]) == 0
+        print(json.dumps(sorted(sys.modules)))
+    """)
+    path = {"PYTHONPATH": str(out.parent)}
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=path)
+    loaded = json.loads(done.stdout.splitlines()[-1])
+    assert not [m for m in loaded for name in FORBIDDEN if m == name or m.startswith(f"{name}.")]
+
+
+def test_a_folder_without_a_recording_is_refused_with_one_line(tmp_path):
+    with pytest.raises(DockairError, match="--record window or full"):
+        replay(tmp_path)
+
+
+def test_bits_are_compared_and_not_values():
+    assert same_bits(np.array([np.nan, 1.0]), np.array([np.nan, 1.0]))
+    assert not same_bits(np.array([0.0]), np.array([-0.0]))
+    assert not same_bits(np.array([1.0]), np.array([1.0, 1.0]))
+    assert not same_bits(np.array([1.0]), np.array([np.nan]))
+    assert not same_bits("hold", np.array([1.0]))

@@ -1,0 +1,241 @@
+"""Scenario files: what is refused and in which words; what the values become."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dockair.errors import DockairError
+from dockair.scenarios.scenario_file import scenario_names
+from dockair.scenarios.schema import Accept, Scenario, Start, Sun, load_scenario
+
+
+@pytest.fixture
+def scenario_file(tmp_path):
+    def write(text: str) -> Path:
+        path = tmp_path / "mine.toml"
+        path.write_text(text, encoding="utf-8")
+        return path
+
+    return write
+
+
+SEED = "an integer from 0 to 9223372036854775807"
+SPEED = "a number from 100.0 to 250.0"
+SIGMAS = "three numbers, each 0 or more"
+
+
+@pytest.mark.parametrize(
+    ("text", "key", "expected"),
+    [
+        ("speed = 1", "speed", "a known key, got 'speed'; exists: accept, claim, flight,"),
+        ("flight.airspeed_kt = 1", "flight.airspeed_kt", "a known key, got 'airspeed_kt'; exists: airspeed_m_s,"),
+        ('flight.airspeed_m_s = "180"', "flight.airspeed_m_s", f"{SPEED}, got '180'"),
+        ("flight.airspeed_m_s = true", "flight.airspeed_m_s", f"{SPEED}, got True"),
+        ("flight.airspeed_m_s = 1000", "flight.airspeed_m_s", f"{SPEED}, got 1000"),
+        ("flight.altitude_m = nan", "flight.altitude_m", "a number from 0.0 to 15000.0, got nan"),
+        ("flight.duration_s = inf", "flight.duration_s", "a number above 0.0 up to 600.0, got inf"),
+        ("flight = 3", "flight", "a table, got 3"),
+        ("seed = -1", "seed", f"{SEED}, got -1"),
+        ("seed = 9223372036854775808", "seed", f"{SEED}, got 9223372036854775808"),
+        ("seed = 1.0", "seed", f"{SEED}, got 1.0"),
+        ("seed = true", "seed", f"{SEED}, got True"),
+        ("sun.present = 1", "sun.present", "true or false, got 1"),
+        ("start.sigma_m = [1.0, 2.0]", "start.sigma_m[2]", SIGMAS),
+        ("start.sigma_m = [1.0, 2.0, -3.0]", "start.sigma_m[2]", f"{SIGMAS}, got -3.0"),
+        ("start.sigma_m = 0.3", "start.sigma_m", f"{SIGMAS}, got 0.3"),
+        ('turbulence.model = "x"', "turbulence.model", "one of the names that exist, got 'x'; exists: none, dryden"),
+        ('turbulence.intensity = "x"', "turbulence.intensity", "one of the names that exist, got 'x'; exists: light,"),
+        ('turbulence.model = "dryden"', "turbulence", "sigma_m_s or intensity beside the model, got 'dryden'"),
+        ('turbulence = {sigma_m_s = 1, intensity = "light"}', "turbulence", "one of sigma_m_s and intensity, got {"),
+        ("rates.camera_hz = 33", "rates.camera_hz", "a rate that divides the physics rate 1000 Hz, got 33; exists: 1,"),
+        ("rates.camera_hz = 125", "rates.camera_hz", "a rate up to the control rate 100 Hz"),
+        ("rates.gyro_hz = 50", "rates.gyro_hz", "a rate from the control rate 100 Hz on"),
+        ("rates.physics_hz = 0", "rates.physics_hz", "an integer from 1 to 100000, got 0"),
+        ('navigation.navigator = "x"', "navigation.navigator", """"truth" or "module:Class", got 'x'"""),
+        ('hardware.camera = "none.toml"', "hardware.camera", "the path of a calibration sheet, got '/"),
+        ("parameters.rope.mass = 1", "parameters", "a parameter sheet, got 'rope'; exists: "),
+        ("parameters.mounting.x = 1", "parameters.mounting.x", "a parameter, got 'x'; exists: camera_position_m,"),
+        ("parameters.mounting.camera_yaw_rad = 1", "parameters.mounting.camera_yaw_rad", "1 number(s) in [-0.07,"),
+        ("parameters.mounting.probe_tip_m = 1", "parameters.mounting.probe_tip_m", "3 number(s) in [-10.0, 10.0] m,"),
+        ('accept.outcome = "x"', "accept.outcome", "one of the names that exist, got 'x'; exists: contact, miss,"),
+    ],
+)
+def test_a_wrong_value_is_refused_in_one_line_with_file_and_key(scenario_file, text, key, expected):
+    path = scenario_file(f'name = "mine"\n{text}')
+    with pytest.raises(DockairError) as caught:
+        load_scenario(path)
+    line = str(caught.value)
+    assert line.startswith(f"{path}: {key}: expected {expected}")
+    assert "\n" not in line
+    assert caught.value.exit_code == 2
+
+
+def test_of_several_mistakes_the_first_is_told_and_the_others_counted(scenario_file):
+    path = scenario_file('name = "mine"\n[flight]\nairspeed_m_s = 1\naltitude_m = -1\nmach = 2')
+    with pytest.raises(DockairError, match=r"flight\.airspeed_m_s: expected .*, got 1; and 2 more$"):
+        load_scenario(path)
+
+
+def test_a_file_without_a_name_is_refused(scenario_file):
+    with pytest.raises(DockairError, match=r"mine\.toml: name: expected a name of letters"):
+        load_scenario(scenario_file("seed = 1"))
+
+
+def test_what_is_not_toml_is_refused_with_its_line(scenario_file):
+    with pytest.raises(DockairError, match=r"mine\.toml: expected TOML, got .*line 2"):
+        load_scenario(scenario_file('name = "mine"\nseed 3\n'))
+
+
+def test_bytes_that_are_not_text_are_refused(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_bytes(b"name = '\xff'")
+    with pytest.raises(DockairError, match="expected TOML"):
+        load_scenario(path)
+
+
+@pytest.mark.parametrize("missing", ["none.toml", "folder/none.toml", Path("default")])
+def test_a_missing_file_is_named(missing):
+    with pytest.raises(DockairError, match="none.toml|default") as caught:
+        load_scenario(missing)
+    assert "no such file" in str(caught.value)
+
+
+def test_a_folder_is_no_scenario(tmp_path):
+    with pytest.raises(DockairError, match="expected a file that can be read, got 'Is a directory'"):
+        load_scenario(tmp_path)
+
+
+def test_an_unknown_name_lists_the_library():
+    with pytest.raises(DockairError) as caught:
+        load_scenario("defualt")
+    assert caught.value.exists == tuple(scenario_names())
+    assert "default" in caught.value.exists
+
+
+def test_only_the_name_is_required(scenario_file):
+    assert load_scenario(scenario_file('name = "mine"')) == Scenario(name="mine")
+
+
+def test_a_scenario_cannot_be_changed():
+    with pytest.raises(ValueError, match="frozen"):
+        load_scenario("default").seed = 3
+
+
+@pytest.mark.parametrize("name", scenario_names())
+def test_every_scenario_of_the_library_loads_is_called_as_its_file_and_claims_something(name):
+    scenario = load_scenario(name)
+    assert scenario.name == name
+    assert scenario.claim
+
+
+def test_the_default_scenario_is_what_the_first_flight_promises():
+    scenario = load_scenario("default")
+    assert (scenario.turbulence.model, scenario.turbulence.sigma_m_s) == ("dryden", 0.5)
+    assert scenario.sun.direction_W[0] < 0.0  # behind
+    assert not scenario.navigation.is_truth
+
+
+def test_settings_replace_the_files_values():
+    settings = {"turbulence.sigma_m_s": "1.1", "seed": "7", "start.sigma_m": "[0.1, 0.2, 0.3]", "sun.present": "false"}
+    scenario = load_scenario("default", settings)
+    assert (scenario.turbulence.sigma_m_s, scenario.seed, scenario.sun.present) == (1.1, 7, False)
+    assert scenario.start.sigma_m == (0.1, 0.2, 0.3)
+
+
+def test_settings_may_be_values_instead_of_text():
+    assert load_scenario("default", {"seed": 7, "start.sigma_m": [0.1, 0.2, 0.3]}).start.sigma_m == (0.1, 0.2, 0.3)
+
+
+def test_a_word_needs_no_quotes_in_a_setting():
+    assert load_scenario("default", {"navigation.navigator": "truth"}).navigation.is_truth
+    assert load_scenario("default", {"navigation.navigator": '"truth"'}).navigation.is_truth
+
+
+def test_setting_the_intensity_replaces_the_files_sigma_and_back():
+    assert load_scenario("default", {"turbulence.intensity": "light"}).turbulence.sigma_m_s is None
+    assert load_scenario("light_gusts", {"turbulence.sigma_m_s": "2"}).turbulence.intensity is None
+
+
+def test_model_none_switches_gusts_off_and_a_strength_alone_switches_them_on(scenario_file):
+    assert load_scenario("default", {"turbulence.model": "none"}).turbulence.model == "none"
+    assert load_scenario(scenario_file('name = "mine"\n[turbulence]\nsigma_m_s = 1')).turbulence.model == "dryden"
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "where", "expected"),
+    [
+        ("flight.speed", "1", "flight.speed", "a known key, got 'speed'; exists: airspeed_m_s,"),
+        ("flight.airspeed_m_s", "fast", "flight.airspeed_m_s", f"{SPEED}, got 'fast'"),
+        ("flight", "1", "flight", "a table, got 1"),
+        ("rates.camera_hz", "33", "rates.camera_hz", "a rate that divides the physics rate 1000 Hz, got 33"),
+        ("parameters.reel.nothing", "1", "parameters.reel.nothing", "a parameter, got 'nothing'; exists:"),
+        ("start.sigma_m", "[1, 2, -3]", "start.sigma_m[2]", f"{SIGMAS}, got -3"),
+        ("seed", "1\nname = 'other'", "seed", SEED),
+    ],
+)
+def test_a_wrong_setting_is_refused_as_a_setting(key, value, where, expected):
+    with pytest.raises(DockairError) as caught:
+        load_scenario("default", {key: value})
+    assert str(caught.value).startswith(f"--set {where}: expected {expected}")
+
+
+@pytest.mark.parametrize("key", ["flight.airspeed_m_s.x", "seed.x"])
+def test_a_setting_below_a_plain_value_is_refused(scenario_file, key):
+    path = scenario_file('name = "mine"\nseed = 1\nflight.airspeed_m_s = 180.0')
+    with pytest.raises(DockairError, match=f"^--set {key}: expected a known key"):
+        load_scenario(path, {key: 1})
+
+
+def test_a_parameter_may_be_overridden_inside_its_range():
+    scenario = load_scenario("default", {"parameters.mounting.camera_yaw_rad": "0.01"})
+    assert scenario.parameters == {"mounting": {"camera_yaw_rad": 0.01}}
+
+
+def test_a_path_in_a_file_starts_at_the_files_folder_and_in_a_setting_where_one_stands(tmp_path, monkeypatch):
+    (tmp_path / "sheets").mkdir()
+    sheet = tmp_path / "sheets" / "camera.toml"
+    sheet.write_text("focal_length_m = 0.016")
+    (tmp_path / "mine.toml").write_text('name = "mine"\n[hardware]\ncamera = "sheets/camera.toml"')
+    assert load_scenario(tmp_path / "mine.toml").hardware.camera == str(sheet)
+    monkeypatch.chdir(sheet.parent)
+    assert load_scenario("default", {"hardware.camera": "camera.toml"}).hardware.camera == "camera.toml"
+
+
+@pytest.mark.parametrize(
+    ("azimuth_deg", "elevation_deg", "direction"),
+    [
+        (0.0, 0.0, (1.0, 0.0, 0.0)),
+        (90.0, 0.0, (0.0, 1.0, 0.0)),
+        (180.0, 0.0, (-1.0, 0.0, 0.0)),
+        (17.0, 90.0, (0.0, 0.0, 1.0)),
+        (180.0, 30.0, (-(0.75**0.5), 0.0, 0.5)),
+    ],
+)
+def test_the_sun_stands_ahead_at_zero_and_to_the_left_at_ninety_degrees(azimuth_deg, elevation_deg, direction):
+    sun = Sun(azimuth_deg=azimuth_deg, elevation_deg=elevation_deg)
+    np.testing.assert_allclose(sun.direction_W, direction, atol=1e-15)
+
+
+def test_without_sun_there_is_no_direction():
+    assert Sun(present=False).direction_W is None
+
+
+def test_a_tip_behind_left_and_above_has_the_ring_ahead_right_and_below():
+    start = Start(aft_m=4.0, left_m=1.0, up_m=0.5, sigma_attitude_deg=180.0 / np.pi * 0.1)
+    np.testing.assert_array_equal(start.p_PD_B, [4.0, -1.0, -0.5])
+    assert start.sigma_R_rad == pytest.approx(0.1)
+
+
+def test_acceptance_names_each_figure_that_was_not_reached():
+    accept = Accept(outcome="contact", radial_offset_max_m=0.15, closure_speed_min_m_s=1.0, closure_speed_max_m_s=1.5)
+    assert accept.shortfalls("contact", 0.15, 1.5) == []
+    assert accept.shortfalls("contact", 0.151, 0.99) == [
+        "radial offset 0.151 m, wanted 0 to 0.15",
+        "closure speed 0.990 m/s, wanted 1 to 1.5",
+    ]
+    assert accept.shortfalls("contact", float("nan"), 1.2) == ["radial offset nan m, wanted 0 to 0.15"]
+    assert accept.shortfalls("miss", None, None) == ["outcome miss, wanted contact"]
+    assert Accept().shortfalls("miss", None, None) == []
+    assert accept.claims_figures
+    assert not Accept().claims_figures
