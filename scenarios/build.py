@@ -1,25 +1,37 @@
-"""Makes a scenario's world, sensors and navigation: the only place where as-built and nominal values are both known."""
+"""Makes a scenario's world, sensors and navigator: the only place where as-built and nominal values are both known."""
 
-import importlib
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, TypeVar
 
 import numpy as np
 
-from dockair.calibration import GyroSheet, Mounting, NavigationSheets, StartGeometry
+from dockair.calibration import Camera, GyroSheet, LedRing, Mounting, NavigationSheets, StartGeometry
 from dockair.clock import Clock
-from dockair.errors import DockairError
 from dockair.messages import Navigates
+from dockair.nav.guidance.approach import GuidanceSettings
+from dockair.nav.guidance.phases import PhaseLimits
 from dockair.parameters import load_parameters
 from dockair.rotations import Array, matrix_from_yaw_pitch_roll
+from dockair.scenarios.message_log import NavigatorRecipe
 from dockair.scenarios.schema import Scenario
 from dockair.scenarios.truth_navigation import TruthNavigator
-from dockair.sim.air.atmosphere import standard_atmosphere
-from dockair.sim.air.turbulence import DrydenField, TurbulenceParameters
+from dockair.sim.air.atmosphere import Air, standard_atmosphere
+from dockair.sim.air.turbulence import DrydenField, TurbulenceParameters, gust_sigma
+from dockair.sim.aircraft.aerodynamics import AirframeParameters
+from dockair.sim.aircraft.flight_control import FlightControlParameters
 from dockair.sim.aircraft.receiver import Receiver
-from dockair.sim.world import World
-from dockair.streams import counter_key, random_stream
+from dockair.sim.hose.chain import DrogueParameters, HoseParameters
+from dockair.sim.hose.coupling import CouplingParameters
+from dockair.sim.hose.reel import ReelParameters
+from dockair.sim.hose.rest import rest_shape
+from dockair.sim.outlines import TankerParameters
+from dockair.sim.world import World, WorldParameters, WorldStart
+from dockair.streams import random_stream
+
+SETTLE_S = 12.0  # hose and gusts run this long before the flight: several periods of the drogue's swing
+SUN_OVERHEAD = np.array([0.0, 0.0, 1.0])  # lights the scene of a scenario without Sun
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,8 +44,196 @@ class MountingParameters:
 
     def mounting(self) -> Mounting:
         """Return the nominal mounting; the camera's axis lies in the body's x-y plane."""
-        return Mounting(
-            R_BC=matrix_from_yaw_pitch_roll(self.camera_yaw_rad, 0.0, 0.0),
-            p_BC=self.camera_position_m,
-            p_BP=self.probe_tip_m,
-        )
+        R_BC = matrix_from_yaw_pitch_roll(self.camera_yaw_rad, 0.0, 0.0)
+        return Mounting(R_BC=R_BC, p_BC=self.camera_position_m, p_BP=self.probe_tip_m)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Periods:
+    """Physics ticks between two samples, control ticks, frames."""
+
+    gyro: int
+    control: int
+    camera: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Parts:
+    """What a flight is made of."""
+
+    world: World
+    camera: Any  # sim.camera.camera.NearInfraredCamera, or None where the truth navigates
+    gyro: Any
+    navigator: Navigates
+    recipe: NavigatorRecipe | None  #: how to make that navigator again, for a replay; None for the truth
+    sheets: NavigationSheets
+    clock: Clock
+    periods: Periods
+
+
+def build(scenario: Scenario, seed: int) -> Parts:
+    """Return the parts of a flight.
+
+    Args:
+        scenario: what to fly.
+        seed: of every random stream.
+
+    Raises:
+        DockairError: a parameter or sheet that does not fit.
+        MachineError: no off-screen OpenGL for the camera.
+    """
+    clock = Clock(scenario.rates.physics_hz)
+    air = standard_atmosphere(scenario.flight.altitude_m)
+    mounting = _sheet(scenario, "mounting", MountingParameters).mounting()
+    receiver = Receiver(
+        airframe=_sheet(scenario, "airframe", AirframeParameters),
+        flight_control=_sheet(scenario, "flight_control", FlightControlParameters),
+        airspeed_m_s=scenario.flight.airspeed_m_s,
+        air=air,
+        step_s=clock.step_s,
+        rng=random_stream(seed, "inertial_velocity"),
+    )
+    parameters = _world_parameters(scenario, air, mounting)
+    offset = scenario.start.sigma_p_m * random_stream(seed, "start").normal(size=3)
+    start = WorldStart(p_PD_B=scenario.start.p_PD_B + offset, settle_s=SETTLE_S)
+    world = World(parameters, receiver, _gusts(scenario, seed, clock), start, clock)
+    sheets = _navigation_sheets(scenario, parameters, receiver)
+    gyro = _gyro(scenario, seed)
+    if scenario.navigation.is_truth:
+        camera, recipe = None, None
+        navigator: Navigates = TruthNavigator(sheets, guidance_settings(scenario))
+    else:
+        camera = _camera(scenario, seed, sheets, world)
+        recipe = _recipe(scenario, sheets)
+        navigator = recipe.build()
+    periods = Periods(
+        gyro=clock.ticks_per(scenario.rates.gyro_hz, "rates.gyro_hz"),
+        control=clock.ticks_per(scenario.rates.control_hz, "rates.control_hz"),
+        camera=clock.ticks_per(scenario.rates.camera_hz, "rates.camera_hz"),
+    )
+    return Parts(
+        world=world,
+        camera=camera,
+        gyro=gyro,
+        navigator=navigator,
+        recipe=recipe,
+        sheets=sheets,
+        clock=clock,
+        periods=periods,
+    )
+
+
+def guidance_settings(scenario: Scenario) -> GuidanceSettings:
+    """Return the guidance that the scenario asks for."""
+    g = scenario.guidance
+    limits = PhaseLimits(stabilise_s=g.stabilise_s, take_in_m=g.take_in_m, hold_s=g.hold_s)
+    return GuidanceSettings(
+        stand_off_m=scenario.start.aft_m, closure_speed_m_s=g.closure_speed_m_s, limits=limits
+    )
+
+
+def _sheet(scenario: Scenario, name: str, cls: type[T]) -> T:
+    return load_parameters(name, cls, scenario.parameters.get(name))
+
+
+def _world_parameters(scenario: Scenario, air: Air, mounting: Mounting) -> WorldParameters:
+    sun_W = scenario.sun.direction_W
+    return WorldParameters(
+        hose=_sheet(scenario, "hose", HoseParameters),
+        drogue=_sheet(scenario, "drogue", DrogueParameters),
+        reel=_sheet(scenario, "reel", ReelParameters),
+        coupling=_sheet(scenario, "coupling", CouplingParameters),
+        tanker=_sheet(scenario, "tanker", TankerParameters),
+        mounting=mounting,
+        air=air,
+        airspeed_m_s=scenario.flight.airspeed_m_s,
+        sun_direction_W=SUN_OVERHEAD if sun_W is None else sun_W,
+    )
+
+
+def _gusts(scenario: Scenario, seed: int, clock: Clock) -> DrydenField | None:
+    turbulence = scenario.turbulence
+    if turbulence.model == "none":
+        return None
+    parameters = _sheet(scenario, "turbulence", TurbulenceParameters)
+    sigma = turbulence.sigma_m_s
+    if turbulence.intensity is not None:
+        sigma = gust_sigma(turbulence.intensity, scenario.flight.altitude_m)
+    if sigma is not None:
+        parameters = replace(parameters, sigma_m_s=sigma)
+    return DrydenField(parameters, scenario.flight.airspeed_m_s, clock.step_s, random_stream(seed, "gust"))
+
+
+def _navigation_sheets(scenario: Scenario, world: WorldParameters, receiver: Receiver) -> NavigationSheets:
+    """Nominal values only: nothing drawn for this flight goes in."""
+    wind_W = np.array([-world.airspeed_m_s, 0.0, 0.0])
+    rest = rest_shape(
+        world.hose, world.drogue, wind_W, world.air.density_kg_m3, world.air.kinematic_viscosity_m2_s
+    )
+    camera, ring = scenario.hardware.camera, scenario.hardware.ring
+    start = StartGeometry(
+        p_PD_B=scenario.start.p_PD_B,
+        sigma_p_m=scenario.start.sigma_p_m,
+        R_BD=receiver.trim_R_WB.T @ _attitude_along(rest.t_D_W),
+        sigma_R_rad=scenario.start.sigma_R_rad,
+    )
+    return NavigationSheets(
+        camera=Camera() if camera is None else Camera.from_toml(camera),
+        ring=LedRing() if ring is None else LedRing.from_toml(ring),
+        mounting=world.mounting,
+        start=start,
+        gyro=_gyro_sheet(scenario),
+        camera_rate_hz=scenario.rates.camera_hz,
+        control_rate_hz=scenario.rates.control_hz,
+        coupling_depth_m=world.coupling.depth_m,
+    )
+
+
+def _attitude_along(x_W: Array) -> Array:
+    """(3, 3) R_WD without roll of a body whose x axis points along a unit vector (3,)."""
+    yaw, pitch = np.arctan2(x_W[1], x_W[0]), -np.arcsin(x_W[2])
+    return matrix_from_yaw_pitch_roll(float(yaw), float(pitch), 0.0)
+
+
+def _gyro_sheet(scenario: Scenario) -> GyroSheet:
+    gyro = _sheet(scenario, "gyro", GyroParameters)
+    return GyroSheet(
+        rate_hz=scenario.rates.gyro_hz,
+        noise_density_rad_s_rthz=gyro.noise_density_rad_s_rthz,
+        bias_sigma_rad_s=gyro.turn_on_bias_sigma_rad_s,
+    )
+
+
+def _gyro(scenario: Scenario, seed: int) -> Gyro:
+    parameters = _sheet(scenario, "gyro", GyroParameters)
+    return Gyro(parameters, scenario.rates.gyro_hz, random_stream(seed, "gyro"))
+
+
+def _camera(scenario: Scenario, seed: int, sheets: NavigationSheets, world: World) -> NearInfraredCamera:
+    """Draw the hardware as it was built, and make its camera."""
+    leds = _sheet(scenario, "leds", LedParameters)
+    as_built = draw_as_built(
+        sheets.camera,
+        sheets.ring,
+        sheets.mounting,
+        _sheet(scenario, "as_built", AsBuiltParameters),
+        leds,
+        random_stream(seed, "as_built"),
+    )
+    return NearInfraredCamera(
+        _sheet(scenario, "camera", CameraParameters),
+        leds,
+        _sheet(scenario, "light", LightParameters),
+        as_built,
+        counter_key(seed, "image"),
+        world.model,
+        scenario.sun.direction_W,
+    )
+
+
+def _recipe(scenario: Scenario, sheets: NavigationSheets) -> NavigatorRecipe:
+    """Our own navigator takes settings; anybody else's is made of its sheets alone."""
+    name = scenario.navigation.navigator
+    ours = name == name_of(Navigator)
+    settings = NavigatorSettings(guidance=guidance_settings(scenario)) if ours else None
+    return NavigatorRecipe(class_name=name, sheets=sheets, settings=settings)

@@ -47,11 +47,12 @@ class Flight:
         self.world, self.camera, self.gyro, self.navigator = parts.world, parts.camera, parts.gyro, parts.navigator
         self.referee = Referee()
         self._full_frames = full_frames
-        self._ticks = parts.ticks
+        self._periods = parts.periods
         self._command = self._next_command = ReceiverCommand()
         self._window = parts.sheets.camera.full_window
         self._in_transfer: deque[tuple[float, CameraFrame]] = deque()
         self._frame_number = 0
+        self.recipe = parts.recipe
 
     @property
     def truth(self) -> Truth:
@@ -66,12 +67,12 @@ class Flight:
         """
         self._command = self._next_command if command is None else command
         imu: list[ImuSample] = []
-        for _ in range(self._ticks.control):
+        for _ in range(self._periods.control):
             truth = self.world.step(self._command)
             self.referee.watch(truth)
-            if truth.tick % self._ticks.gyro == 0:
+            if truth.tick % self._periods.gyro == 0:
                 imu.append(self.gyro.step(truth.time_s, truth.w_WB_B))
-            if self.camera is not None and truth.tick % self._ticks.camera == 0:
+            if self.camera is not None and truth.tick % self._periods.camera == 0:
                 self._expose(truth.time_s)
         frame = self._delivered(truth.time_s)
         if isinstance(self.navigator, TruthNavigator):
@@ -86,3 +87,48 @@ class Flight:
         """Free the camera's off-screen context."""
         if self.camera is not None:
             self.camera.close()
+
+    def _expose(self, time_s: float) -> None:
+        window = None if self._full_frames else self._window
+        frame = self.camera.expose(self.world.data, time_s, self._frame_number, window)
+        self._frame_number += 1
+        self._in_transfer.append((time_s + self.camera.latency_s(frame), frame))
+
+    def _delivered(self, time_s: float) -> CameraFrame | None:
+        """Return the oldest frame whose transfer is over, if there is one."""
+        if self._in_transfer and self._in_transfer[0][0] <= time_s:
+            return self._in_transfer.popleft()[1]
+        return None
+
+
+def fly(
+    scenario: Scenario,
+    seed: int | None = None,
+    out: str | Path | None = None,
+    *,
+    record: str = "window",
+    progress: Progress | None = None,
+) -> Result:
+    """Fly a scenario to its end.
+
+    Args:
+        scenario: what to fly.
+        seed: of every random stream; the scenario's own by default.
+        out: folder that takes result.json, the recording and the messages; nothing is written without.
+        record: "window" keeps exactly the pixels that `nav` received, "full" makes the camera read whole frames,
+            "none" keeps no frame.
+        progress: called at every control tick.
+    """
+    seed = scenario.seed if seed is None else seed
+    begun = time.perf_counter()
+    flight = Flight(scenario, seed, full_frames=record == "full")
+    try:
+        with Recorder(flight, out, record) as recorder:
+            while (tick := flight.step()).outcome is None:
+                recorder.append(tick)
+                if progress is not None:
+                    progress(tick.truth, tick.solution)
+            recorder.append(tick)
+    finally:
+        flight.close()
+    return recorder.finish(flight, tick.outcome, seed, time.perf_counter() - begun)

@@ -14,12 +14,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from dockair.calibration import Mounting
-from dockair.rotations import matrix_from_yaw_pitch_roll, quaternion_from_matrix
+from dockair.rotations import Array, matrix_from_yaw_pitch_roll, quaternion_from_matrix
 
 Point = tuple[float, float, float]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class TankerParameters:
     """assets/parameters/tanker.toml."""
 
@@ -27,7 +27,7 @@ class TankerParameters:
     span_m: float
     length_m: float
     fuselage_radius_m: float
-    exit_m: np.ndarray  # type: ignore[type-arg]
+    exit_m: Array  #: (3,) the hose's exit in T
     pod_length_m: float
     pod_radius_m: float
     reflectance: float
@@ -54,7 +54,9 @@ class Piece:
         return [float(c) for c in quaternion_from_matrix(R)]
 
 
-def _pair(name: str, kind: str, at: Point, size: Point, *, yaw: float, roll: float, shade: float = 1.0) -> list[Piece]:
+def _pair(
+    name: str, kind: str, at: Point, size: Point, *, yaw: float = 0.0, roll: float = 0.0, shade: float = 1.0
+) -> list[Piece]:
     """The piece on the left and its mirror image on the right."""
     x, y, z = at
     left = Piece(f"{name}_left", kind, at, size, yaw_rad=yaw, roll_rad=roll, shade=shade)
@@ -86,11 +88,11 @@ def tanker_pieces(tanker: TankerParameters) -> list[Piece]:
             yaw=sweep,
             roll=dihedral,
         ),
-        Piece("fin", "ellipsoid", (tail_x, 0.0, 3.2 * 0.5 * r + r), (2.2, 0.18, 3.4), pitch_rad=np.deg2rad(-32.0)),
+        Piece("fin", "box", (tail_x, 0.0, 2.6 * r), (1.5, 0.12, 1.7 * r), pitch_rad=np.deg2rad(-32.0)),
         *_pair(
             "engine", "ellipsoid", (2.2, 0.36 * half_span, -1.25 * r), (2.3, 1.0, 1.0), yaw=0.0, roll=0.0, shade=0.7
         ),
-        *_pair("pylon", "box", (1.0, 0.36 * half_span, -0.72 * r), (1.4, 0.12, 0.5), yaw=0.0, roll=0.0, shade=0.8),
+        *_pair("pylon", "box", (1.0, 0.36 * half_span, -0.72 * r), (1.4, 0.12, 0.5), shade=0.8),
         Piece(
             "pod",
             "capsule",
@@ -121,7 +123,7 @@ def receiver_pieces(mounting: Mounting) -> list[Piece]:
         Piece("fuselage_intake", "ellipsoid", (0.6, 0.0, -0.75), (2.2, 0.45, 0.42), shade=0.8),
         Piece("canopy", "ellipsoid", (1.1, 0.0, 0.42), (1.5, 0.36, 0.5), shade=0.4),
         Piece("nozzle", "capsule", (-5.0, 0.0, -0.1), (0.5, 0.0, 0.0), to=(-5.6, 0.0, -0.1), shade=0.4),
-        *_pair("wing", "ellipsoid", (-1.6, 2.5, -0.1), (1.4, 2.35, 0.09), yaw=0.5 * sweep, roll=0.0),
-        *_pair("tailplane", "ellipsoid", (-5.4, 1.6, -0.1), (0.9, 1.2, 0.06), yaw=0.5 * sweep, roll=0.0),
-        Piece("fin", "ellipsoid", (-4.9, 0.0, 1.5), (1.1, 0.07, 1.5), pitch_rad=-sweep),
+        *_pair("wing", "box", (-1.6, 2.5, -0.1), (1.2, 2.0, 0.05), yaw=0.5 * sweep),
+        *_pair("tailplane", "box", (-5.4, 1.6, -0.1), (0.7, 1.0, 0.04), yaw=0.5 * sweep),
+        Piece("fin", "box", (-4.9, 0.0, 1.5), (0.9, 0.05, 1.3), pitch_rad=-sweep),
     ]

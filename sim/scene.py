@@ -18,9 +18,10 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from dockair.calibration import Camera, LedRing, Mounting
-from dockair.rotations import Array
+from dockair.calibration import Camera, Mounting
+from dockair.rotations import Array, quaternion_from_matrix
 from dockair.sim.air.atmosphere import STANDARD_GRAVITY_M_S2
+from dockair.sim.basket import add_drogue, grey, sliding
 from dockair.sim.hose.chain import DrogueParameters, HoseParameters
 from dockair.sim.hose.coupling import CouplingParameters
 from dockair.sim.hose.reel import ReelParameters
@@ -30,7 +31,6 @@ from dockair.sim.outlines import Piece, TankerParameters, receiver_pieces, tanke
 _PROBE, _RECEIVER = 1, 2
 
 _RECEIVER_REFLECTANCE = 0.4  # grey paint near 850 nm; drawing only
-_SOCKET_STAVES = 12  # capsules around the coupling's mouth
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -57,7 +57,7 @@ def build_scene(parameters: SceneParameters) -> mujoco.MjModel:
     _add_sky_and_sun(spec, parameters.sun_direction_W)
     _add_tanker(spec, parameters.tanker)
     drogue = _add_hose(spec, parameters)
-    _add_drogue(drogue, parameters)
+    add_drogue(drogue, parameters.drogue, parameters.coupling, _PROBE | _RECEIVER)
     _add_receiver(spec, parameters)
     latch = spec.add_equality(
         name="latch", type=mujoco.mjtEq.mjEQ_CONNECT, objtype=mujoco.mjtObj.mjOBJ_SITE, name1="probe_tip"
@@ -99,10 +99,6 @@ def _add_sky_and_sun(spec: Any, sun_direction_W: Array) -> None:
     )
 
 
-def _grey(reflectance: float) -> list[float]:
-    return [reflectance, reflectance, reflectance, 1.0]
-
-
 def _add_pieces(body: Any, pieces: list[Piece], prefix: str, reflectance: float, contact: dict[str, Any]) -> None:
     kinds = {
         "ellipsoid": mujoco.mjtGeom.mjGEOM_ELLIPSOID,
@@ -115,7 +111,7 @@ def _add_pieces(body: Any, pieces: list[Piece], prefix: str, reflectance: float,
             name=prefix + piece.name,
             type=kinds[piece.kind],
             size=list(piece.size),
-            rgba=_grey(min(reflectance * piece.shade, 1.0)),
+            rgba=grey(min(reflectance * piece.shade, 1.0)),
             mass=0.0,
             **placed,
             **contact,
@@ -149,10 +145,10 @@ def _add_hose(spec: Any, parameters: SceneParameters) -> Any:
             type=mujoco.mjtGeom.mjGEOM_CAPSULE,
             fromto=[0.0, 0.0, 0.0, -length, 0.0, 0.0],
             size=[hose.radius_m, 0.0, 0.0],
-            rgba=_grey(hose.reflectance),
+            rgba=grey(hose.reflectance),
             contype=0,
             conaffinity=_PROBE | _RECEIVER,
-            friction=[drogue.friction, 0.005, 0.0001],
+            friction=sliding(drogue.friction),
         )
         parent, joint_at = body, [-length, 0.0, 0.0]
     body = parent.add_body(name="drogue", pos=[-length - drogue.hose_joint_x_m, 0.0, 0.0])
@@ -173,116 +169,16 @@ def _add_hinges(body: Any, name: str, at: list[float], stiffness: float, damping
         joint.stiffness[0], joint.damping[0] = stiffness, damping
 
 
-def _add_drogue(body: Any, parameters: SceneParameters) -> None:
-    drogue, coupling = parameters.drogue, parameters.coupling
-    body.explicitinertial, body.mass = True, drogue.mass_kg
-    body.ipos, body.inertia = [drogue.centre_of_mass_x_m, 0.0, 0.0], drogue.inertia_kg_m2
-    solid = {
-        "contype": 0,
-        "conaffinity": _PROBE | _RECEIVER,
-        "friction": [drogue.friction, 0.005, 0.0001],
-        "solref": [drogue.contact_time_constant_s, 1.0],
-        "rgba": _grey(drogue.reflectance),
-    }
-    _add_basket(body, drogue, coupling, solid)
-    _add_socket(body, drogue, coupling, solid)
-    _add_canopy(body, drogue)
-    ring = LedRing(diameter_m=drogue.ring_diameter_m)
-    drawn = {"contype": 0, "conaffinity": 0}
-    for k, (_, y, z) in enumerate(ring.positions_D):
-        body.add_site(name=f"led_{k}", pos=[0.0, y, z], size=[0.004] * 3)
-        body.add_geom(
-            name=f"led_housing_{k}",
-            type=mujoco.mjtGeom.mjGEOM_CYLINDER,
-            fromto=[0.002, y, z, drogue.rim_x_m, y, z],  # behind the LED, which lies on the housing's face
-            size=[drogue.led_housing_radius_m, 0.0, 0.0],
-            rgba=_grey(0.04),
-            **drawn,
-        )
-    body.add_site(name="coupling", pos=[coupling.depth_m, 0.0, 0.0], size=[0.01] * 3)
-
-
-def _circle(count: int, radius: float) -> Array:
-    """(count, 2) points (y, z) on a circle."""
-    angle = 2.0 * np.pi * np.arange(count) / count
-    return radius * np.column_stack([np.cos(angle), np.sin(angle)])
-
-
-def _add_basket(body: Any, drogue: DrogueParameters, coupling: CouplingParameters, solid: dict[str, Any]) -> None:
-    """Rim of capsules; ribs from the rim to the coupling's mouth, too close together for a probe's tip."""
-    rim = _circle(drogue.ribs, 0.5 * drogue.ring_diameter_m)
-    throat = _circle(drogue.ribs, coupling.socket_radius_m + drogue.rib_radius_m)
-    for k in range(drogue.ribs):
-        here, there = rim[k], rim[(k + 1) % drogue.ribs]
-        for name, to, radius in (
-            ("rim", [drogue.rim_x_m, *there], drogue.rim_tube_radius_m),
-            ("rib", [drogue.throat_x_m, *throat[k]], drogue.rib_radius_m),
-        ):
-            body.add_geom(
-                name=f"basket_{name}_{k}",
-                type=mujoco.mjtGeom.mjGEOM_CAPSULE,
-                fromto=[drogue.rim_x_m, *here, *to],
-                size=[radius, 0.0, 0.0],
-                **solid,
-            )
-
-
-def _add_socket(body: Any, drogue: DrogueParameters, coupling: CouplingParameters, solid: dict[str, Any]) -> None:
-    """Mouth of the coupling as a bundle of staves around its bore; a solid body from its bottom to the hose."""
-    bottom = coupling.depth_m + coupling.stop_gap_m
-    half_wall = 0.5 * coupling.socket_wall_m
-    outside = coupling.socket_radius_m + coupling.socket_wall_m
-    for k, (y, z) in enumerate(_circle(_SOCKET_STAVES, coupling.socket_radius_m + half_wall)):
-        body.add_geom(
-            name=f"coupling_stave_{k}",
-            type=mujoco.mjtGeom.mjGEOM_CAPSULE,
-            fromto=[drogue.throat_x_m, y, z, bottom, y, z],
-            size=[half_wall, 0.0, 0.0],
-            **solid,
-        )
-    body.add_geom(
-        name="coupling_body",
-        type=mujoco.mjtGeom.mjGEOM_CYLINDER,
-        fromto=[bottom, 0.0, 0.0, drogue.hose_joint_x_m, 0.0, 0.0],
-        size=[outside, 0.0, 0.0],
-        **solid,
-    )
-
-
-def _add_canopy(body: Any, drogue: DrogueParameters) -> None:
-    """A skirt of flat panels from the rim outward and forward; drawn only."""
-    inner, outer, panels = 0.5 * drogue.ring_diameter_m, 0.5 * drogue.canopy_diameter_m, 24
-    slant = np.hypot(outer - inner, drogue.canopy_length_m)
-    lean = np.arctan2(outer - inner, drogue.canopy_length_m)
-    half_width = np.pi * outer / panels
-    for k in range(panels):
-        angle = 2.0 * np.pi * k / panels
-        middle = 0.5 * (inner + outer)
-        x = drogue.rim_x_m + drogue.rim_tube_radius_m + 0.5 * drogue.canopy_length_m
-        out = np.array([0.0, np.cos(angle), np.sin(angle)])
-        along = np.cos(lean) * np.array([1.0, 0.0, 0.0]) + np.sin(lean) * out
-        sideways = np.array([0.0, -np.sin(angle), np.cos(angle)])
-        quat = np.empty(4)
-        mujoco.mju_mat2Quat(quat, np.column_stack([along, sideways, np.cross(along, sideways)]).ravel())
-        body.add_geom(
-            name=f"canopy_{k}",
-            type=mujoco.mjtGeom.mjGEOM_BOX,
-            pos=np.array([x, 0.0, 0.0]) + middle * out,
-            quat=quat,
-            size=[0.5 * slant, half_width, 0.002],
-            rgba=_grey(drogue.canopy_reflectance),
-            contype=0,
-            conaffinity=0,
-        )
-
-
 def _add_receiver(spec: Any, parameters: SceneParameters) -> None:
     mounting, coupling = parameters.mounting, parameters.coupling
     inertia = np.asarray(parameters.receiver_inertia_B, dtype=float)
     body = spec.worldbody.add_body(name="receiver")
     body.add_freejoint(name="receiver")
     body.explicitinertial, body.mass = True, parameters.receiver_mass_kg
-    body.fullinertia = [*np.diag(inertia), inertia[0, 1], inertia[0, 2], inertia[1, 2]]
+    # MuJoCo sorts the principal moments of a `fullinertia` but leaves `iquat` as it was; so both are set here
+    moments, axes = np.linalg.eigh(inertia)
+    axes[:, 0] *= np.sign(np.linalg.det(axes))
+    body.inertia, body.iquat = moments, quaternion_from_matrix(axes)
     contact = {"contype": _RECEIVER, "conaffinity": 0}
     _add_pieces(body, receiver_pieces(mounting), "", _RECEIVER_REFLECTANCE, contact)
     _add_probe(body, mounting, coupling)
@@ -294,7 +190,7 @@ def _add_probe(body: Any, mounting: Mounting, coupling: CouplingParameters) -> N
     x, y, z = (float(c) for c in mounting.p_BP)
     tip, boom = coupling.probe_tip_radius_m, coupling.probe_boom_radius_m
     elbow, foot = [x - 1.7, y, z], [x - 3.2, 0.35 * y, 0.2 * z]
-    contact = {"contype": _PROBE, "conaffinity": 0, "rgba": _grey(0.3)}
+    contact = {"contype": _PROBE, "conaffinity": 0, "rgba": grey(0.3)}
     capsule = mujoco.mjtGeom.mjGEOM_CAPSULE
     sphere = mujoco.mjtGeom.mjGEOM_SPHERE
     body.add_geom(name="probe_tip", type=sphere, pos=[x - tip, y, z], size=[tip, 0.0, 0.0], **contact)

@@ -18,90 +18,30 @@ Not modelled: tanker motion, wake and bow wave, fuel flow.
 
 import copy
 from dataclasses import dataclass
-from typing import Protocol
 
 import mujoco
 import numpy as np
 
-from dockair.calibration import Mounting
 from dockair.clock import Clock
 from dockair.errors import DockairError
 from dockair.messages import ReceiverCommand
 from dockair.rotations import Array, quaternion_from_matrix
-from dockair.sim.air.atmosphere import STANDARD_GRAVITY_M_S2, Air
 from dockair.sim.addresses import Addresses
-from dockair.sim.hose.chain import DrogueParameters, HoseParameters, velocities_at
-from dockair.sim.hose.coupling import CouplingParameters, CouplingState, ProbeInCoupling, next_coupling_state
-from dockair.sim.hose.loads import load_coefficients, tow_loads
-from dockair.sim.hose.reel import Reel, ReelParameters, guide_coefficients, guide_loads
-from dockair.sim.hose.rest import RestShape, hinge_angles, rest_shape
-from dockair.sim.outlines import TankerParameters
+from dockair.sim.air.atmosphere import STANDARD_GRAVITY_M_S2
+from dockair.sim.hose.chain import cross
+from dockair.sim.hose.coupling import CouplingState, next_coupling_state, probe_in_coupling
+from dockair.sim.hose.reel import Reel
+from dockair.sim.hose.rest import hinge_angles
+from dockair.sim.hose.tow import Tow
+from dockair.sim.parts import Airframe, GustField, WorldParameters, WorldStart
 from dockair.sim.scene import SceneParameters, build_scene
 from dockair.sim.truth import Truth
 
 _WAITING_PLACE_M = (-300.0, 0.0, -20.0)  # of the receiver while the hose settles: out of everybody's way
+__all__ = ["World", "WorldParameters", "WorldStart", "WorldState"]
+
 _STATE = mujoco.mjtState.mjSTATE_INTEGRATION
 _GRAVITY = np.array([0.0, 0.0, -STANDARD_GRAVITY_M_S2])
-
-
-class Airframe(Protocol):
-    """What the world needs of the receiver: `dockair.sim.aircraft.receiver.Receiver`."""
-
-    mass_kg: float
-    inertia_B: Array
-    trim_R_WB: Array
-    airspeed_m_s: float
-    angle_of_attack_rad: float
-    sideslip_rad: float
-    throttle: float
-
-    def step(
-        self,
-        *,
-        R_WB: Array,
-        v_WB: Array,
-        w_WB_B: Array,
-        air_velocity_W: Array,
-        specific_force_B: Array,
-        command: ReceiverCommand,
-    ) -> tuple[Array, Array]:
-        """Force and moment about the centre of gravity in W, without gravity."""
-        ...
-
-
-class GustField(Protocol):
-    """What the world needs of the gusts: `dockair.sim.air.turbulence.DrydenField`."""
-
-    def step(self) -> None:
-        """Advance by one tick."""
-        ...
-
-    def velocity(self, x_W: Array) -> Array:
-        """(n, 3) gust in W axes at places x (n,)."""
-        ...
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class WorldParameters:
-    """The sheets and the flight condition."""
-
-    hose: HoseParameters
-    drogue: DrogueParameters
-    reel: ReelParameters
-    coupling: CouplingParameters
-    tanker: TankerParameters
-    mounting: Mounting
-    air: Air
-    airspeed_m_s: float
-    sun_direction_W: Array  #: (3,) from the scene to the Sun
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class WorldStart:
-    """Where the flight begins."""
-
-    p_PD_B: Array  #: (3,) the drogue's mean ring centre from the probe's tip, body axes of the trimmed receiver [m]
-    settle_s: float  #: how long hose and gusts run before
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -139,7 +79,7 @@ class World:
     Attributes:
         truth: the state now.
         model, data: for the camera, to read only.
-        static_root_tension_n: tension at the exit at rest at full trail.
+        rest: hose and drogue at rest at full trail in still air.
     """
 
     def __init__(
@@ -152,14 +92,17 @@ class World:
         self.data = mujoco.MjData(self.model)
         self._at = Addresses.of(self.model)
         self._wind_W = np.array([-parameters.airspeed_m_s, 0.0, 0.0])
-        rest = self._prepare_tow()
+        p = parameters
+        self._tow = Tow(p.hose, p.drogue, p.reel, p.air, self._wind_W, clock.step_s)
+        self._coupling = CouplingState.READY
+        self.rest = rest = self._tow.rest
         self.data.qpos[self._at.hinges] = hinge_angles(np.vstack([rest.t_W, rest.t_D_W])).ravel()
         self._put_receiver(np.array(_WAITING_PLACE_M))
         self._reactions = _Reactions(rest.root_tension_n, rest.drogue_tension_n, 0.0, np.zeros(3))
         self._observe(0)
         p_WD_mean = self._settle(round(start.settle_s / clock.step_s))
         R_WB = np.asarray(receiver.trim_R_WB)
-        self._put_receiver(p_WD_mean - R_WB @ (start.p_PD_B + parameters.mounting.p_BP))
+        self._put_receiver(p_WD_mean - R_WB @ (start.p_PD_B + p.mounting.p_BP))
         self._reactions.a_WB = np.zeros(3)
         self._observe(0)
 
@@ -185,7 +128,7 @@ class World:
         mujoco.mj_getState(self.model, self.data, engine, _STATE)
         return WorldState(
             engine=engine,
-            parts=copy.deepcopy((self._reel, self._receiver, self._gusts)),
+            parts=copy.deepcopy((self._tow.reel, self._receiver, self._gusts)),
             coupling=self._coupling,
             truth=self.truth,
             gusts_W=self._gusts_W.copy(),
@@ -196,20 +139,9 @@ class World:
         """Go back to a saved state; what follows is the same to the bit."""
         mujoco.mj_setState(self.model, self.data, state.engine, _STATE)
         mujoco.mj_step1(self.model, self.data)
-        self._reel, self._receiver, self._gusts = copy.deepcopy(state.parts)
+        self._tow.reel, self._receiver, self._gusts = copy.deepcopy(state.parts)
         self._coupling, self.truth = state.coupling, state.truth
         self._gusts_W, self._specific_force_B = state.gusts_W.copy(), state.specific_force_B.copy()
-
-    def _prepare_tow(self) -> RestShape:
-        """Set up loads, guide and reel for the flight condition; return the shape at rest."""
-        p, rho, nu = self.parameters, self.parameters.air.density_kg_m3, self.parameters.air.kinematic_viscosity_m2_s
-        rest = rest_shape(p.hose, p.drogue, self._wind_W, rho, nu)
-        self.static_root_tension_n = rest.root_tension_n
-        self._loads = load_coefficients(p.hose, p.drogue, rho, nu)
-        self._guide = guide_coefficients(p.hose, p.reel, rest.root_tension_n)
-        self._reel = Reel(p.reel, rest.root_tension_n, self._clock.step_s)
-        self._coupling = CouplingState.READY
-        return rest
 
     def _put_receiver(self, p_WB: Array) -> None:
         """Place the receiver, trimmed and at rest in W."""
@@ -234,8 +166,15 @@ class World:
     def _advance(self, tick: int) -> None:
         """One tick, the receiver's forces being applied already."""
         at, data, before = self._at, self.data, self.truth
-        data.xfrc_applied[at.tow] = self._tow_wrenches()
-        data.qfrc_applied[at.reel_dof] = self._reel.step(before.root_tension_n, before.reel_rate_m_s)
+        data.xfrc_applied[at.tow] = self._tow.wrenches(
+            data.xipos[at.tow],
+            data.xmat[at.tow].reshape(-1, 3, 3),
+            data.cvel[at.tow],
+            data.subtree_com[at.tow.start],
+            self._gusts_W[:-1],
+            before.reel_position_m,
+        )
+        data.qfrc_applied[at.reel_dof] = self._tow.reel.step(before.root_tension_n, before.reel_rate_m_s)
         mujoco.mj_step2(self.model, data)
         mujoco.mj_rnePostConstraint(self.model, data)
         self._reactions = self._solved_forces()
@@ -245,45 +184,23 @@ class World:
         mujoco.mj_step1(self.model, data)
         self._observe(tick)
 
-    def _tow_wrenches(self) -> Array:
-        """(links + 1, 6) air loads, and the guide's in the pod, on links and drogue."""
-        at, data = self._at, self.data
-        position, spatial = data.xipos[at.tow], data.cvel[at.tow]
-        R = data.xmat[at.tow].reshape(-1, 3, 3)
-        v = velocities_at(position, spatial, data.subtree_com[at.tow.start])
-        drawn_in = float(data.qpos[at.reel_qpos])
-        air = self._wind_W + self._gusts_W[:-1]
-        w = np.ascontiguousarray(spatial[:, :3])
-        wrench = tow_loads(position, R, v, w, air, drawn_in, self._loads)
-        if drawn_in > 0.0:
-            wrench[:-1] += guide_loads(position[:-1], R[:-1], v[:-1], w[:-1], drawn_in, self._guide)
-        return wrench
-
     def _solved_forces(self) -> _Reactions:
-        at, data, hose = self._at, self.data, self.parameters.hose
-        at_exit = min(max(int(data.qpos[at.reel_qpos] / hose.link_length_m), 0), hose.links - 1)
+        """Forces at the beginning of the tick, which MuJoCo has just solved for."""
+        at, data = self._at, self.data
+        at_exit = at.tow.start + self._tow.link_at_exit(self.truth.reel_position_m)
         pull = 0.0
         if self._coupling is CouplingState.LATCHED:  # its three rows come first: it is the only equality
             pull = float(data.efc_force[:3] @ self.truth.R_WD[:, 0])
         return _Reactions(
-            root_tension_n=float(np.linalg.norm(data.cfrc_int[at.tow.start + at_exit, 3:])),
-            drogue_tension_n=float(np.linalg.norm(data.cfrc_int[at.drogue, 3:])),
+            root_tension_n=_norm(data.cfrc_int[at_exit, 3:]),
+            drogue_tension_n=_norm(data.cfrc_int[at.drogue, 3:]),
             coupling_force_n=pull,
             a_WB=data.qacc[at.receiver_dof][:3].copy(),
         )
 
     def _decide_coupling(self) -> None:
-        truth, p = self.truth, self.parameters.coupling
-        p_DP = truth.p_DP
-        x_D = truth.R_WD[:, 0]
-        r_W = truth.R_WD @ p_DP
-        v_D = truth.v_WD + np.array(_cross(truth.R_WD @ truth.w_WD_D, r_W))
-        probe = ProbeInCoupling(
-            distance_m=float(np.sqrt((p_DP[0] - p.depth_m) ** 2 + p_DP[1] ** 2 + p_DP[2] ** 2)),
-            angle_rad=float(np.arccos(min(max(truth.R_WB[:, 0] @ x_D, -1.0), 1.0))),
-            closing_speed_m_s=float((truth.v_WP - v_D) @ x_D),
-            pull_n=self._reactions.coupling_force_n,
-        )
+        p = self.parameters.coupling
+        probe = probe_in_coupling(self.truth, self._reactions.coupling_force_n, p)
         self._coupling = next_coupling_state(self._coupling, probe, p)
         self.data.eq_active[self._at.latch] = self._coupling is CouplingState.LATCHED
 
@@ -309,10 +226,10 @@ class World:
             w_WB_B=qvel[3:].copy(),
             a_WB=solved.a_WB,
             p_WP=p_WB + p_BP_W,
-            v_WP=qvel[:3] + _cross(R_WB @ qvel[3:], p_BP_W),
+            v_WP=qvel[:3] + cross(R_WB @ qvel[3:], p_BP_W),
             R_WD=R_WD,
             p_WD=p_WD,
-            v_WD=data.cvel[at.drogue, 3:] + _cross(w_WD, p_WD - root),
+            v_WD=data.cvel[at.drogue, 3:] + cross(w_WD, p_WD - root),
             w_WD_D=R_WD.T @ w_WD,
             p_WH=np.vstack([data.xpos[at.links], data.xanchor[at.drogue_joint]]),
             R_WT=np.eye(3),
@@ -344,9 +261,8 @@ class World:
         return self._gusts.velocity(x)
 
 
-def _cross(a: Array, b: Array) -> Array:
-    """(3,) a x b; numpy's own is ten times slower for one pair."""
-    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+def _norm(v: Array) -> float:
+    return float(np.sqrt(v @ v))
 
 
 def _scene_parameters(parameters: WorldParameters, receiver: Airframe, clock: Clock) -> SceneParameters:

@@ -138,7 +138,8 @@ def mirrored(R_CD, p_CD, points_D):
     """The other attitude of Eq. (2): the LEDs' plane reflected about the line of sight to their middle.
 
     Args:
-        R_CD, p_CD: a pose.
+        R_CD: (3, 3) attitude.
+        p_CD: (3,) position [m].
         points_D: (n, 3) LEDs in drogue axes [m].
 
     Returns:

@@ -94,9 +94,7 @@ class LinearAerodynamics:
             w_B: (3,) angular velocity [rad/s].
             surfaces_rad: (3,) elevator, aileron, rudder [rad].
         """
-        return _force_and_moment(
-            self.C_0, self.D, self.z_0, self.lengths, self.density_kg_m3, v_B, w_B, surfaces_rad
-        )
+        return _force_and_moment(self.C_0, self.D, self.z_0, self.lengths, self.density_kg_m3, v_B, w_B, surfaces_rad)
 
 
 def flow_angles(v_B: Array) -> tuple[float, float, float]:

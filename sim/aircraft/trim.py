@@ -46,7 +46,9 @@ def level_trim(parameters: AirframeParameters, airspeed_m_s: float, air: Air) ->
     """
     qbar_S = 0.5 * air.density_kg_m3 * airspeed_m_s**2 * parameters.wing_area_m2
     weight = parameters.mass_kg * STANDARD_GRAVITY_M_S2
-    slope = float(parameters.normal_force[-1] - parameters.normal_force[0]) / float(np.ptp(parameters.angle_of_attack_rad))
+    slope = float(parameters.normal_force[-1] - parameters.normal_force[0]) / float(
+        np.ptp(parameters.angle_of_attack_rad)
+    )
     guess = np.array([-weight / (qbar_S * slope), 0.0]) if qbar_S > 0.0 else np.zeros(2)
 
     def imbalance(x: Array) -> Array:

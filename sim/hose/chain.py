@@ -91,3 +91,9 @@ def velocities_at(places: Array, spatial: Array, reference: Array) -> Array:
         r = places[i] - reference
         v[i] = spatial[i, 3:] + np.cross(spatial[i, :3], r)
     return v
+
+
+@njit(cache=True)
+def cross(a: Array, b: Array) -> Array:
+    """(3,) a x b; numpy's own takes ten times as long for one pair of vectors."""
+    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])

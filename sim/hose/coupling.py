@@ -18,6 +18,11 @@ Source of the limits: assets/parameters/coupling.toml.
 from dataclasses import dataclass
 from enum import Enum
 
+import numpy as np
+
+from dockair.sim.hose.chain import cross
+from dockair.sim.truth import Truth
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CouplingParameters:
@@ -68,3 +73,17 @@ def next_coupling_state(state: CouplingState, probe: ProbeInCoupling, parameters
     slow_enough = probe.closing_speed_m_s <= parameters.closing_speed_max_m_s
     aligned = probe.angle_rad <= parameters.angle_limit_rad
     return CouplingState.LATCHED if fast_enough and slow_enough and aligned else CouplingState.BARRED
+
+
+def probe_in_coupling(truth: Truth, pull_n: float, parameters: CouplingParameters) -> ProbeInCoupling:
+    """Return where the probe is, of the world's state and the force the coupling bears."""
+    p_DP = truth.p_DP
+    p_KP = p_DP - np.array([parameters.depth_m, 0.0, 0.0])
+    v_DP_D = truth.R_WD.T @ (truth.v_WP - truth.v_WD) - cross(truth.w_WD_D, p_DP)
+    cosine = float(truth.R_WB[:, 0] @ truth.R_WD[:, 0])
+    return ProbeInCoupling(
+        distance_m=float(np.sqrt(p_KP @ p_KP)),
+        angle_rad=float(np.arccos(min(max(cosine, -1.0), 1.0))),
+        closing_speed_m_s=float(v_DP_D[0]),
+        pull_n=pull_n,
+    )

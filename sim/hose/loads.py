@@ -69,7 +69,7 @@ def hose_load_per_length(t: Array, u: Array, k: Array) -> Array:
         s = min(max(s, 0.0), 1.0)
         c_n = k[_CN_LOW] + (k[_CN_HIGH] - k[_CN_LOW]) * s * s * (3.0 - 2.0 * s)
         normal = 0.5 * k[_RHO] * c_n * k[_DIAMETER] * across
-    # C_f of Eq. (3), with 1/Re_f of Eq. (2) so that a hose exactly along the stream is the limit and not a division by 0
+    # Eq. (3) with 1 / Re_f of Eq. (2), which is 0 and not infinite for a hose exactly along the stream
     c_f = k[_CF] * (2.0 * k[_NU] * across / (np.pi * k[_DIAMETER] * speed * speed)) ** (-_FRICTION_EXPONENT)
     tangential = 0.5 * k[_RHO] * c_f * np.pi * k[_DIAMETER] * abs(along) * along
     f[0] = normal * n0 + tangential * t[0]

@@ -1,0 +1,168 @@
+"""The three-dimensional part of an episode: the model's primitives moved by the truth, the belief beside it."""
+
+from collections import defaultdict
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from dockair.calibration import NavigationSheets
+from dockair.rotations import Array, quaternion_from_matrix
+from dockair.scenarios.flight_log import FlightLog
+from dockair.scenarios.recording_layout import BELIEF, TRUTH
+from dockair.sim.shapes import Shape
+
+#: Body of the model -> (rotation, position) in Truth.
+_MOVED_BY = {"tanker": ("R_WT", "p_WT"), "drogue": ("R_WD", "p_WD"), "receiver": ("R_WB", "p_WB")}
+_HOSE_RADIUS_M = 0.034  # drawn where no model gives it
+_HOSE_COLOUR = [60, 60, 66]
+_LED_COLOUR = [255, 120, 160]
+_FRUSTUM_M = 1.2
+
+
+def time_columns(log: FlightLog, ticks: Sequence[int]) -> list[Any]:
+    """Return the two timelines at some control ticks; `frame` counts the frames used up to each."""
+    import rerun as rr
+
+    stamps = [s.frame_time_stamp_s for s in log.solutions]
+    numbers = {stamp: k for k, stamp in enumerate(sorted({s for s in stamps if np.isfinite(s)}))}
+    frames = [numbers.get(stamps[k], -1) for k in ticks]
+    times = [log.truths[k].time_s for k in ticks]
+    columns = [rr.TimeColumn("sim_time", duration=times)]
+    return [*columns, rr.TimeColumn("frame", sequence=np.maximum(frames, 0))] if numbers else columns
+
+
+def log_scene(
+    recording: Any, log: FlightLog, ticks: Sequence[int], sheets: NavigationSheets, shapes: Sequence[Shape]
+) -> None:
+    """Log bodies once, their poses at the given control ticks."""
+    import rerun as rr
+
+    recording.log("world", rr.ViewCoordinates.FLU, static=True)
+    _log_bodies(recording, shapes)
+    _log_receiver_fittings(recording, sheets)
+    times = time_columns(log, ticks)
+    truths = [log.truths[k] for k in ticks]
+    for body, (rotation, position) in _MOVED_BY.items():
+        rotations = [getattr(truth, rotation) for truth in truths]
+        translations = [getattr(truth, position) for truth in truths]
+        recording.send_columns(f"world/{body}", times, _transforms(translations, rotations))
+    recording.log(
+        "world/hose", rr.LineStrips3D.from_fields(colors=_HOSE_COLOUR, radii=_hose_radius(shapes)), static=True
+    )
+    recording.send_columns("world/hose", times, rr.LineStrips3D.columns(strips=[truth.p_WH for truth in truths]))
+    _log_belief(recording, log, ticks, sheets, times)
+    path = np.array([truth.p_WP for truth in log.truths])
+    line = rr.LineStrips3D([path], colors=[*TRUTH, 90], radii=rr.Radius.ui_points(0.8))
+    recording.log("world/probe_path", line, static=True)
+
+
+def _transforms(translations: Sequence[Array], rotations: Sequence[Array]) -> Any:
+    import rerun as rr
+
+    quaternions = np.array([np.roll(quaternion_from_matrix(R), -1) for R in rotations])  # rerun: x, y, z, w
+    return rr.Transform3D.columns(translation=np.array(translations), quaternion=quaternions)
+
+
+def _log_belief(
+    recording: Any, log: FlightLog, ticks: Sequence[int], sheets: NavigationSheets, times: list[Any]
+) -> None:
+    """The believed drogue: ring, LEDs and axis, placed from the receiver as the navigation has it."""
+    import rerun as rr
+
+    solutions = [log.solutions[k] for k in ticks]
+    places = [s.p_PD_B + sheets.mounting.p_BP for s in solutions]
+    recording.send_columns("world/receiver/belief", times, _transforms(places, [s.R_BD for s in solutions]))
+    ring = np.vstack([sheets.ring.positions_D, sheets.ring.positions_D[:1]])
+    axis = np.array([[0.0, 0.0, 0.0], [sheets.coupling_depth_m, 0.0, 0.0]])
+    lines = rr.LineStrips3D([_circle(sheets.ring.diameter_m), axis], colors=BELIEF, radii=rr.Radius.ui_points(1.5))
+    recording.log("world/receiver/belief/ring", lines, static=True)
+    points = rr.Points3D(ring[:-1], colors=BELIEF, radii=rr.Radius.ui_points(3.0))
+    recording.log("world/receiver/belief/leds", points, static=True)
+    velocities = np.array([s.command.velocity_m_s for s in solutions]).reshape(-1, 3)
+    recording.log(
+        "world/receiver/command",
+        rr.Arrows3D.from_fields(origins=[sheets.mounting.p_BP], colors=BELIEF, radii=rr.Radius.ui_points(1.5)),
+        static=True,
+    )
+    recording.send_columns("world/receiver/command", times, rr.Arrows3D.columns(vectors=velocities))
+
+
+def _circle(diameter_m: float) -> Array:
+    angle = np.linspace(0.0, 2.0 * np.pi, 49)
+    return 0.5 * diameter_m * np.column_stack([np.zeros_like(angle), np.cos(angle), np.sin(angle)])
+
+
+def _log_receiver_fittings(recording: Any, sheets: NavigationSheets) -> None:
+    import rerun as rr
+
+    camera, mounting = sheets.camera, sheets.mounting
+    recording.log("world/receiver/camera", rr.Transform3D(translation=mounting.p_BC, mat3x3=mounting.R_BC), static=True)
+    pinhole = rr.Pinhole(
+        focal_length=camera.focal_length_px,
+        width=camera.width_px,
+        height=camera.height_px,
+        principal_point=camera.principal_point_px,
+        camera_xyz=rr.ViewCoordinates.FLU,
+        image_plane_distance=_FRUSTUM_M,
+    )
+    recording.log("world/receiver/camera", pinhole, static=True)
+    leds = rr.Points3D(sheets.ring.positions_D, colors=_LED_COLOUR, radii=0.012)
+    recording.log("world/drogue/leds", leds, static=True)
+
+
+def _hose_radius(shapes: Sequence[Shape]) -> float:
+    radii = [shape.half_size_m[0] for shape in shapes if shape.body.startswith("hose") and shape.kind == "capsule"]
+    return float(radii[0]) if radii else _HOSE_RADIUS_M
+
+
+def _log_bodies(recording: Any, shapes: Sequence[Shape]) -> None:
+    import rerun as rr
+
+    groups: dict[tuple[str, str], list[Shape]] = defaultdict(list)
+    for shape in shapes:
+        if shape.body in _MOVED_BY:
+            groups[shape.body, shape.kind].append(shape)
+    solid = rr.components.FillMode.Solid
+    for (body, kind), group in groups.items():
+        entity = f"world/{body}/{kind}s"
+        centres = np.array([shape.p_m for shape in group])
+        quaternions = np.array([np.roll(shape.q_wxyz, -1) for shape in group])
+        half = np.array([shape.half_size_m for shape in group])
+        look: dict[str, Any] = {"quaternions": quaternions, "colors": [_colour(shape) for shape in group]}
+        if kind == "ellipsoid":
+            recording.log(entity, rr.Ellipsoids3D(half_sizes=half, centers=centres, fill_mode=solid, **look), static=True)
+        elif kind == "box":
+            recording.log(entity, rr.Boxes3D(half_sizes=half, centers=centres, fill_mode=solid, **look), static=True)
+        elif kind == "cylinder":
+            sizes = {"lengths": 2.0 * half[:, 2], "radii": half[:, 0]}
+            recording.log(entity, rr.Cylinders3D(**sizes, centers=centres, fill_mode=solid, **look), static=True)
+        elif kind == "capsule":  # the viewer's begin at their origin, MuJoCo's are centred on it
+            starts = centres - np.array([_z_axis(shape) * shape.half_size_m[2] for shape in group])
+            sizes = {"lengths": 2.0 * half[:, 2], "radii": half[:, 0]}
+            recording.log(entity, rr.Capsules3D(**sizes, translations=starts, fill_mode=solid, **look), static=True)
+        else:
+            _log_meshes(recording, entity, group)
+
+
+def _log_meshes(recording: Any, entity: str, group: Sequence[Shape]) -> None:
+    import rerun as rr
+
+    for shape in group:
+        place = f"{entity}/{shape.name or 'unnamed'}"
+        transform = rr.Transform3D(translation=shape.p_m, quaternion=np.roll(shape.q_wxyz, -1))
+        recording.log(place, transform, static=True)
+        mesh = rr.Mesh3D(
+            vertex_positions=shape.vertices_m, triangle_indices=shape.triangles, albedo_factor=_colour(shape)
+        )
+        recording.log(place, mesh, static=True)
+
+
+def _z_axis(shape: Shape) -> Array:
+    w, x, y, z = shape.q_wxyz
+    return np.array([2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)])
+
+
+def _colour(shape: Shape) -> list[int]:
+    """The near-infrared reflectance as a visible grey, brightened: black rubber and white paint must both show."""
+    return [int(255 * np.sqrt(np.clip(c, 0.0, 1.0))) for c in shape.rgba[:3]] + [int(255 * shape.rgba[3])]

@@ -1,0 +1,100 @@
+"""What a world is made of: the sheets and the flight condition, the receiver, the gusts, the start."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from dockair.calibration import Mounting
+from dockair.messages import ReceiverCommand
+from dockair.rotations import Array
+from dockair.sim.air.atmosphere import Air
+from dockair.sim.hose.chain import DrogueParameters, HoseParameters
+from dockair.sim.hose.coupling import CouplingParameters
+from dockair.sim.hose.reel import ReelParameters
+from dockair.sim.outlines import TankerParameters
+
+
+class Airframe(Protocol):
+    """What the world needs of the receiver: `dockair.sim.aircraft.receiver.Receiver`."""
+
+    @property
+    def mass_kg(self) -> float:
+        """Mass [kg]."""
+        ...
+
+    @property
+    def inertia_B(self) -> Array:
+        """(3, 3) about the centre of gravity [kg m^2]."""
+        ...
+
+    @property
+    def trim_R_WB(self) -> Array:
+        """(3, 3) attitude in trimmed level flight."""
+        ...
+
+    @property
+    def airspeed_m_s(self) -> float:
+        """At the last step [m/s]."""
+        ...
+
+    @property
+    def angle_of_attack_rad(self) -> float:
+        """At the last step."""
+        ...
+
+    @property
+    def sideslip_rad(self) -> float:
+        """At the last step."""
+        ...
+
+    @property
+    def throttle(self) -> float:
+        """Commanded fraction of the thrust range."""
+        ...
+
+    def step(
+        self,
+        *,
+        R_WB: Array,
+        v_WB: Array,
+        w_WB_B: Array,
+        air_velocity_W: Array,
+        specific_force_B: Array,
+        command: ReceiverCommand,
+    ) -> tuple[Array, Array]:
+        """Force and moment about the centre of gravity in W, without gravity."""
+        ...
+
+
+class GustField(Protocol):
+    """What the world needs of the gusts: `dockair.sim.air.turbulence.DrydenField`."""
+
+    def step(self) -> None:
+        """Advance by one tick."""
+        ...
+
+    def velocity(self, x_W: Array) -> Array:
+        """(n, 3) gust in W axes at places x (n,)."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class WorldParameters:
+    """The sheets and the flight condition."""
+
+    hose: HoseParameters
+    drogue: DrogueParameters
+    reel: ReelParameters
+    coupling: CouplingParameters
+    tanker: TankerParameters
+    mounting: Mounting
+    air: Air
+    airspeed_m_s: float
+    sun_direction_W: Array  #: (3,) from the scene to the Sun
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class WorldStart:
+    """Where the flight begins."""
+
+    p_PD_B: Array  #: (3,) the drogue's mean ring centre from the probe's tip, body axes of the trimmed receiver [m]
+    settle_s: float  #: how long hose and gusts run before

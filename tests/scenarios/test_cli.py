@@ -1,0 +1,292 @@
+"""The command line: one line for each mistake, exit status, nothing but one object on stdout with --json."""
+
+import json
+import os
+import subprocess
+import sys
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from dockair.errors import DockairError, MachineError
+from dockair.scenarios import cli, doctor
+from dockair.scenarios.metrics import NavigationFigures, Result
+from dockair.scenarios.referee import Contact
+
+NAVIGATION = NavigationFigures(
+    range_rmse_m=0.02,
+    lateral_rmse_m=0.004,
+    range_max_m=0.05,
+    lateral_max_m=0.01,
+    velocity_rmse_m_s=0.03,
+    attitude_rmse_deg=0.4,
+    nees_mean=9.1,
+    availability=0.98,
+    frames_used=600,
+)
+
+
+def a_result(scenario, seed, out, **changes) -> Result:
+    values = {
+        "scenario": scenario.name,
+        "seed": seed,
+        "outcome": "contact",
+        "attempts": 1,
+        "contact": Contact(time_s=9.87, radial_offset_m=0.042, closure_speed_m_s=1.23, angle_deg=2.5),
+        "hold": None,
+        "disconnect": None,
+        "collided_with": "",
+        "truth_navigation": scenario.navigation.is_truth,
+        "nav": NAVIGATION,
+        "frames": 612,
+        "duration_s": 20.0,
+        "real_time_factor": 0.25,
+        "wall_time_s": 80.0,
+        "versions": {"dockair": "0.1.0"},
+        "out_dir": str(out),
+    }
+    return Result(**(values | changes))
+
+
+@pytest.fixture
+def command(monkeypatch, capfd):
+    """Run `dockair` with arguments; return its exit status, stdout and stderr."""
+
+    def run(*arguments: str) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["dockair", *arguments])
+        with pytest.raises(SystemExit) as ended:
+            cli.main()
+        said = capfd.readouterr()
+        return ended.value.code, said.out, said.err
+
+    return run
+
+
+@pytest.fixture
+def flights(monkeypatch, tmp_path):
+    """Stand in for the loop: notes what it is asked to fly, tells the progress of two ticks, returns a contact."""
+    asked = []
+
+    def fly(scenario, seed=None, out=None, *, record="window", progress=None):
+        asked.append(SimpleNamespace(scenario=scenario, seed=seed, out=out, record=record))
+        for time_s in (0.0, 5.0):
+            progress(
+                SimpleNamespace(time_s=time_s, p_PD_B=np.array([3.0, 4.0, 0.0])), SimpleNamespace(phase="approach")
+            )
+        result = a_result(scenario, seed, out)
+        result.write(out)
+        return result
+
+    monkeypatch.setitem(sys.modules, "dockair.scenarios.loop", SimpleNamespace(fly=fly))
+    monkeypatch.setattr(doctor, "require_rendering", lambda: None)
+    monkeypatch.chdir(tmp_path)
+    return asked
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("fly", "defualt"), "scenario: expected a scenario of the library, or the path of a TOML file, got 'defualt'"),
+        (("fly", "none.toml"), "none.toml: expected a scenario file, got 'no such file'"),
+        (
+            ("fly", "--set", "flight.speed=1"),
+            "--set flight.speed: expected a known key, got 'speed'; exists: airspeed_m_s,",
+        ),
+        (
+            ("fly", "--set", "flight.airspeed_m_s=fast"),
+            "--set flight.airspeed_m_s: expected a number from 100.0 to 250.0",
+        ),
+        (("fly", "--set", "seed"), "--set: expected key=value, as in turbulence.sigma_m_s=1.1, got 'seed'"),
+        (("fly", "--set", "=1"), "--set: expected key=value, as in turbulence.sigma_m_s=1.1, got '=1'"),
+        (("fly", "--seed", "-1"), "Invalid value for '--seed'"),
+        (("fly", "--seed", "9223372036854775808"), "Invalid value for '--seed'"),
+        (("fly", "--record", "some"), "Invalid value for '--record'"),
+        (("fly", "--sed", "1"), "No such option: --sed"),
+        (("fyl",), "No such command 'fyl'"),
+        (("replay", "nowhere"), "nowhere: expected the folder of a recorded flight, got 'no such folder'"),
+        (("replay",), "Missing argument 'OUT'"),
+        (("bench", "defualt"), "scenario: expected a scenario of the library"),
+    ],
+)
+def test_a_mistake_is_told_in_one_line_and_ends_with_status_two(command, tmp_path, monkeypatch, arguments, said):
+    monkeypatch.chdir(tmp_path)
+    status, out, err = command(*arguments)
+    assert status == 2
+    assert out == ""
+    assert err.startswith(f"dockair: {said}")
+    assert err.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_flying_writes_to_a_folder_named_after_scenario_and_seed(command, flights, tmp_path):
+    status, out, err = command("fly", "still_air", "--seed", "3", "--record", "none")
+    assert status == 0
+    (flight,) = flights
+    assert (flight.scenario.name, flight.seed, flight.record) == ("still_air", 3, "none")
+    assert (tmp_path / flight.out).samefile(tmp_path / "out" / "still_air-3")
+    for figure in ("contact", "0.042", "1.23", "9.87", "out/still_air-3/result.json", "as the scenario claims"):
+        assert figure in out
+    assert "range   5.00 m" in err
+
+
+def test_flying_without_a_name_flies_the_default_scenario_with_its_own_seed(command, flights):
+    assert command("fly")[0] == 0
+    assert (flights[0].scenario.name, flights[0].seed) == ("default", 0)
+
+
+def test_settings_reach_the_scenario(command, flights):
+    command("fly", "--set", "seed=5", "--set", "turbulence.intensity=light")
+    assert (flights[0].seed, flights[0].scenario.turbulence.intensity) == (5, "light")
+
+
+def test_json_is_one_object_on_stdout_and_nothing_else(command, flights):
+    status, out, err = command("fly", "--json")
+    assert status == 0
+    table = json.loads(out)
+    assert table["outcome"] == "contact"
+    assert table["contact"]["radial_offset_m"] == 0.042
+    assert "approach" in err
+
+
+@pytest.mark.parametrize("outcome", ["miss", "rim_strike", "abort", "collision", "timeout"])
+def test_the_exit_status_is_zero_whatever_the_outcome(command, flights, monkeypatch, outcome):
+    def fly(scenario, seed, out, *, record, progress):
+        return a_result(scenario, seed, out, outcome=outcome, contact=None)
+
+    monkeypatch.setitem(sys.modules, "dockair.scenarios.loop", SimpleNamespace(fly=fly))
+    status, out, _ = command("fly")
+    assert status == 0
+    assert out.startswith(outcome)
+    assert f"outcome {outcome}, wanted contact" in out
+
+
+def test_perfect_navigation_is_said_in_the_outcome_and_needs_no_opengl(command, flights, monkeypatch):
+    def refuse():
+        raise MachineError("off-screen OpenGL", expected="a picture", remedy="none here")
+
+    monkeypatch.setattr(doctor, "require_rendering", refuse)
+    status, out, _ = command("fly", "truth_navigation")
+    assert status == 0
+    assert "perfect navigation" in out
+
+
+def test_without_opengl_flying_ends_with_status_three_and_keeps_the_earlier_flight(
+    command, flights, monkeypatch, tmp_path
+):
+    command("fly")
+    monkeypatch.setenv("MUJOCO_GL", "egl")
+    monkeypatch.setattr(doctor, "_RENDER", "None.eglQueryString")
+    monkeypatch.setattr(doctor, "require_rendering", REQUIRE_RENDERING)
+    status, out, err = command("fly")
+    assert status == 3
+    assert out == ""
+    remedy = "type: sudo apt-get install -y libegl1 libgl1-mesa-dri libopengl0"
+    assert err == f"dockair: off-screen OpenGL: expected a picture through egl; {remedy}\n"
+    assert (tmp_path / "out/default-0/result.json").is_file()
+
+
+REQUIRE_RENDERING = doctor.require_rendering
+
+
+def test_an_earlier_flight_is_replaced_and_other_files_beside_it_stay(command, flights, tmp_path):
+    folder = tmp_path / "out" / "default-0"
+    command("fly")
+    (folder / "episode.rrd").write_text("old")
+    (folder / "notes.txt").write_text("mine")
+    assert command("fly")[0] == 0
+    assert sorted(path.name for path in folder.iterdir()) == ["notes.txt", "result.json"]
+
+
+def test_a_folder_with_other_files_is_refused_untouched(command, flights, tmp_path):
+    (tmp_path / "thesis.tex").write_text("mine")
+    status, _, err = command("fly", "--out", str(tmp_path))
+    assert status == 2
+    assert "expected a new or empty folder, or one with an earlier flight, got 'a folder with thesis.tex'" in err
+    assert flights == []
+    assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
+
+
+def test_what_goes_wrong_inside_a_flight_is_one_line(command, flights, monkeypatch):
+    def fly(*_, **__):
+        raise DockairError("navigation.navigator", expected="a module that can be imported", got="mine:Mine")
+
+    monkeypatch.setitem(sys.modules, "dockair.scenarios.loop", SimpleNamespace(fly=fly))
+    status, out, err = command("fly")
+    assert (status, out) == (2, "")
+    assert err == "dockair: navigation.navigator: expected a module that can be imported, got 'mine:Mine'\n"
+
+
+def test_interrupting_a_flight_is_no_traceback(command, flights, monkeypatch):
+    def fly(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setitem(sys.modules, "dockair.scenarios.loop", SimpleNamespace(fly=fly))
+    status, _, err = command("fly")
+    assert status == 130
+    assert "Traceback" not in err
+
+
+@pytest.mark.parametrize(("identical", "expected_status"), [(True, 0), (False, 1)])
+def test_a_replay_that_differs_ends_with_status_one(command, monkeypatch, tmp_path, identical, expected_status):
+    class Report:
+        def __init__(self):
+            self.identical = identical
+
+        def to_json(self):
+            return json.dumps({"identical": identical, "frames": 3})
+
+    monkeypatch.setitem(sys.modules, "dockair.scenarios.replay", SimpleNamespace(replay=lambda out: Report()))
+    status, out, _ = command("replay", str(tmp_path), "--json")
+    assert status == expected_status
+    assert json.loads(out) == {"identical": identical, "frames": 3}
+
+
+def test_the_library_is_listed_with_its_claims(command):
+    status, out, _ = command("scenarios", "--json")
+    assert status == 0
+    listed = {entry["name"]: entry for entry in json.loads(out)["scenarios"]}
+    assert listed["default"]["turbulence"]["sigma_m_s"] == 0.5
+    assert listed["truth_navigation"]["navigation"]["navigator"] == "truth"
+    status, out, _ = command("scenarios")
+    assert all(name in out for name in listed)
+
+
+def test_help_and_version_need_no_command(command):
+    status, out, _ = command()
+    assert status == 0
+    assert all(name in out for name in ("fly", "scenarios", "replay", "bench", "doctor"))
+    assert command("--version")[1].strip() == cli.dockair.__version__
+
+
+@pytest.mark.parametrize("arguments", [("--help",), ("fly", "--help"), ("scenarios",)])
+def test_quick_commands_load_no_engine(arguments):
+    code = (
+        "import sys\nfrom dockair.scenarios import cli\nsys.argv = ['dockair', *sys.argv[1:]]\n"
+        "try:\n    cli.main()\nexcept SystemExit:\n    pass\n"
+        "slow = ('mujoco', 'rerun', 'cv2', 'numba', 'pyarrow', 'matplotlib', 'gymnasium', 'filterpy')\n"
+        "print(*[name for name in slow if name in sys.modules], file=sys.stderr)"
+    )
+    done = subprocess.run([sys.executable, "-c", code, *arguments], capture_output=True, text=True)
+    assert done.returncode == 0
+    assert done.stderr.strip() == ""
+
+
+@pytest.mark.slow
+def test_a_real_flight_through_the_command_line_prints_its_result_and_repeats_it(tmp_path):
+    command = [sys.executable, "-m", "dockair", "fly", "truth_navigation", "--set", "flight.duration_s=1.0", "--json"]
+    results = []
+    for name in ("first", "second"):
+        out = tmp_path / name
+        done = subprocess.run(
+            [*command, "--record", "none", "--out", str(out)], capture_output=True, text=True, env=dict(os.environ)
+        )
+        assert done.returncode == 0, done.stderr
+        printed = json.loads(done.stdout)
+        assert json.loads((out / "result.json").read_text()) == printed
+        results.append(
+            {key: printed[key] for key in printed if key not in ("wall_time_s", "real_time_factor", "out_dir")}
+        )
+    assert results[0] == results[1]
+    assert results[0]["outcome"] == "timeout"
+    assert results[0]["truth_navigation"] is True

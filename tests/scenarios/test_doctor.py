@@ -1,0 +1,116 @@
+"""The doctor: what is missing becomes one line that says what to type."""
+
+import json
+import os
+from pathlib import Path
+
+import pytest
+
+from dockair.errors import MachineError
+from dockair.scenarios import doctor
+
+
+def test_on_this_machine_nothing_needed_is_missing_but_perhaps_opengl(tmp_path):
+    checks = doctor.examine(tmp_path)
+    missing = {check.name for check in checks if not check.ok and check.needed}
+    assert {name for name in missing if not name.startswith("off-screen OpenGL")} == set()
+
+
+@pytest.mark.gl
+def test_a_machine_that_renders_is_told_who_renders():
+    check = doctor._rendering()
+    assert check.ok
+    assert check.found
+    doctor.require_rendering()
+
+
+@pytest.mark.parametrize(
+    "failure",
+    [
+        "import sys; raise AttributeError(\"'NoneType' object has no attribute 'eglQueryString'\")",
+        "raise ImportError('Cannot initialize a EGL device display.')",
+        "raise TypeError('glGetError')",
+        "import os; os.abort()",
+    ],
+)
+def test_however_opengl_fails_it_is_one_line_with_the_packages_to_install(monkeypatch, failure):
+    monkeypatch.setenv("MUJOCO_GL", "egl")
+    monkeypatch.setattr(doctor, "_RENDER", failure)
+    with pytest.raises(MachineError) as caught:
+        doctor.require_rendering()
+    assert str(caught.value) == (
+        "off-screen OpenGL: expected a picture through egl; "
+        "type: sudo apt-get install -y libegl1 libgl1-mesa-dri libopengl0"
+    )
+    assert caught.value.exit_code == 3
+
+
+def test_what_opengl_said_is_kept_for_those_who_ask(monkeypatch):
+    monkeypatch.setattr(doctor, "_RENDER", "raise ImportError('Cannot initialize')")
+    assert doctor._rendering().detail == "ImportError: Cannot initialize"
+
+
+def test_a_renderer_that_hangs_is_given_up(monkeypatch):
+    monkeypatch.setattr(doctor, "_RENDER", "import time; time.sleep(60)")
+    monkeypatch.setattr(doctor, "RENDER_TIMEOUT_S", 0.5)
+    assert not doctor._rendering().ok
+
+
+def test_another_backend_that_was_chosen_is_named_instead_of_packages(monkeypatch):
+    monkeypatch.setenv("MUJOCO_GL", "osmesa")
+    monkeypatch.setattr(doctor, "_RENDER", "raise ImportError('no OSMesa')")
+    assert doctor._rendering().remedy == "MUJOCO_GL is osmesa: unset it, or set it to egl"
+
+
+@pytest.mark.parametrize(
+    ("environment", "chosen"),
+    [({}, "egl"), ({"DISPLAY": ""}, "egl"), ({"DISPLAY": ":0"}, None), ({"DISPLAY": ":0", "MUJOCO_GL": "egl"}, "egl")],
+)
+def test_egl_is_chosen_where_nobody_chose_and_there_is_no_screen(environment, chosen):
+    assert doctor._render_environment(environment).get("MUJOCO_GL") == chosen
+
+
+def test_a_machine_is_fit_when_only_what_is_not_needed_is_missing():
+    fine, needed = doctor.Check("a", True, ""), doctor.Check("b", False, "")
+    wished = doctor.Check("c", False, "", needed=False)
+    assert doctor.is_fit([fine, wished])
+    assert not doctor.is_fit([fine, needed])
+
+
+def test_a_full_disk_and_missing_memory_are_found(monkeypatch, tmp_path):
+    monkeypatch.setattr(doctor, "DISK_AT_LEAST_GB", 1e9)
+    monkeypatch.setattr(doctor, "MEMORY_AT_LEAST_GB", 1e9)
+    assert not doctor._disk(tmp_path / "not" / "there" / "yet").ok
+    assert not doctor._memory().ok
+
+
+def test_a_package_that_is_not_installed_is_named(monkeypatch):
+    monkeypatch.setattr(doctor, "_required", lambda: ["numpy", "no-such-package"])
+    check = doctor._packages()
+    assert not check.ok
+    assert check.found == "missing: no-such-package"
+
+
+def test_the_versions_are_of_what_the_project_requires_without_its_extras():
+    versions = doctor.package_versions()
+    assert {"dockair", "mujoco", "numpy", "rerun-sdk", "opencv-python-headless"} <= set(versions)
+    assert "pytest" not in versions
+    assert "missing" not in versions.values()
+
+
+def test_links_that_are_text_are_not_in_place(monkeypatch, tmp_path):
+    for name in ("sim", "nav", "scenarios"):
+        (tmp_path / name).mkdir()
+    (tmp_path / "assets").write_text("../../assets")
+    monkeypatch.setattr(doctor, "files", lambda _: Path(tmp_path))
+    check = doctor._links()
+    assert not check.ok
+    assert check.found == "missing: assets"
+    assert "clone with git" in check.remedy
+
+
+def test_the_report_is_plain_json():
+    checks = [doctor.Check("cores", True, str(os.cpu_count()))]
+    table = json.loads(json.dumps(doctor.to_json(checks)))
+    assert table["ok"] is True
+    assert set(table) == {"ok", "checks", "versions"}

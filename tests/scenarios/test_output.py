@@ -1,0 +1,60 @@
+"""What people are shown: progress that does not flood a log, figures only where there are any."""
+
+import io
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from dockair.scenarios.output import FlightProgress, gusts_in_words, show_result
+from dockair.scenarios.schema import load_scenario
+
+
+def tick(time_s: float):
+    return SimpleNamespace(time_s=time_s, p_PD_B=np.array([0.0, 3.0, 4.0])), SimpleNamespace(phase="approach")
+
+
+def test_without_a_terminal_progress_is_a_line_every_five_simulated_seconds():
+    text = io.StringIO()
+    with FlightProgress(20.0, Console(file=text, width=200)) as progress:
+        for time_s in np.arange(0.0, 12.0, 0.01):
+            progress(*tick(time_s))
+    lines = text.getvalue().splitlines()
+    assert [float(line.split()[0]) for line in lines] == [0.0, 5.0, 10.0]
+    assert lines[1] == "   5.0 s  approach     range   5.00 m"
+
+
+def test_on_a_terminal_progress_is_a_bar_that_is_gone_afterwards():
+    text = io.StringIO()
+    console = Console(file=text, width=120, force_terminal=True)
+    with FlightProgress(20.0, console) as progress:
+        progress(*tick(10.0))
+        progress._bar.refresh()
+        during = text.getvalue()
+    assert "approach" in during
+    assert "10.0 of 20 s" in during
+    assert text.getvalue().endswith("\x1b[2K")  # the line is cleared
+
+
+@pytest.mark.parametrize(("name", "words"), [("default", "0.5 m/s"), ("still_air", "still"), ("light_gusts", "light")])
+def test_gusts_are_told_by_strength_or_by_name(name, words):
+    assert gusts_in_words(load_scenario(name)) == words
+
+
+def test_a_flight_without_contact_shows_no_contact_figures_and_no_recording(capsys, tmp_path):
+    result = {
+        "outcome": "miss",
+        "scenario": "mine",
+        "seed": 1,
+        "contact": None,
+        "nav": {"range_rmse_m": None},
+        "frames": 7,
+    }
+    show_result(result, None, tmp_path)
+    out = capsys.readouterr().out
+    assert out.splitlines()[0] == "miss  mine, seed 1"
+    assert "camera frames" in out
+    assert "closing speed" not in out
+    assert "range error" not in out
+    assert "rerun" not in out
