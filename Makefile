@@ -12,9 +12,7 @@ JOBS ?= 2
 BIN := .venv/bin
 INSTALLED := .venv/.installed
 
-ifeq ($(DISPLAY),)
 export MUJOCO_GL ?= egl
-endif
 
 .PHONY: dock test check static bench install clean
 
@@ -32,7 +30,7 @@ static: install
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-	$(BIN)/lint-imports
+	$(BIN)/lint-imports --no-cache
 
 bench: install
 	@$(BIN)/dockair bench

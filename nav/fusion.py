@@ -1,32 +1,14 @@
 """Drogue relative to receiver over time: gyro between frames, frames with their own capture time.
 
-Error-state Kalman filter. The belief is held in body axes B, from the centre of gravity:
+Error-state Kalman filter on `belief`: R_BD, s = p_BD_B and v = v_BD_B of the drogue's ring centre from the centre of
+gravity, which are run forward with the gyro and corrected with frames there. The probe's tip is a point of the body,
+so what guidance wants follows with the rate w = w_WB_B of the moment:
 
-    R = R_BD,    s = p_BD_B,    v = v_BD_B  (velocity of the ring centre less that of the centre of gravity, as seen
-                                             from axes that do not turn, written in body axes)
-
-with nine errors (phi, ds, dv), R_true = exp(phi) R. With w = w_WB_B from the gyro and E = exp(-[w x] dt):
-
-    R <- E R,    s <- E (s + v dt),    v <- E v                                                       (1)
-    errors <- F errors,    F = [E 0 0; 0 E E dt; 0 0 E]                                               (2)
-
-Eq. (1) is exact for constant w. What is random: the drogue's acceleration relative to the receiver (white), its turning
-(random walk), and the gyro: its noise n enters the errors as G n dt, G = [I; -[s x]; -[v x]].
-
-The probe's tip is a point of the body, so what guidance wants follows with the rate of the moment:
-
-    p_PD = s - p_BP,   v_PD = v - w x p_BP,   d/dt p_PD (in body axes) = v - w x s                    (3)
-
-v belongs to the centre of gravity, not to the tip, because the tip's velocity jumps with every pitching of the
-receiver, which the gyro knows and a random acceleration would have to guess.
+    p_PD = s - p_BP,   v_PD = v - w x p_BP,   d/dt p_PD (in body axes) = v - w x s                    (1)
 
 A frame is taken at its capture time: the belief is rolled back to the stamp, corrected, and everything newer is run
-again, in whatever order frames arrive. `pose.posterior` forms the pose (a+, P_aa+) that explains frame and prediction
-together, and the velocity follows by regression on the pose, K = P_va P_aa^-1:
-
-    v+ = v + K (a+ - a),   P_va+ = K P_aa+,   P_vv+ = P_vv - K (P_aa - P_aa+) K'                      (4)
-
-The gate is its likelihood ratio, chi-square with 6 degrees of freedom.
+again, in whatever order frames arrive. Between gyro samples the rate is linear. The gate is the frame's likelihood
+ratio against the prediction, chi-square with 6 degrees of freedom (`pose.posterior`).
 
 Not modelled: gyro bias as a state (at 10 deg/h it moves a drogue 10 m away by 0.5 mm/s; it is in the gyro's noise),
 errors of calibration and mounting (constant in the camera, so no frame shows them), the drogue's swing as a system.
@@ -37,15 +19,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from scipy.stats import chi2
 
 from dockair.calibration import NavigationSheets
 from dockair.messages import ImuSample
-from dockair.nav.pose.descent import PosePrior
+from dockair.nav.belief import Belief, MotionNoise, corrected, mixture, moved, pose_prior
 from dockair.nav.pose.estimate import PoseEstimate, PoseStatus
-from dockair.nav.pose.posterior import posterior
-from dockair.rotations import Array, log, skew
+from dockair.rotations import Array, skew
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,7 +40,7 @@ class FusionSettings:
     bias_correlation_s: float = 1.0  # the gyro's bias counts as noise of this correlation time; of the filter's memory
     gate_probability: float = 0.9999  # a good frame is refused once in 10 000
     buffer_s: float = 0.25  # how late a frame may be
-    rate_average_s: float = 0.01  # gyro samples averaged for Eq. (3): noise against lag, 5 samples at 500 Hz
+    rate_average_s: float = 0.01  # gyro samples averaged for Eq. (1): noise against lag, 5 samples at 500 Hz
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -75,21 +55,13 @@ class FilterState:
     covariance: Array  #: (9, 9) of (phi, p_PD_B, v_PD_B): R_BD <- exp(phi) R_BD [rad, m, m/s]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Belief:
-    R_BD: Array
-    p_BD: Array
-    v_BD: Array
-    P: Array
-
-
 @dataclass(slots=True, eq=False)
 class _Node:
     """A moment in the buffer, a gyro sample's or a frame's, and the belief after it."""
 
     time_s: float
     pose: PoseEstimate | None
-    belief: _Belief
+    beliefs: list[Belief]
 
 
 def _time(node: _Node) -> float:
@@ -112,16 +84,15 @@ class RelativeFilter:
             [np.full(3, start.sigma_R_rad), start.sigma_p_m, np.full(3, self._settings.start_velocity_sigma_m_s)]
         )
         s = np.array(start.p_PD_B + self._mounting.p_BP, dtype=float)
-        self._start = _Belief(np.array(start.R_BD, dtype=float), s, np.zeros(3), np.diag(sigma**2))
+        self._start = [Belief(np.array(start.R_BD, dtype=float), s, np.zeros(3), np.diag(sigma**2))]
         self._nodes: list[_Node] = []
         self._gyro_times: list[float] = []
         self._gyro_rates: list[Array] = []
-        self._T = np.kron(np.eye(2), self._mounting.R_BC.T)  # (phi, ds) in B to (phi, delta) in C
         gyro, bias_s = sheets.gyro, self._settings.bias_correlation_s
-        self._densities2 = (
-            self._settings.attitude_density**2,
-            self._settings.acceleration_density**2,
-            gyro.noise_density_rad_s_rthz**2 + 2.0 * gyro.bias_sigma_rad_s**2 * bias_s,
+        self._noise = MotionNoise(
+            attitude2=self._settings.attitude_density**2,
+            acceleration2=self._settings.acceleration_density**2,
+            gyro2=gyro.noise_density_rad_s_rthz**2 + 2.0 * gyro.bias_sigma_rad_s**2 * bias_s,
         )
 
     def propagate(self, imu: Sequence[ImuSample]) -> None:
@@ -152,11 +123,11 @@ class RelativeFilter:
             self._nodes.append(_Node(time_stamp_s, None, self._start))
         if time_stamp_s < self._nodes[0].time_s:
             return False
-        belief = self._corrected(self._belief(time_stamp_s), pose)
-        if belief is None:
+        beliefs = corrected(self._beliefs(time_stamp_s), pose, self._mounting, self._gate)
+        if not beliefs:
             return False
         index = bisect_right(self._nodes, time_stamp_s, key=_time)
-        self._nodes.insert(index, _Node(time_stamp_s, pose, belief))
+        self._nodes.insert(index, _Node(time_stamp_s, pose, beliefs))
         self._run_from(index + 1)
         return True
 
@@ -164,7 +135,7 @@ class RelativeFilter:
         """Return the belief at a time; at that of the newest message if none is given."""
         if time_s is None:
             time_s = self._nodes[-1].time_s if self._nodes else 0.0
-        belief, p_BP, w = self._belief(time_s), self._mounting.p_BP, self._averaged_rate(time_s)
+        belief, p_BP, w = mixture(self._beliefs(time_s)), self._mounting.p_BP, self._averaged_rate(time_s)
         gyro = self._sheets.gyro
         sigma_w2 = gyro.noise_density_rad_s_rthz**2 / self._settings.rate_average_s + gyro.bias_sigma_rad_s**2
         covariance = belief.P.copy()
@@ -180,7 +151,7 @@ class RelativeFilter:
 
     def predicted_pose(self, time_s: float) -> tuple[Array, Array, Array]:
         """R_CD (3, 3), p_CD (3,) [m] and their covariance (6, 6) of (phi, delta) in camera axes, at a time."""
-        prior = self._prior(self._belief(time_s))
+        prior = pose_prior(mixture(self._beliefs(time_s)), self._mounting)
         return prior.R_CD, prior.p_CD, prior.covariance
 
     def predicted_led_pixels(self, time_s: float) -> tuple[Array, Array]:
@@ -216,16 +187,16 @@ class RelativeFilter:
         """Run the buffer again from a node on; the first node is given."""
         for i in range(max(index, 1), len(self._nodes)):
             node = self._nodes[i]
-            node.belief = self._moved(self._nodes[i - 1], node.time_s)
+            node.beliefs = self._moved(self._nodes[i - 1], node.time_s)
             if node.pose is not None:
-                node.belief = self._corrected(node.belief, node.pose) or node.belief
+                node.beliefs = corrected(node.beliefs, node.pose, self._mounting, self._gate) or node.beliefs
 
-    def _belief(self, time_s: float) -> _Belief:
+    def _beliefs(self, time_s: float) -> list[Belief]:
         """Return the belief at a time; the oldest kept if it is older."""
         if not self._nodes:
             return self._start
         index = bisect_right(self._nodes, time_s, key=_time)
-        return self._moved(self._nodes[index - 1], time_s) if index else self._nodes[0].belief
+        return self._moved(self._nodes[index - 1], time_s) if index else self._nodes[0].beliefs
 
     def _rate(self, time_s: float) -> Array:
         """(3,) gyro rate in body axes, linear between samples, the nearest one outside."""
@@ -243,67 +214,7 @@ class RelativeFilter:
         first = bisect_right(self._gyro_times, time_s - self._settings.rate_average_s)
         return np.mean(self._gyro_rates[first:last], axis=0) if last > first else self._rate(time_s)
 
-    def _moved(self, node: _Node, time_s: float) -> _Belief:
-        """Eqs (1) and (2) from a node to a time with no gyro sample in between."""
-        dt, b = time_s - node.time_s, node.belief
-        if dt <= 0.0:
-            return b
-        w = 0.5 * (self._rate(node.time_s) + self._rate(time_s))
-        return _Belief(*_propagated(b.R_BD, b.p_BD, b.v_BD, b.P, w, dt, self._densities2))
-
-    def _prior(self, belief: _Belief) -> PosePrior:
-        R_BC = self._mounting.R_BC
-        return PosePrior(
-            R_CD=R_BC.T @ belief.R_BD,
-            p_CD=R_BC.T @ (belief.p_BD - self._mounting.p_BC),
-            covariance=self._T @ belief.P[:6, :6] @ self._T.T,
-        )
-
-    def _corrected(self, belief: _Belief, pose: PoseEstimate) -> _Belief | None:
-        """Return the belief with a pose taken, Eq. (4); None if the gate refuses it."""
-        prior = self._prior(belief)
-        taken = posterior(prior, pose)
-        if taken is None or not taken.gate_chi2 <= self._gate:
-            return None
-        R_BC, P = self._mounting.R_BC, belief.P
-        step = self._T.T @ np.concatenate([log(taken.R_CD @ prior.R_CD.T), taken.p_CD - prior.p_CD])
-        P_aa = self._T.T @ taken.covariance @ self._T
-        K = np.linalg.solve(P[:6, :6], P[:6, 6:]).T
-        P_new = np.empty((9, 9))
-        P_new[:6, :6], P_new[6:, :6] = P_aa, K @ P_aa
-        P_new[:6, 6:] = P_new[6:, :6].T
-        P_new[6:, 6:] = P[6:, 6:] - K @ (P[:6, :6] - P_aa) @ K.T
-        return _Belief(
-            R_BC @ taken.R_CD,
-            self._mounting.p_BC + R_BC @ taken.p_CD,
-            belief.v_BD + K @ step,
-            0.5 * (P_new + P_new.T),
-        )
-
-
-@njit(cache=True)
-def _propagated(R, s, v, P, w, dt, densities2):
-    """R, s, v, P after dt, Eqs (1) and (2); densities2 of the drogue's attitude and acceleration and of the gyro."""
-    attitude2, acceleration2, gyro2 = densities2
-    angle = np.sqrt(w[0] ** 2 + w[1] ** 2 + w[2] ** 2) * dt
-    a = 1.0 - angle**2 / 6.0 if angle < 1e-4 else np.sin(angle) / angle
-    b = 0.5 - angle**2 / 24.0 if angle < 1e-4 else (1.0 - np.cos(angle)) / angle**2
-    x, y, z = -w[0] * dt, -w[1] * dt, -w[2] * dt
-    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    E = np.eye(3) + a * K + b * np.dot(K, K)
-    moved = s + v * dt
-    s_new, v_new = np.dot(E, moved), np.dot(E, v)
-    F, G, Q = np.zeros((9, 9)), np.zeros((9, 3)), np.zeros((9, 9))
-    F[:3, :3], F[3:6, 3:6], F[3:6, 6:], F[6:, 6:] = E, E, E * dt, E
-    G[:3] = np.eye(3)
-    for i in range(2):
-        u = s_new if i == 0 else v_new
-        r = 3 + 3 * i
-        G[r, 1], G[r, 2], G[r + 1, 2] = u[2], -u[1], u[0]
-        G[r + 1, 0], G[r + 2, 0], G[r + 2, 1] = -u[2], u[1], -u[0]
-    for i in range(3):
-        Q[i, i] = attitude2 * dt
-        Q[3 + i, 3 + i], Q[6 + i, 6 + i] = acceleration2 * dt**3 / 3.0, acceleration2 * dt
-        Q[3 + i, 6 + i] = Q[6 + i, 3 + i] = acceleration2 * dt**2 / 2.0
-    P_new = np.dot(np.dot(F, P), F.T) + Q + gyro2 * dt * np.dot(G, G.T)
-    return np.dot(E, R), s_new, v_new, 0.5 * (P_new + P_new.T)
+    def _moved(self, node: _Node, time_s: float) -> list[Belief]:
+        """Return a node's beliefs at a time with no gyro sample in between."""
+        w_B = 0.5 * (self._rate(node.time_s) + self._rate(time_s))
+        return [moved(belief, w_B, time_s - node.time_s, self._noise) for belief in node.beliefs]

@@ -5,7 +5,9 @@ Exit status: 0 done as asked, whatever the flight's outcome; 1 a replay that was
 stderr. Modules that are slow to import are imported by the command that needs them.
 """
 
+import errno
 import json
+import os
 import sys
 from enum import Enum
 from pathlib import Path
@@ -179,12 +181,21 @@ def main() -> None:
     """Run a command; what a person did wrong ends in one line on stderr, not in a traceback."""
     try:
         status = app(standalone_mode=False)
+        sys.stdout.flush()
     except DockairError as error:
         print(f"dockair: {error}", file=sys.stderr)
         sys.exit(error.exit_code)
     except typer.TyperException as error:
         print(f"dockair: {error.format_message()}", file=sys.stderr)
         sys.exit(2)
+    except BrokenPipeError:  # whoever read our output has gone
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(0)
+    except OSError as error:
+        if error.errno not in (errno.ENOSPC, errno.EDQUOT):
+            raise
+        print(f"dockair: {error.filename or 'disk'}: expected room to write, got a full disk", file=sys.stderr)
+        sys.exit(3)
     except (typer.Abort, KeyboardInterrupt):
         print("dockair: stopped", file=sys.stderr)
         sys.exit(130)

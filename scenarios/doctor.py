@@ -102,11 +102,9 @@ def _opengl() -> str:
 
 
 def _render_environment(environment: Mapping[str, str]) -> dict[str, str]:
-    """Return the environment with EGL chosen where nobody chose and there is no screen."""
-    chosen = dict(environment)
-    if "MUJOCO_GL" not in chosen and not chosen.get("DISPLAY"):
-        chosen["MUJOCO_GL"] = "egl"
-    return chosen
+    """Return the environment with EGL where nobody chose otherwise, as the camera does."""
+    default = {"MUJOCO_GL": "egl"} if sys.platform.startswith("linux") else {}
+    return default | dict(environment)
 
 
 def _rendering() -> Check:

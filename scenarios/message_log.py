@@ -23,6 +23,7 @@ import cv2
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
+from numpy.typing import NDArray
 
 from dockair.calibration import NavigationSheets
 from dockair.errors import DockairError
@@ -238,9 +239,9 @@ def _tick_from_row(row: dict[str, Any], pixels: bool) -> TickMessages:
     return TickMessages(imu=imu, frame=frame, png=png)
 
 
-def pixels_from_png(png: bytes) -> Array:
+def pixels_from_png(png: bytes) -> NDArray[np.uint8]:
     """(rows, columns) pixels of a stored frame."""
-    return np.asarray(cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_UNCHANGED))
+    return np.asarray(cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_UNCHANGED), dtype=np.uint8)
 
 
 def read_estimates(out_dir: str | Path) -> Iterator[dict[str, Array | str]]:

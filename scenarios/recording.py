@@ -1,4 +1,4 @@
-"""One `episode.rrd` a flight: the camera's frames with what was found in them, the scene in three dimensions, the plots.
+"""One `episode.rrd` a flight: the camera's frames and what was found in them, the scene in three dimensions, plots.
 
 | entity                              | from               | drawn                                               |
 |-------------------------------------|--------------------|-----------------------------------------------------|
@@ -25,7 +25,7 @@ from dockair.calibration import NavigationSheets
 from dockair.messages import NavSolution, Window
 from dockair.rotations import Array
 from dockair.scenarios.flight_log import FlightLog
-from dockair.scenarios.message_log import TickMessages
+from dockair.scenarios.message_log import TickMessages, pixels_from_png
 from dockair.scenarios.recording_layout import BELIEF, CLOSE_UP, FOUND, NEUTRAL, TRUTH, blueprint
 from dockair.scenarios.recording_plots import log_plots
 from dockair.scenarios.recording_scene import log_scene, time_columns
@@ -62,6 +62,7 @@ def write_episode(
 
     path = Path(out_dir) / FILE_NAME
     recording = rr.RecordingStream("dockair", recording_id=name, send_properties=False)
+    recording.set_log_time_enabled(False)  # times of day would make two recordings of one flight differ
     recording.save(path, default_blueprint=blueprint(sheets.camera))
     ticks = drawn_ticks(log, sheets.control_rate_hz)
     log_scene(recording, log, ticks, sheets, shapes)
@@ -96,7 +97,8 @@ def _log_overlays(recording: Any, log: FlightLog, ticks: Sequence[int], sheets: 
 
     found = [s.candidates_px + _PIXEL_CENTRE for s in solutions]
     sizes = [len(points) for points in found]
-    recording.log("camera/candidates", rr.Ellipses2D.from_fields(colors=NEUTRAL, line_radii=rr.Radius.ui_points(0.7)), static=True)
+    thin, thick = rr.Radius.ui_points(0.7), rr.Radius.ui_points(2.0)
+    recording.log("camera/candidates", rr.Ellipses2D.from_fields(colors=NEUTRAL, line_radii=thin), static=True)
     columns = rr.Ellipses2D.columns(centers=_stacked(found, 2), half_sizes=np.full((sum(sizes), 2), 9.0))
     send("camera/candidates", times, columns.partition(sizes))
 
@@ -104,11 +106,13 @@ def _log_overlays(recording: Any, log: FlightLog, ticks: Sequence[int], sheets: 
     sizes = [len(numbers) for numbers in seen]
     leds = [s.led_pixels_px[k] + _PIXEL_CENTRE for s, k in zip(solutions, seen, strict=True)]
     labels = [str(k) for numbers in seen for k in numbers]
-    recording.log("camera/leds", rr.Points2D.from_fields(colors=FOUND, radii=rr.Radius.ui_points(2.0)), static=True)
+    recording.log("camera/leds", rr.Points2D.from_fields(colors=FOUND, radii=thick), static=True)
     send("camera/leds", times, rr.Points2D.columns(positions=_stacked(leds, 2), labels=labels).partition(sizes))
 
     rings = [believed_ring_px(s, sheets) + _PIXEL_CENTRE for s in solutions]
-    recording.log("camera/ring", rr.LineStrips2D.from_fields(colors=BELIEF, radii=rr.Radius.ui_points(0.7)), static=True)
+    recording.log(
+        "camera/ring", rr.LineStrips2D.from_fields(colors=BELIEF, radii=rr.Radius.ui_points(0.7)), static=True
+    )
     send("camera/ring", times, rr.LineStrips2D.columns(strips=rings))
 
     centres = np.array([ring.mean(axis=0) for ring in rings]).reshape(-1, 2)
@@ -145,9 +149,11 @@ def _log_frames(recording: Any, log: FlightLog, messages: Iterable[TickMessages]
         recording.set_time("sim_time", duration=time_s)
         recording.set_time("frame", sequence=number)
         entity = f"camera/window/pixels_{'x'.join(str(size) for size in padded_shape(window))}"
-        if before not in ("", entity):
-            recording.log(before, rr.Clear(recursive=False))
-        before = entity
+        if entity != before:
+            if before:
+                recording.log(before, rr.EncodedImage.from_fields(opacity=0.0))  # the viewer does not heed a Clear here
+            recording.log(entity, rr.EncodedImage.from_fields(opacity=1.0))
+            before = entity
         recording.log("camera/window", rr.Transform3D(translation=[window.column_start, window.row_start, 0]))
         recording.log(entity, rr.EncodedImage(contents=png, media_type="image/png", draw_order=-10.0))
         rows, columns = window.shape
@@ -161,7 +167,7 @@ def _padded_frames(log: FlightLog, messages: Iterable[TickMessages]) -> Iterator
     def pad(entry: tuple[float, Window, bytes]) -> tuple[float, Window, bytes]:
         time_s, window, png = entry
         canvas = np.zeros(padded_shape(window), np.uint8)
-        canvas[: window.shape[0], : window.shape[1]] = cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_UNCHANGED)
+        canvas[: window.shape[0], : window.shape[1]] = pixels_from_png(png)
         return time_s, window, cv2.imencode(".png", canvas, [cv2.IMWRITE_PNG_COMPRESSION, 1])[1].tobytes()
 
     waiting: list[tuple[float, Window, bytes]] = []

@@ -1,4 +1,4 @@
-"""How the viewer lays an episode out: frames left, scene right, plots below, phases at the bottom."""
+"""How the viewer lays an episode out: frames left, scene and drogue right, plots below, phases at the bottom."""
 
 from typing import Any
 
@@ -9,6 +9,15 @@ TRUTH = [90, 200, 250]
 BELIEF = [255, 159, 10]
 FOUND = [48, 209, 88]
 NEUTRAL = [255, 214, 10]
+PHASES = {
+    "pre contact": [110, 130, 150],
+    "approach": [10, 132, 255],
+    "contact": [48, 209, 88],
+    "hold": [36, 138, 61],
+    "disconnect": [150, 110, 200],
+    "clear": [90, 90, 100],
+    "breakaway": [255, 69, 58],
+}
 AXES = [[255, 69, 58], [48, 209, 88], [10, 132, 255]]
 
 CLOSE_UP = "camera/close_up"  #: an entity at the believed ring's centre; the close-up view looks from there
@@ -20,29 +29,36 @@ def blueprint(camera: Camera) -> Any:
     import rerun.blueprint as rrb
 
     width, height = camera.width_px, camera.height_px
-    eye = rrb.EyeControls3D(position=(-27.0, 9.5, 1.5), look_target=(-17.0, 0.0, -2.8), eye_up=(0.0, 0.0, 1.0))
     sensor = rrb.Spatial2DView(
         origin="camera",
         name="Camera, whole sensor",
         visual_bounds=rrb.VisualBounds2D(x_range=[0, width], y_range=[0, height]),
     )
+    half = _CLOSE_UP_HALF_PX
     close_up = rrb.Spatial2DView(
         origin=CLOSE_UP,
         contents=["camera/**"],
         name="Camera, around the ring",
-        visual_bounds=rrb.VisualBounds2D(
-            x_range=[-_CLOSE_UP_HALF_PX, _CLOSE_UP_HALF_PX], y_range=[-_CLOSE_UP_HALF_PX, _CLOSE_UP_HALF_PX]
-        ),
+        visual_bounds=rrb.VisualBounds2D(x_range=[-half, half], y_range=[-half, half]),
     )
-    scene = rrb.Spatial3DView(
-        origin="world", name="Scene: truth, and belief in orange", eye_controls=eye, background=[38, 44, 54],
-        line_grid=False,
-    )  # fmt: skip
-    views = rrb.Horizontal(rrb.Vertical(sensor, close_up, row_shares=[5, 6]), scene, column_shares=[5, 8])
+    cameras = rrb.Vertical(sensor, close_up, row_shares=[4, 6])
+    scene = _scene("world", "Scene", eye=(-31.0, 8.5, 1.0), target=(-15.0, -1.0, -2.0))
+    drogue = _scene("world/drogue", "At the drogue: belief in orange", eye=(-2.2, 1.5, 0.7), target=(-0.3, 0.0, 0.0))
+    views = rrb.Horizontal(cameras, scene, drogue, column_shares=[5, 6, 5])
     return rrb.Blueprint(
-        rrb.Vertical(views, _plots(), _states(), row_shares=[10, 5, 2]),
+        rrb.Vertical(views, _plots(), _states(), row_shares=[10, 5, 3]),
         rrb.TimePanel(timeline="sim_time", state="collapsed"),
         collapse_panels=True,
+    )
+
+
+def _scene(origin: str, name: str, *, eye: tuple[float, ...], target: tuple[float, ...]) -> Any:
+    import rerun.blueprint as rrb
+
+    controls = rrb.EyeControls3D(position=eye, look_target=target, eye_up=(0.0, 0.0, 1.0))
+    background = [38, 44, 54]
+    return rrb.Spatial3DView(
+        origin=origin, contents=["world/**"], name=name, eye_controls=controls, background=background, line_grid=False
     )
 
 

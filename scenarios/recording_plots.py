@@ -8,7 +8,7 @@ import numpy as np
 from dockair.rotations import Array
 from dockair.scenarios.flight_log import FlightLog, standard_deviations
 from dockair.scenarios.metrics import true_relative_state
-from dockair.scenarios.recording_layout import AXES, BELIEF, NEUTRAL, TRUTH
+from dockair.scenarios.recording_layout import AXES, BELIEF, NEUTRAL, PHASES, TRUTH
 
 _SIGMA = [130, 130, 130]
 
@@ -23,6 +23,8 @@ def log_plots(recording: Any, log: FlightLog) -> None:
     for entity, (label, colour, values) in plot_series(log).items():
         recording.log(f"plots/{entity}", rr.SeriesLines(names=label, colors=colour, widths=1.5), static=True)
         recording.send_columns(f"plots/{entity}", times, rr.Scalars.columns(scalars=values))
+    phases = rr.StateConfiguration(values=list(PHASES), labels=list(PHASES), colors=list(PHASES.values()))
+    recording.log("states/phase", phases, static=True)
     _log_states(recording, log, "states/phase", [s.phase for s in log.solutions])
     _log_states(recording, log, "states/frame", [s.status for s in log.solutions])
 

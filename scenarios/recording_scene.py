@@ -15,7 +15,7 @@ from dockair.sim.shapes import Shape
 #: Body of the model -> (rotation, position) in Truth.
 _MOVED_BY = {"tanker": ("R_WT", "p_WT"), "drogue": ("R_WD", "p_WD"), "receiver": ("R_WB", "p_WB")}
 _HOSE_RADIUS_M = 0.034  # drawn where no model gives it
-_HOSE_COLOUR = [60, 60, 66]
+_HOSE_COLOUR = [120, 120, 130]
 _LED_COLOUR = [255, 120, 160]
 _FRUSTUM_M = 1.2
 
@@ -117,32 +117,40 @@ def _hose_radius(shapes: Sequence[Shape]) -> float:
 
 
 def _log_bodies(recording: Any, shapes: Sequence[Shape]) -> None:
-    import rerun as rr
-
     groups: dict[tuple[str, str], list[Shape]] = defaultdict(list)
     for shape in shapes:
         if shape.body in _MOVED_BY:
             groups[shape.body, shape.kind].append(shape)
-    solid = rr.components.FillMode.Solid
     for (body, kind), group in groups.items():
         entity = f"world/{body}/{kind}s"
-        centres = np.array([shape.p_m for shape in group])
-        quaternions = np.array([np.roll(shape.q_wxyz, -1) for shape in group])
-        half = np.array([shape.half_size_m for shape in group])
-        look: dict[str, Any] = {"quaternions": quaternions, "colors": [_colour(shape) for shape in group]}
-        if kind == "ellipsoid":
-            recording.log(entity, rr.Ellipsoids3D(half_sizes=half, centers=centres, fill_mode=solid, **look), static=True)
-        elif kind == "box":
-            recording.log(entity, rr.Boxes3D(half_sizes=half, centers=centres, fill_mode=solid, **look), static=True)
-        elif kind == "cylinder":
-            sizes = {"lengths": 2.0 * half[:, 2], "radii": half[:, 0]}
-            recording.log(entity, rr.Cylinders3D(**sizes, centers=centres, fill_mode=solid, **look), static=True)
-        elif kind == "capsule":  # the viewer's begin at their origin, MuJoCo's are centred on it
-            starts = centres - np.array([_z_axis(shape) * shape.half_size_m[2] for shape in group])
-            sizes = {"lengths": 2.0 * half[:, 2], "radii": half[:, 0]}
-            recording.log(entity, rr.Capsules3D(**sizes, translations=starts, fill_mode=solid, **look), static=True)
-        else:
+        if kind == "mesh":
             _log_meshes(recording, entity, group)
+        else:
+            recording.log(entity, _primitives(kind, group), static=True)
+
+
+def _primitives(kind: str, group: Sequence[Shape]) -> Any:
+    """Return one archetype for all shapes of a kind."""
+    import rerun as rr
+
+    centres = np.array([shape.p_m for shape in group])
+    half = np.array([shape.half_size_m for shape in group])
+    look: dict[str, Any] = {
+        "quaternions": np.array([np.roll(shape.q_wxyz, -1) for shape in group]),
+        "colors": [_colour(shape) for shape in group],
+        "fill_mode": rr.components.FillMode.Solid,
+    }
+    if kind == "ellipsoid":
+        return rr.Ellipsoids3D(half_sizes=half, centers=centres, **look)
+    if kind == "box":
+        return rr.Boxes3D(half_sizes=half, centers=centres, **look)
+    lengths, radii = 2.0 * half[:, 2], half[:, 0]
+    if kind == "cylinder":
+        return rr.Cylinders3D(lengths=lengths, radii=radii, centers=centres, **look)
+    starts = centres - np.array([_z_axis(shape) * shape.half_size_m[2] for shape in group])
+    return rr.Capsules3D(
+        lengths=lengths, radii=radii, translations=starts, **look
+    )  # the viewer's begin at their origin
 
 
 def _log_meshes(recording: Any, entity: str, group: Sequence[Shape]) -> None:
@@ -150,11 +158,11 @@ def _log_meshes(recording: Any, entity: str, group: Sequence[Shape]) -> None:
 
     for shape in group:
         place = f"{entity}/{shape.name or 'unnamed'}"
-        transform = rr.Transform3D(translation=shape.p_m, quaternion=np.roll(shape.q_wxyz, -1))
+        attitude = rr.Quaternion(xyzw=np.roll(shape.q_wxyz, -1))
+        transform = rr.Transform3D(translation=shape.p_m, quaternion=attitude)
         recording.log(place, transform, static=True)
-        mesh = rr.Mesh3D(
-            vertex_positions=shape.vertices_m, triangle_indices=shape.triangles, albedo_factor=_colour(shape)
-        )
+        corners, triangles = np.asarray(shape.vertices_m), np.asarray(shape.triangles)
+        mesh = rr.Mesh3D(vertex_positions=corners, triangle_indices=triangles, albedo_factor=_colour(shape))
         recording.log(place, mesh, static=True)
 
 

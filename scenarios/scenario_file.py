@@ -59,7 +59,7 @@ def _library() -> dict[str, Path]:
 
 def _find(name_or_path: str | Path) -> Path:
     path = Path(name_or_path)
-    if isinstance(name_or_path, str) and path.suffix != ".toml" and os.sep not in name_or_path:
+    if isinstance(name_or_path, str) and path.suffix.lower() != ".toml" and os.sep not in name_or_path:
         if name_or_path not in _library():
             expected = "a scenario of the library, or the path of a TOML file"
             raise DockairError("scenario", expected=expected, got=name_or_path, exists=scenario_names())

@@ -8,7 +8,8 @@ tanker stands still and the air blows. Bodies "tanker", "hose_0" ... "hose_{n-1}
 Who touches whom: the probe touches basket, coupling and hose; every other part of the receiver touches hose, drogue and
 tanker. Hose and drogue touch nothing of the tanker. Grey values are reflectances near 850 nm.
 
-Joints: "reel" slides link 0 along the pod's axis, 0 at full trail, positive wound in; each link, and the drogue on the
+Joints: "reel" slides link 0 along the pod's axis, 0 at full trail, positive wound in (the outer
+stop's buffer gives a little beyond 0); each link, and the drogue on the
 last one, has two hinges "<body>_y", "<body>_z" at its front end, and no twist.
 """
 
@@ -63,7 +64,7 @@ def build_scene(parameters: SceneParameters) -> mujoco.MjModel:
         name="latch", type=mujoco.mjtEq.mjEQ_CONNECT, objtype=mujoco.mjtObj.mjOBJ_SITE, name1="probe_tip"
     )
     latch.name2, latch.active = "coupling", False
-    latch.solref[:] = parameters.coupling.latch_time_constant_s, 1.0
+    latch.solref[:] = parameters.coupling.latch_time_constant_s, parameters.coupling.latch_damping_ratio
     return spec.compile()
 
 
@@ -158,7 +159,7 @@ def _add_hose(spec: Any, parameters: SceneParameters) -> Any:
 
 def _add_reel(body: Any, reel: ReelParameters) -> None:
     joint = body.add_joint(name="reel", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[1.0, 0.0, 0.0])
-    joint.limited, joint.range = mujoco.mjtLimited.mjLIMITED_TRUE, [0.0, reel.range_m]
+    joint.limited, joint.range = mujoco.mjtLimited.mjLIMITED_TRUE, [-reel.buffer_travel_m, reel.range_m]
     joint.armature = reel.drum_mass_kg
     joint.solref_limit[:] = reel.stop_time_constant_s, 1.0
 
@@ -179,18 +180,19 @@ def _add_receiver(spec: Any, parameters: SceneParameters) -> None:
     moments, axes = np.linalg.eigh(inertia)
     axes[:, 0] *= np.sign(np.linalg.det(axes))
     body.inertia, body.iquat = moments, quaternion_from_matrix(axes)
-    contact = {"contype": _RECEIVER, "conaffinity": 0}
+    contact = {"contype": _RECEIVER, "conaffinity": 0, "friction": sliding(parameters.drogue.friction)}
     _add_pieces(body, receiver_pieces(mounting), "", _RECEIVER_REFLECTANCE, contact)
-    _add_probe(body, mounting, coupling)
+    _add_probe(body, mounting, coupling, parameters.drogue.friction)
     body.add_site(name="probe_tip", pos=mounting.p_BP, size=[0.01] * 3)
 
 
-def _add_probe(body: Any, mounting: Mounting, coupling: CouplingParameters) -> None:
+def _add_probe(body: Any, mounting: Mounting, coupling: CouplingParameters, friction: float) -> None:
     """Tip sphere whose foremost point is P, a straight boom, and a mast from it to the nose's side."""
     x, y, z = (float(c) for c in mounting.p_BP)
     tip, boom = coupling.probe_tip_radius_m, coupling.probe_boom_radius_m
     elbow, foot = [x - 1.7, y, z], [x - 3.2, 0.35 * y, 0.2 * z]
-    contact = {"contype": _PROBE, "conaffinity": 0, "rgba": grey(0.3)}
+    # MuJoCo takes the larger friction of two geoms: both must have the pair's
+    contact = {"contype": _PROBE, "conaffinity": 0, "rgba": grey(0.3), "friction": sliding(friction)}
     capsule = mujoco.mjtGeom.mjGEOM_CAPSULE
     sphere = mujoco.mjtGeom.mjGEOM_SPHERE
     body.add_geom(name="probe_tip", type=sphere, pos=[x - tip, y, z], size=[tip, 0.0, 0.0], **contact)

@@ -174,7 +174,9 @@ class World:
             self._gusts_W[:-1],
             before.reel_position_m,
         )
-        data.qfrc_applied[at.reel_dof] = self._tow.reel.step(before.root_tension_n, before.reel_rate_m_s)
+        data.qfrc_applied[at.reel_dof] = self._tow.reel.step(
+            before.root_tension_n, before.reel_position_m, before.reel_rate_m_s
+        )
         mujoco.mj_step2(self.model, data)
         mujoco.mj_rnePostConstraint(self.model, data)
         self._reactions = self._solved_forces()

@@ -1,46 +1,55 @@
 """Steers the drogue, as seen from the probe's tip, onto the probe.
 
 The state is the drogue in *body* axes: p = p_PD_B, its rate r = dp/dt, both known to millimetres from the camera's own
-view (the camera's place in the drogue's axes is not). The receiver's velocity in W is unknown, so the command is
-built up from its own rate of change:
+view (the camera's place in the drogue's axes is not). The receiver answers a command after a response time tau.
 
-    du/dt = k_p e + k_d r_e,        |du/dt| <= a_max,   |u| <= u_max                      (1)
+Across, the drogue's swing is predicted over tau (`drogue_motion`) and met there: with y_D its place, y_r the
+receiver's own on the same scale, both at t + tau, the latter from the commands already given,
 
-with e the error in position, r_e in rate, each taken as "drogue minus where it should be". Against a receiver that
-flies u, e'' = a_drogue - k_p e - k_d e': damped, and blind to the bias of the receiver's inertial velocity and to a
-steady drift of the drogue. du/dt also goes out as acceleration, so that the flight control need not wait for u.
+    u = y_D' + k (y_D - y_r),      du/dt = y_D'' + k (y_D' - u)  + smoothing                              (1)
 
-Across: e is the ring's centre off the probe's line, and the coupling's once the tip is inside the basket.
-Along: in PRE_CONTACT e is the distance to the stand-off; while closing only the rate is held, so that the closure
-speed is what the coupling wants whatever the drogue does. After contact the view says nothing about the way to the
-tanker: the way pushed in is the integral of what was commanded beyond the drogue's mean velocity, itself the slow
-average of u during the approach.
+Along, the command is built up from its own rate of change, e being the distance beyond the stand-off and c the
+closure speed asked for, ramped up:
 
-Not modelled: the bow wave's push on the drogue, prediction of the drogue's swing.
+    du/dt = k_p e + k_d r   in PRE_CONTACT,        du/dt = k_d (r + c)   while closing                    (2)
+
+so that the closure speed is what the coupling wants whatever the drogue does. u and du/dt both go out. Neither minds a
+bias of the receiver's inertial velocity.
+
+After contact the view says nothing about the way to the tanker: the way pushed in is the integral of what was
+commanded beyond the drogue's mean velocity, itself the slow average of u during the approach.
+
+Not modelled: the bow wave's push on the drogue.
 """
 
+from collections import deque
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from dockair.messages import ReceiverCommand
+from dockair.nav.guidance.drogue_motion import DrogueMotion, SwingSettings
 from dockair.nav.guidance.phases import Phase, PhaseLimits, Situation, next_phase
 from dockair.rotations import Array
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GuidanceSettings:
-    """Gains and speeds. Gains: poles of Eq. (1) well below the flight control's bandwidth of about 1.2 rad/s."""
+    """Gains and speeds."""
 
     stand_off_m: float = 4.0  # pre-contact distance, tip to ring centre (procedures: 3-5 m)
     closure_speed_m_s: float = 1.2  # published practice 1.0-1.5 m/s
     back_off_speed_m_s: float = 1.0  # breakaway practice 1-2 m/s
+    response_time_s: float = 0.25  # tau: the flight control's lag to a command with its rate, 0.5 to 2 rad/s
+    lateral_gain_1_s: float = 1.0  # k: poles of Eq. (1) at a quarter of 1 / tau
+    smoothing_1_s: float = 4.0  # how fast u goes to the u of Eq. (1) where it is not there: 1 / tau
     position_gain_1_s2: float = 0.6  # k_p: error of 1 m asks for 0.6 m/s^2
     rate_gain_1_s: float = 1.2  # k_d: rate of 1 m/s asks for 1.2 m/s^2
-    acceleration_limit_m_s2: float = 1.5  # a_max; 0.15 g, 9 degrees of bank
-    velocity_limit_m_s: float = 2.5  # u_max
+    acceleration_limit_m_s2: float = 1.5  # 0.15 g, 9 degrees of bank
+    velocity_limit_m_s: float = 2.5
     closure_acceleration_m_s2: float = 0.6  # how fast the closure speed is asked for
     mean_velocity_time_s: float = 4.0  # averaging time of the drogue's mean velocity
+    swing: SwingSettings = field(default_factory=SwingSettings)
     limits: PhaseLimits = field(default_factory=PhaseLimits)
 
 
@@ -61,9 +70,13 @@ class Guidance:
     def __init__(self, settings: GuidanceSettings, control_rate_hz: int) -> None:
         self._settings, self._dt = settings, 1.0 / control_rate_hz
         self.phase = Phase.PRE_CONTACT
+        self._motion = DrogueMotion(settings.swing, self._dt, settings.response_time_s)
         self._u: Array = np.zeros(3)
-        self._u_mean: Array = np.zeros(3)
-        self._closure = 0.0
+        delay = round(settings.response_time_s * control_rate_hz)
+        self._given = deque([np.zeros(2)] * delay, maxlen=delay)  # commands across that are not flown yet
+        self._flown: Array = np.zeros(2)  # y_r now
+        self._seen = False
+        self._mean_along = self._closure = 0.0
         self._in_phase_s = self._steady_s = self._unusable_s = self._pushed_in_m = 0.0
 
     def step(self, state: RelativeState) -> ReceiverCommand:
@@ -76,13 +89,16 @@ class Guidance:
         following = next_phase(self.phase, self._settings.limits, self._situation(state))
         if following is not self.phase:
             self.phase, self._in_phase_s = following, 0.0
-        u_dot = self._track(state) if self._tracking(state) else self._hold_course()
+        if self.phase in (Phase.PRE_CONTACT, Phase.APPROACH, Phase.CLEAR):
+            self._observe(state)
+            u_dot = self._track(state)
+        else:
+            u_dot = self._hold_course()
         u_dot = _limited(u_dot, self._settings.acceleration_limit_m_s2)
-        u = _limited(self._u + u_dot * self._dt, self._settings.velocity_limit_m_s)
-        u_dot, self._u = (u - self._u) / self._dt, u
-        if self.phase in (Phase.PRE_CONTACT, Phase.APPROACH):
-            self._average(state)
-        return ReceiverCommand(velocity_m_s=u.copy(), acceleration_m_s2=u_dot)
+        self._u = _limited(self._u + u_dot * self._dt, self._settings.velocity_limit_m_s)
+        self._flown = self._flown + self._given[0] * self._dt
+        self._given.append(self._u[1:])
+        return ReceiverCommand(velocity_m_s=self._u.copy(), acceleration_m_s2=u_dot)
 
     def _count(self, state: RelativeState) -> None:
         settings, limits = self._settings, self._settings.limits
@@ -97,7 +113,7 @@ class Guidance:
         )
         self._steady_s = self._steady_s + self._dt if steady else 0.0
         if self.phase is Phase.CONTACT:
-            self._pushed_in_m += (self._u[0] - self._u_mean[0]) * self._dt
+            self._pushed_in_m += (self._u[0] - self._mean_along) * self._dt
 
     def _situation(self, state: RelativeState) -> Situation:
         return Situation(
@@ -111,37 +127,52 @@ class Guidance:
             pushed_in_m=self._pushed_in_m,
         )
 
-    def _tracking(self, state: RelativeState) -> bool:
-        return state.usable and self.phase in (Phase.PRE_CONTACT, Phase.APPROACH, Phase.CLEAR)
+    def _observe(self, state: RelativeState) -> None:
+        """Follow the drogue on the receiver's own scale of u."""
+        if not state.usable:
+            self._motion.step(None, None)
+            return
+        place = self._error_across(state) + self._flown
+        rate = state.rate_PD_B[1:] + self._given[0]
+        if not self._seen:
+            self._motion.start(place, rate)
+            self._seen = True
+        self._motion.step(place, rate)
+        along = self._u[0] + state.rate_PD_B[0]
+        self._mean_along += (along - self._mean_along) * self._dt / self._settings.mean_velocity_time_s
+
+    def _error_across(self, state: RelativeState) -> Array:
+        """(2,) ring centre off the probe's line, or the coupling once the tip is inside the basket."""
+        return (state.p_PD_B if state.p_PD_B[0] > 0.0 else state.p_PK_B)[1:]
 
     def _track(self, state: RelativeState) -> Array:
+        """(3,) du/dt of Eqs. (1) and (2); toward the drogue's drift, if known, while the drogue is not seen."""
         s = self._settings
-        inside = state.p_PD_B[0] < 0.0
-        error = (state.p_PK_B if inside else state.p_PD_B).copy()
-        rate = state.rate_PD_B.copy()
+        if not state.usable:
+            return self._toward(np.array([self._u[0], *self._motion.drift_m_s]))
+        place, velocity, acceleration = self._motion.ahead()
+        receiver = self._flown + np.sum(self._given, axis=0) * self._dt
+        across = velocity + s.lateral_gain_1_s * (place - receiver)
+        across_dot = acceleration + s.lateral_gain_1_s * (velocity - self._u[1:])
+        across_dot = across_dot + s.smoothing_1_s * (across - self._u[1:])
+        rate = float(state.rate_PD_B[0])
         if self.phase is Phase.APPROACH:
             self._closure = min(self._closure + s.closure_acceleration_m_s2 * self._dt, s.closure_speed_m_s)
-            error[0] = 0.0
-            rate[0] += self._closure
+            along_dot = s.rate_gain_1_s * (rate + self._closure)
         else:
             self._closure = 0.0
-            error[0] -= s.stand_off_m
-        return np.asarray(s.position_gain_1_s2 * error + s.rate_gain_1_s * rate)
+            along_dot = s.position_gain_1_s2 * (state.p_PD_B[0] - s.stand_off_m) + s.rate_gain_1_s * rate
+        return np.array([along_dot, *across_dot])
 
     def _hold_course(self) -> Array:
-        """Fly the drogue's mean velocity, plus the speed along that the phase asks for."""
+        """(3,) du/dt toward the drogue's mean velocity, plus the speed along that the phase asks for."""
         s = self._settings
         along = {Phase.CONTACT: s.closure_speed_m_s, Phase.DISCONNECT: -s.back_off_speed_m_s}
         along[Phase.BREAKAWAY] = -s.back_off_speed_m_s
-        wanted = self._u_mean + np.array([along.get(self.phase, 0.0), 0.0, 0.0])
-        return np.asarray(s.rate_gain_1_s * (wanted - self._u))
+        return self._toward(np.array([self._mean_along + along.get(self.phase, 0.0), *self._motion.drift_m_s]))
 
-    def _average(self, state: RelativeState) -> None:
-        """Update the slow average of the drogue's velocity on the receiver's own scale of u."""
-        if not state.usable:
-            return
-        drogue = self._u + np.array([state.rate_PD_B[0], 0.0, 0.0])
-        self._u_mean = self._u_mean + (drogue - self._u_mean) * self._dt / self._settings.mean_velocity_time_s
+    def _toward(self, u: Array) -> Array:
+        return np.asarray(self._settings.rate_gain_1_s * (u - self._u))
 
 
 def _limited(v: Array, limit: float) -> Array:

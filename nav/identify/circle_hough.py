@@ -85,8 +85,8 @@ def find_circles(
     radii: Array,
     *,
     centre_gate: tuple[float, float, float],
-    cell: float = 0.1,
-    gate: float = 0.12,
+    cell: float = 0.15,
+    gate: float = 0.15,
     peaks: int = 12,
     min_votes: int = 4,
 ) -> Peaks:

@@ -15,8 +15,8 @@ points shifted to their mean and scaled to unit size. With the conic's sign chos
 Turned to its axes and stretched by A/B along the minor one the ellipse is a circle (3); eq (26) says so for one point.
 On that circle a tilted ring's LEDs stand 45 degrees apart but for perspective (43.6 to 46.4 at 2.5 m and 20 degrees).
 
-The ellipse's centre is not the image of the ring's centre (6.5 px off at 3 m and 20 degrees): it identifies, it does not
-measure.
+The ellipse's centre is not the image of the ring's centre (6.5 px off at 3 m and 20 degrees): it identifies, it does
+not measure.
 """
 
 from dataclasses import dataclass
@@ -143,6 +143,4 @@ def places_on_circle(points: Array, count: int = 8) -> Places:
     spacing = 2.0 * np.pi / count
     phase = float(np.angle(np.exp(1j * count * angle).mean())) / count
     steps = np.round((angle - phase) / spacing)
-    return Places(
-        slot=steps.astype(np.int64) % count, phase_rad=phase, residual_rad=angle - phase - steps * spacing
-    )
+    return Places(slot=steps.astype(np.int64) % count, phase_rad=phase, residual_rad=angle - phase - steps * spacing)

@@ -45,6 +45,7 @@ class Octagons:
     triple: NDArray[np.int64]  #: (m, 3) candidates that define it
     count: NDArray[np.int64]  #: (m,) LEDs, the three included
     candidate: NDArray[np.int64]  #: (m, 8) candidate in each slot, -1 for none
+    tolerance_px: Array  #: (m,) of its look-ups
     tested: int  #: hypotheses of plausible shape that were looked up
 
 
@@ -54,6 +55,7 @@ def find_octagons(
     *,
     radius_range_px: tuple[float, float],
     centre_gate: tuple[float, float, float],
+    roll_gate: tuple[float, float],
     min_axis_ratio: float,
     tolerance_px: float,
     tolerance_per_radius: float,
@@ -67,18 +69,25 @@ def find_octagons(
         triples: (m, 3) indices, any order.
         radius_range_px: of the larger semi-axis.
         centre_gate: u, v and radius of the disc in which the centre must lie [px].
+        roll_gate: roll of LED 0 and largest deviation from it, up to the ring's symmetry [rad].
         min_axis_ratio: smaller to larger semi-axis, the cosine of the largest tilt.
         tolerance_px: of a look-up, at radius 0;
         tolerance_per_radius: growing with the radius [px/px];
         perspective_per_radius_squared: and with its square [1/px].
         capacity: hypotheses kept, those with most LEDs when there are more.
     """
-    triple, count, candidate, tested = _find_octagons(
-        np.ascontiguousarray(points), triples, radius_range_px[0], radius_range_px[1], *centre_gate,
+    triple, count, candidate, tolerance, tested = _find_octagons(
+        np.ascontiguousarray(points), triples, radius_range_px[0], radius_range_px[1], *centre_gate, *roll_gate,
         min_axis_ratio, tolerance_px, tolerance_per_radius, perspective_per_radius_squared, 16 * capacity,
     )  # fmt: skip
     order = np.argsort(-count, kind="stable")[:capacity]
-    return Octagons(triple=triple[order], count=count[order], candidate=candidate[order], tested=int(tested))
+    return Octagons(
+        triple=triple[order],
+        count=count[order],
+        candidate=candidate[order],
+        tolerance_px=tolerance[order],
+        tested=int(tested),
+    )
 
 
 @njit(cache=True)
@@ -105,12 +114,13 @@ def _look_up(points, cu, cv, a, slot_of, tolerance, found):  # type: ignore[no-u
 
 @njit(cache=True)
 def _find_octagons(  # type: ignore[no-untyped-def]
-    points, triples, r_min, r_max, gate_u, gate_v, gate_r, min_ratio, tol, tol_r, tol_rr, capacity
+    points, triples, r_min, r_max, gate_u, gate_v, gate_r, roll, roll_tol, min_ratio, tol, tol_r, tol_rr, capacity
 ):
     shape_limit = min_ratio**2 / (1.0 + min_ratio**2) ** 2  # det / trace^2 of A'A at that ratio of axes
     out_triple = np.empty((capacity, 3), np.int64)
     out_count = np.empty(capacity, np.int64)
     out_slots = np.empty((capacity, SLOTS), np.int64)
+    out_tolerance = np.empty(capacity)
     taken = np.zeros(len(points), np.bool_)
     found = np.empty(SLOTS, np.int64)
     a = np.empty(4)
@@ -133,15 +143,21 @@ def _find_octagons(  # type: ignore[no-untyped-def]
             cu, cv = points[i, 0] - a[0], points[i, 1] - a[2]  # slot 0 is at e_0 = (1, 0)
             if radius < r_min or radius > r_max or (cu - gate_u) ** 2 + (cv - gate_v) ** 2 > gate_r**2:
                 continue
+            # rotation part of A; slot 0 of a ring with roll phi lies at phi + 180 deg, and 180 is four slots
+            turns = (np.arctan2(a[2] - a[1], a[0] + a[3]) - roll) / _ANGLE[1]
+            if abs(turns - np.round(turns)) * _ANGLE[1] > roll_tol:
+                continue
             tested += 1
             taken[i] = taken[j] = taken[k] = True
             found[:] = -1
             found[0], found[_GAP_SLOTS[pattern, 0]], found[_GAP_SLOTS[pattern, 1]] = i, j, k
-            count = _look_up(points, cu, cv, a, taken, tol + radius * (tol_r + tol_rr * radius), found)
+            tolerance = tol + radius * (tol_r + tol_rr * radius)
+            count = _look_up(points, cu, cv, a, taken, tolerance, found)
             taken[i] = taken[j] = taken[k] = False
             if count >= 4 and n < capacity:
                 out_triple[n, 0], out_triple[n, 1], out_triple[n, 2] = i, j, k
                 out_count[n] = count
                 out_slots[n] = found
+                out_tolerance[n] = tolerance
                 n += 1
-    return out_triple[:n].copy(), out_count[:n].copy(), out_slots[:n].copy(), tested
+    return out_triple[:n].copy(), out_count[:n].copy(), out_slots[:n].copy(), out_tolerance[:n].copy(), tested

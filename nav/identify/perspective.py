@@ -4,9 +4,9 @@ A ring of unit radius at p, spanned by two perpendicular unit vectors a, b (its 
 
     X_s = p + a cos 45 s + b sin 45 s,   u = c_u - f X_y/X_x,   v = c_v - f X_z/X_x         (1)
 
-Six unknowns, like the affine octagon's, but exact: four LEDs leave two equations to check, eight leave ten. It is fitted
-by Levenberg-Marquardt from both tilts that parallel projection cannot tell apart; the better fit counts. Candidates off
-the fit by more than the tolerance are dropped, the worst first, and candidates on it are taken up.
+Six unknowns, like the affine octagon's, but exact: four LEDs leave two equations to check, eight leave ten. It is
+fitted by Levenberg-Marquardt from both tilts that parallel projection cannot tell apart; the better fit counts.
+Candidates off the fit by more than the tolerance are dropped, the worst first, and candidates on it are taken up.
 
 The pose serves identification alone (range in radii, attitude up to noise); `nav/pose` estimates the real one.
 Not modelled: LEDs out of plane, distortion (give undistorted pixels).
@@ -91,26 +91,32 @@ def _project(pose):  # type: ignore[no-untyped-def]
     image = np.empty((SLOTS + 1, 2))
     for s in range(SLOTS + 1):
         c, d = (_COS[s], _SIN[s]) if s < SLOTS else (0.0, 0.0)
-        X = pose[0] + c * pose[1] + d * pose[2]
-        depth = max(X[0], 1e-6)
-        image[s, 0], image[s, 1] = -X[1] / depth, -X[2] / depth
+        depth = max(pose[0, 0] + c * pose[1, 0] + d * pose[2, 0], 1e-6)
+        image[s, 0] = -(pose[0, 1] + c * pose[1, 1] + d * pose[2, 1]) / depth
+        image[s, 1] = -(pose[0, 2] + c * pose[1, 2] + d * pose[2, 2]) / depth
     return image
 
 
 @njit(cache=True)
 def _solve(N, b):  # type: ignore[no-untyped-def]
-    """Solution (n, m) of N x = b, N (n, n) symmetric positive definite, by elimination in place."""
-    n = len(N)
+    """Solution (n, m) of N x = b, N (n, n) symmetric positive definite, by elimination in place.
+
+    Loops, here and below, because slices of arrays this small cost more than the sums they hold.
+    """
+    n, m = b.shape
     for k in range(n):
         pivot = max(N[k, k], 1e-300)
         for i in range(k + 1, n):
             factor = N[i, k] / pivot
-            N[i] -= factor * N[k]
-            b[i] -= factor * b[k]
+            for j in range(k, n):
+                N[i, j] -= factor * N[k, j]
+            for j in range(m):
+                b[i, j] -= factor * b[k, j]
     for k in range(n - 1, -1, -1):
-        for i in range(k + 1, n):
-            b[k] -= N[k, i] * b[i]
-        b[k] /= max(N[k, k], 1e-300)
+        for j in range(m):
+            for i in range(k + 1, n):
+                b[k, j] -= N[k, i] * b[i, j]
+            b[k, j] /= max(N[k, k], 1e-300)
     return b
 
 
@@ -119,21 +125,31 @@ def _affine(points, candidate):  # type: ignore[no-untyped-def]
     """(3, 2) centre and the images of the ring's two axes by least squares, parallel projection."""
     N = np.zeros((3, 3))
     b = np.zeros((3, 2))
-    row = np.empty(3)
+    row = np.ones(3)
     for s in range(SLOTS):
         if candidate[s] >= 0:
-            row[0], row[1], row[2] = 1.0, _COS[s], _SIN[s]
+            row[1], row[2] = _COS[s], _SIN[s]
             for i in range(3):
-                N[i] += row[i] * row
-                b[i] += row[i] * points[candidate[s]]
+                for j in range(3):
+                    N[i, j] += row[i] * row[j]
+                for j in range(2):
+                    b[i, j] += row[i] * points[candidate[s], j]
     return _solve(N, b)
 
 
 @njit(cache=True)
 def _orthonormalise(pose):  # type: ignore[no-untyped-def]
-    pose[1] /= np.sqrt((pose[1] ** 2).sum())
-    pose[2] -= (pose[1] * pose[2]).sum() * pose[1]
-    pose[2] /= np.sqrt((pose[2] ** 2).sum())
+    """Make rows a and b unit vectors, b perpendicular to a, in place."""
+    a_length = np.sqrt(pose[1, 0] ** 2 + pose[1, 1] ** 2 + pose[1, 2] ** 2)
+    along = 0.0
+    for k in range(3):
+        pose[1, k] /= a_length
+        along += pose[1, k] * pose[2, k]
+    for k in range(3):
+        pose[2, k] -= along * pose[1, k]
+    b_length = np.sqrt(pose[2, 0] ** 2 + pose[2, 1] ** 2 + pose[2, 2] ** 2)
+    for k in range(3):
+        pose[2, k] /= b_length
 
 
 @njit(cache=True)
@@ -156,11 +172,17 @@ def _start_pose(affine, side):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
+def _distance2(points, k, image, s):  # type: ignore[no-untyped-def]
+    return (points[k, 0] - image[s, 0]) ** 2 + (points[k, 1] - image[s, 1]) ** 2
+
+
+@njit(cache=True)
 def _squares(points, candidate, image):  # type: ignore[no-untyped-def]
+    """Sum of squared residuals."""
     total = 0.0
     for s in range(SLOTS):
         if candidate[s] >= 0:
-            total += ((points[candidate[s]] - image[s]) ** 2).sum()
+            total += _distance2(points, candidate[s], image, s)
     return total
 
 
@@ -174,20 +196,21 @@ def _normal_equations(points, candidate, pose, image):  # type: ignore[no-untype
     for s in range(SLOTS):
         if candidate[s] < 0:
             continue
-        r = _COS[s] * pose[1] + _SIN[s] * pose[2]
-        depth = max(pose[0, 0] + r[0], 1e-6)
-        for k in range(3):
-            dX[k, k] = 1.0
-        # phi x r
-        dX[0, 4], dX[0, 5] = r[2], -r[1]
-        dX[1, 3], dX[1, 5] = -r[2], r[0]
-        dX[2, 3], dX[2, 4] = r[1], -r[0]
+        c, d = _COS[s], _SIN[s]
+        x, y, z = c * pose[1, 0] + d * pose[2, 0], c * pose[1, 1] + d * pose[2, 1], c * pose[1, 2] + d * pose[2, 2]
+        depth = max(pose[0, 0] + x, 1e-6)
+        dX[0, 0] = dX[1, 1] = dX[2, 2] = 1.0
+        dX[0, 4], dX[0, 5] = z, -y  # rotation vector x (x, y, z)
+        dX[1, 3], dX[1, 5] = -z, x
+        dX[2, 3], dX[2, 4] = y, -x
         for axis in range(2):
-            J[:] = -(dX[axis + 1] + image[s, axis] * dX[0]) / depth
             residual = points[candidate[s], axis] - image[s, axis]
             for i in range(6):
-                N[i] += J[i] * J
+                J[i] = -(dX[axis + 1, i] + image[s, axis] * dX[0, i]) / depth
+            for i in range(6):
                 g[i, 0] += J[i] * residual
+                for j in range(6):
+                    N[i, j] += J[i] * J[j]
     return N, g
 
 
@@ -242,7 +265,7 @@ def _collect(points, image, tolerance):  # type: ignore[no-untyped-def]
     for s in range(SLOTS):
         best = tolerance * tolerance
         for k in range(len(points)):
-            d = ((points[k] - image[s]) ** 2).sum()
+            d = _distance2(points, k, image, s)
             if d < best:
                 best = d
                 candidate[s] = k
@@ -258,7 +281,7 @@ def _drop_outliers(points, candidate, pose, squares, tolerance, tolerance_per_ra
         worst, largest = -1, limit
         for s in range(SLOTS):
             if candidate[s] >= 0:
-                d = np.sqrt(((points[candidate[s]] - image[s]) ** 2).sum())
+                d = np.sqrt(_distance2(points, candidate[s], image, s))
                 if d > largest:
                     worst, largest = s, d
         if worst < 0 or (candidate >= 0).sum() <= 3:
@@ -282,7 +305,5 @@ def _fit_ring(points, first_candidate, tolerance, tolerance_per_radius):  # type
         if (collected != candidate).any() and (collected >= 0).sum() >= 4:
             candidate = collected
             pose, squares = _best_pose(points, candidate)
-    candidate, pose, squares, limit = _drop_outliers(
-        points, candidate, pose, squares, tolerance, tolerance_per_radius
-    )
+    candidate, pose, squares, limit = _drop_outliers(points, candidate, pose, squares, tolerance, tolerance_per_radius)
     return candidate, pose, squares, limit

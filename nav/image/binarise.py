@@ -55,10 +55,10 @@ def check_image(image: Image) -> None:
     Raises:
         DockairError: not two-dimensional, or not unsigned 8 or 16 bit.
     """
-    if not isinstance(image, np.ndarray) or image.ndim != 2:
+    if np.ndim(image) != 2:
         raise DockairError("image", expected="an array of shape (rows, columns)", got=np.shape(image))
-    if image.dtype not in (np.uint8, np.uint16):
-        raise DockairError("image", expected="dtype uint8 or uint16", got=str(image.dtype))
+    if getattr(image, "dtype", None) not in (np.uint8, np.uint16):
+        raise DockairError("image", expected="dtype uint8 or uint16", got=str(np.asarray(image).dtype))
 
 
 def frame_statistics(image: Image) -> FrameStatistics:

@@ -31,7 +31,7 @@ _COLUMN_STEP = np.array([1, 1, 0, -1, -1, -1, 0, 1])
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Runs:
-    """Components as runs of pixels: row[i], columns [start[i], stop[i]); component c owns runs offset[c]:offset[c+1]."""
+    """Components as runs: row[i], columns [start[i], stop[i]); component c owns runs offset[c]:offset[c+1]."""
 
     row: Indices
     start: Indices

@@ -6,10 +6,10 @@ import numpy as np
 
 from dockair.nav.pose import model
 from dockair.nav.pose.measurement import LinesOfSight
-from dockair.rotations import Array, mrp_from_matrix
+from dockair.rotations import Array
 
 _NO_PRIOR = np.zeros((0, 0))
-_ZERO = np.zeros(3)
+_UNIT, _ZERO = np.eye(3), np.zeros(3)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,7 +39,7 @@ class Descent:
     outcome: int  #: model.CONVERGED, NOT_CONVERGED, BEHIND or SINGULAR
     R_CD: Array  #: (3, 3)
     p_CD: Array  #: (3,) [m]
-    information: Array  #: (6, 6) of (phi, delta) in camera axes, the prior's included
+    covariance: Array  #: (6, 6) of (phi, delta) in camera axes, the prior included; NaN unless converged
     led_chi2: Array  #: (n,) weighted square of each LED's residual, two degrees of freedom each
     cost: float  #: their sum and the prior's share
     iterations: int
@@ -62,23 +62,21 @@ def descend(
         settings: which descent.
         prior: belief about the pose, with LOCAL coordinates only.
     """
-    prior_p, prior_t, information = _ZERO, _ZERO, _NO_PRIOR
-    if prior is not None:
-        prior_p, prior_t = mrp_from_matrix(prior.R_CD), prior.p_CD
-        information = np.linalg.inv(prior.covariance)
-    outcome, iterations, R, p, led_chi2, cost, N = model.descend(
+    outcome, iterations, R, p, led_chi2, cost, covariance = model.descend(
         sight.rays,
         sight.weights,
         sight.points_D,
-        mrp_from_matrix(R_CD),
-        np.array(p_CD, dtype=float),
-        prior_p,
-        prior_t,
-        information,
+        np.ascontiguousarray(R_CD, dtype=float),
+        np.ascontiguousarray(p_CD, dtype=float),
+        _UNIT if prior is None else np.ascontiguousarray(prior.R_CD),
+        _ZERO if prior is None else np.ascontiguousarray(prior.p_CD),
+        _NO_PRIOR if prior is None else np.linalg.inv(prior.covariance),
         settings.coordinates,
         settings.damping,
         settings.first_damping,
         settings.tolerance_sigma,
         settings.max_iterations,
     )
-    return Descent(outcome=outcome, R_CD=R, p_CD=p, information=N, led_chi2=led_chi2, cost=cost, iterations=iterations)
+    return Descent(
+        outcome=outcome, R_CD=R, p_CD=p, covariance=covariance, led_chi2=led_chi2, cost=cost, iterations=iterations
+    )

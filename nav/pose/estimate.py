@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from enum import Enum
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dockair.calibration import Camera
 from dockair.errors import DockairError
@@ -21,7 +22,7 @@ from dockair.nav.pose.descent import Descent, PosePrior
 from dockair.nav.pose.glsdc import glsdc
 from dockair.nav.pose.levenberg_marquardt import levenberg_marquardt
 from dockair.nav.pose.measurement import LinesOfSight, lines_of_sight_from_pixels
-from dockair.nav.pose.planar import mirrored, two_poses
+from dockair.nav.pose.planar import mirrored, position_for_attitude, two_poses
 from dockair.rotations import Array
 
 _METHODS: dict[str, Callable[..., Descent]] = {"lm": levenberg_marquardt, "glsdc": glsdc}
@@ -92,10 +93,9 @@ def solve_pose(
         DockairError: wrong shapes, unknown method, sigma not positive.
     """
     pixels, points_D, sigma = _checked(pixels, points_D, sigma_px, method, prior)
-    seen = np.isfinite(pixels).all(axis=1)
-    if initial is None and prior is not None:
-        initial = (prior.R_CD, prior.p_CD)
-    if seen.sum() < (4 if initial is None else 3):
+    seen = np.asarray(np.isfinite(pixels).all(axis=1))
+    start = (prior.R_CD, prior.p_CD) if initial is None and prior is not None else initial
+    if seen.sum() < (4 if start is None else 3):
         return _no_pose(PoseStatus.TOO_FEW_LEDS, len(pixels))
     whole = bool(seen.all())
     sight = lines_of_sight_from_pixels(
@@ -105,16 +105,19 @@ def solve_pose(
         sigma if whole else sigma[seen],
     )
     refine = _METHODS[method]
-    if prior is not None:
-        return _estimate(levenberg_marquardt(sight, *initial, prior=prior), sight, seen)
-    if initial is None:
+    if start is None:
         attitudes, positions = two_poses(sight.rays, sight.points_D)
         if not np.isfinite(positions).all():
             return _no_pose(PoseStatus.DEGENERATE, len(pixels))
         ends = [_estimate(refine(sight, attitudes[k], positions[k]), sight, seen) for k in range(2)]
         ends.sort(key=lambda end: end.chi2 if end.status is PoseStatus.CONVERGED else np.inf)
         return _paired(ends[0], ends[1])
-    first = _estimate(refine(sight, *initial), sight, seen)
+    if prior is not None:
+        return _estimate(levenberg_marquardt(sight, *start, prior=prior), sight, seen)
+    first = _estimate(refine(sight, *start), sight, seen)
+    if first.status is PoseStatus.NOT_CONVERGED:  # a range far off leads astray; the attitude alone gives a better one
+        again = refine(sight, start[0], position_for_attitude(sight.rays, sight.points_D, start[0]))
+        first = _estimate(again, sight, seen)
     if first.status is not PoseStatus.CONVERGED:
         return first
     return _paired(first, _estimate(refine(sight, *mirrored(first.R_CD, first.p_CD, sight.points_D)), sight, seen))
@@ -152,7 +155,7 @@ def _no_pose(status: PoseStatus, count: int) -> PoseEstimate:
     )
 
 
-def _estimate(end: Descent, sight: LinesOfSight, seen: Array) -> PoseEstimate:
+def _estimate(end: Descent, sight: LinesOfSight, seen: NDArray[np.bool_]) -> PoseEstimate:
     status = _STATUS[end.outcome]
     led_chi2 = np.full(len(seen), np.nan)
     led_chi2[seen] = end.led_chi2
@@ -160,20 +163,13 @@ def _estimate(end: Descent, sight: LinesOfSight, seen: Array) -> PoseEstimate:
         status=status,
         R_CD=end.R_CD,
         p_CD=end.p_CD,
-        covariance=_inverse(end.information) if status is PoseStatus.CONVERGED else np.full((6, 6), np.nan),
+        covariance=end.covariance,
         iterations=end.iterations,
         rms_px=float(np.sqrt(end.led_chi2 @ sight.sigma_px**2 / (2 * len(sight.rays)))),
         chi2=float(end.led_chi2.sum()),
         led_chi2=led_chi2,
         measurement=sight,
     )
-
-
-def _inverse(information: Array) -> Array:
-    scale = 1.0 / np.sqrt(np.diag(information))  # rad and m: scaled before it is inverted
-    scale = scale[:, None] * scale
-    covariance = np.linalg.inv(information * scale) * scale
-    return np.asarray(0.5 * (covariance + covariance.T))
 
 
 def _paired(first: PoseEstimate, second: PoseEstimate) -> PoseEstimate:

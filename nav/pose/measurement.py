@@ -40,7 +40,7 @@ def isotropic_weights(count: int, sigma: float) -> Array:
 
 
 @njit(cache=True)
-def tangent_weights(rays, focal_length_px, distortion, sigma_px):
+def tangent_weights(rays: Array, focal_length_px: float, distortion: Array, sigma_px: Array) -> Array:
     """(n, 3, 3) weights G'G/sigma^2, G = d(pixel)/dh at the ray.
 
     Args:

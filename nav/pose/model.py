@@ -29,15 +29,37 @@ Everything is in one file because compiled kernels may call those of their own f
 import numpy as np
 from numba import njit
 
+from dockair.rotations import Array
+
 SOURCE, LOCAL = 0, 1  #: coordinates of a step: (p, o) as in the source, or (phi, delta)
 UNDAMPED, IDENTITY, DIAGONAL = 0, 1, 2  #: eqs (62), (64), (65) of the source
 CONVERGED, NOT_CONVERGED, BEHIND, SINGULAR = 0, 1, 2, 3  #: how a descent ended
 _SINGULAR_PIVOT = 1e-13  # of the normal matrix scaled to unit diagonal: nothing but rounding is left
-_ROUNDING = 1e-14  # of the cost: a smaller promise cannot be told from rounding
+_CREEPING = 1e-2  # sigmas; a floor so flat that steps are still this short after half of the iterations is reached
+_ROUNDING = 1e-10  # of the cost: its own rounding is about 1e-12, a smaller promise cannot be told from it
 
 
 @njit(cache=True)
-def _matrix_from_mrp(p, C):
+def _mrp_from_matrix(R: Array, p: Array) -> None:
+    """Fill the passive MRP of R, |p| <= 1: from the largest row of 4 q q', q the quaternion of R."""
+    K = np.empty((4, 4))
+    K[0] = [1.0 + R[0, 0] + R[1, 1] + R[2, 2], R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]]
+    k = 0
+    for i in range(3):
+        K[1 + i, 0] = K[0, 1 + i]
+        for j in range(3):
+            K[1 + i, 1 + j] = R[i, j] + R[j, i]
+        K[1 + i, 1 + i] += 2.0 - K[0, 0]
+        if K[1 + i, 1 + i] > K[k, k]:
+            k = 1 + i
+    q = K[k]
+    norm = np.sqrt(q[0] ** 2 + q[1] ** 2 + q[2] ** 2 + q[3] ** 2)
+    for i in range(3):
+        p[i] = -q[1 + i] / (q[0] + norm) if q[0] >= 0.0 else -q[1 + i] / (q[0] - norm)
+
+
+@njit(cache=True)
+def _matrix_from_mrp(p: Array, C: Array) -> None:
     s = p[0] ** 2 + p[1] ** 2 + p[2] ** 2
     a, b = 8.0 / (1.0 + s) ** 2, 4.0 * (1.0 - s) / (1.0 + s) ** 2
     for i in range(3):
@@ -53,7 +75,7 @@ def _matrix_from_mrp(p, C):
 
 
 @njit(cache=True)
-def _mrp_product(a, b, sign_b, out):
+def _mrp_product(a: Array, b: Array, sign_b: float, out: Array) -> None:
     """MRP of C(a) C(sign_b b), |out| <= 1: product of the two quaternions (1 - s, 2 p)/(1 + s)."""
     s, r = a[0] ** 2 + a[1] ** 2 + a[2] ** 2, b[0] ** 2 + b[1] ** 2 + b[2] ** 2
     w1, x1, y1, z1 = 1.0 - s, 2.0 * a[0], 2.0 * a[1], 2.0 * a[2]
@@ -66,7 +88,7 @@ def _mrp_product(a, b, sign_b, out):
 
 
 @njit(cache=True)
-def _mrp_rate(p, sign, B):
+def _mrp_rate(p: Array, sign: float, B: Array) -> None:
     """{(1 - p'p) I + 2 sign [p x] + 2 p p'}."""
     s = 1.0 - (p[0] ** 2 + p[1] ** 2 + p[2] ** 2)
     for i in range(3):
@@ -82,7 +104,7 @@ def _mrp_rate(p, sign, B):
 
 
 @njit(cache=True)
-def _line_of_sight(C, t, q, p, coordinates, h, J, B):
+def _line_of_sight(C: Array, t: Array, q: Array, p: Array, coordinates: int, h: Array, J: Array, B: Array) -> None:
     """Fill h (3,) and J (3, 6), the derivative in the chosen coordinates; B is work space holding {..} of eq (56)."""
     ax = C[0, 0] * q[0] + C[0, 1] * q[1] + C[0, 2] * q[2]
     ay = C[1, 0] * q[0] + C[1, 1] * q[1] + C[1, 2] * q[2]
@@ -92,15 +114,10 @@ def _line_of_sight(C, t, q, p, coordinates, h, J, B):
     for i in range(3):
         h[i] /= r
     if coordinates == LOCAL:
-        for i in range(3):  # rows of D = (I - h h')/|s|, then -D [a x], Eq. (1)
-            dx, dy, dz = -h[i] * h[0] / r, -h[i] * h[1] / r, -h[i] * h[2] / r
-            if i == 0:
-                dx += 1.0 / r
-            elif i == 1:
-                dy += 1.0 / r
-            else:
-                dz += 1.0 / r
-            J[i, 3], J[i, 4], J[i, 5] = dx, dy, dz
+        for i in range(3):  # rows d of (I - h h')/|s|, then -d [a x], Eq. (1)
+            for j in range(3):
+                J[i, 3 + j] = ((1.0 if i == j else 0.0) - h[i] * h[j]) / r
+            dx, dy, dz = J[i, 3], J[i, 4], J[i, 5]
             J[i, 0], J[i, 1], J[i, 2] = dz * ay - dy * az, dx * az - dz * ax, dy * ax - dx * ay
         return
     s = p[0] ** 2 + p[1] ** 2 + p[2] ** 2
@@ -115,7 +132,7 @@ def _line_of_sight(C, t, q, p, coordinates, h, J, B):
 
 
 @njit(cache=True)
-def lines_of_sight(mrp, p_CD, points_D, coordinates):
+def lines_of_sight(mrp: Array, p_CD: Array, points_D: Array, coordinates: int) -> tuple[Array, Array]:
     """Predicted lines of sight and their derivatives.
 
     Args:
@@ -137,7 +154,10 @@ def lines_of_sight(mrp, p_CD, points_D, coordinates):
 
 
 @njit(cache=True)
-def _normal_equations(rays, weights, points, p, t, prior_p, prior_t, prior_information, coordinates, N, g, led_cost):
+def _normal_equations(
+    rays: Array, weights: Array, points: Array, p: Array, t: Array, prior_p: Array, prior_t: Array,
+    prior_information: Array, coordinates: int, N: Array, g: Array, led_cost: Array,
+) -> float:  # fmt: skip
     """Fill N = H'WH, g = H'W(b - h), the cost of each LED; return the whole cost, inf with an LED behind its ray."""
     C, B, h, J, WJ = np.empty((3, 3)), np.empty((3, 3)), np.empty(3), np.empty((3, 6)), np.empty((3, 6))
     _matrix_from_mrp(p, C)
@@ -171,7 +191,7 @@ def _normal_equations(rays, weights, points, p, t, prior_p, prior_t, prior_infor
 
 
 @njit(cache=True)
-def _add_prior(p, t, prior_p, prior_t, information, N, g):
+def _add_prior(p: Array, t: Array, prior_p: Array, prior_t: Array, information: Array, N: Array, g: Array) -> float:
     """Add Eq. (3) in local coordinates; return its cost."""
     s, B, d, A, LA = np.empty(3), np.empty((3, 3)), np.zeros(6), np.zeros((6, 6)), np.zeros((6, 6))
     _mrp_product(p, prior_p, -1.0, s)  # passive: d_phi = 4 s, and -d(d_phi)/dphi is B of the next line
@@ -195,10 +215,10 @@ def _add_prior(p, t, prior_p, prior_t, information, N, g):
 
 
 @njit(cache=True)
-def _factor(N, mu, damping, L, scale):
+def _factor(N: Array, D: Array, mu: float, L: Array, scale: Array) -> bool:
     """Cholesky factor L of N + damping scaled to unit diagonal; False when it is singular."""
     for i in range(6):
-        scale[i] = N[i, i] + (mu if damping == IDENTITY else mu * N[i, i])
+        scale[i] = N[i, i] + mu * D[i]
         if not (scale[i] > 0.0 and scale[i] < np.inf):
             return False
         scale[i] = 1.0 / np.sqrt(scale[i])
@@ -215,10 +235,10 @@ def _factor(N, mu, damping, L, scale):
 
 
 @njit(cache=True)
-def _solve(N, mu, damping, g, x):
+def _solve(N: Array, D: Array, mu: float, g: Array, x: Array) -> bool:
     """Solve (N + damping) x = g; False when it is singular."""
     L, scale = np.empty((6, 6)), np.empty(6)
-    if not _factor(N, mu, damping, L, scale):
+    if not _factor(N, D, mu, L, scale):
         return False
     for i in range(6):
         x[i] = g[i] * scale[i]
@@ -235,7 +255,7 @@ def _solve(N, mu, damping, g, x):
 
 
 @njit(cache=True)
-def _moved(p, t, x, coordinates, p_new, t_new):
+def _moved(p: Array, t: Array, x: Array, coordinates: int, p_new: Array, t_new: Array) -> None:
     """Fill the state after a step x."""
     C, step = np.empty((3, 3)), np.empty(3)
     if coordinates == LOCAL:
@@ -260,70 +280,102 @@ def _moved(p, t, x, coordinates, p_new, t_new):
 
 @njit(cache=True)
 def descend(
-    rays, weights, points, mrp, p_CD, prior_p, prior_t, information, coordinates, damping, mu, tolerance, max_iterations
-):
+    rays: Array, weights: Array, points: Array, R_CD: Array, p_CD: Array, prior_R: Array, prior_t: Array,
+    information: Array, coordinates: int, damping: int, mu: float, tolerance: float, max_iterations: int,
+) -> tuple[int, int, Array, Array, Array, float, Array]:  # fmt: skip
     """Minimise the cost of the module's head from a start; no error is raised, the outcome is in the first result.
 
     Args:
         rays: (n, 3) measured unit vectors b_i in camera axes.
         weights: (n, 3, 3) W_i.
         points: (n, 3) LEDs in drogue axes [m].
-        mrp: (3,) start of p.
-        p_CD: (3,) start of t [m].
-        prior_p: (3,) attitude of Eq. (3).
+        R_CD: (3, 3) start.
+        p_CD: (3,) start [m].
+        prior_R: (3, 3) attitude of Eq. (3).
         prior_t: (3,) position of Eq. (3) [m].
         information: (6, 6) Lambda of Eq. (3), with LOCAL coordinates; (0, 0) for no prior.
         coordinates: SOURCE or LOCAL.
         damping: UNDAMPED, IDENTITY or DIAGONAL.
-        mu: first damping. A step that lowers the cost by more than 3/4 of what the quadratic model promises divides it
-            by ten, less than 1/4 doubles it, one that raises the cost is not taken and multiplies it by ten.
+        mu: first damping, on the largest diagonal met so far. With g the share of the decrease promised by the
+            quadratic model that a step brings, mu falls by max(0.1, 1 - (2 g - 1)^3); a step that raises the cost is
+            not taken and mu rises tenfold.
         tolerance: converged when the undamped step is shorter than this many of its own standard deviations.
         max_iterations: of solved steps.
 
     Returns:
-        outcome, iterations, R_CD (3, 3), p_CD (3,), cost of each LED (n,), whole cost, N (6, 6) in LOCAL coordinates.
+        outcome, iterations, R_CD (3, 3), p_CD (3,), cost of each LED (n,), whole cost,
+        covariance (6, 6) of (phi, delta), the inverse of N; NaN unless CONVERGED.
     """
-    p, t, p_new, t_new = mrp.copy(), p_CD.copy(), np.empty(3), np.empty(3)
+    p, t, p_new, t_new, prior_p = np.empty(3), p_CD.copy(), np.empty(3), np.empty(3), np.empty(3)
+    _mrp_from_matrix(R_CD, p)
+    _mrp_from_matrix(prior_R, prior_p)
     N, N_new, C = np.zeros((6, 6)), np.zeros((6, 6)), np.empty((3, 3))
-    g, g_new, x, led_cost, led_new = np.zeros(6), np.zeros(6), np.empty(6), np.zeros(len(rays)), np.zeros(len(rays))
+    g, g_new, x, D, led_cost, led_new = (
+        np.zeros(6),
+        np.zeros(6),
+        np.empty(6),
+        np.zeros(6),
+        np.zeros(len(rays)),
+        np.zeros(len(rays)),
+    )
     cost = _normal_equations(rays, weights, points, p, t, prior_p, prior_t, information, coordinates, N, g, led_cost)
     outcome, iterations = (NOT_CONVERGED, 0) if cost < np.inf else (BEHIND, 0)
     while outcome == NOT_CONVERGED and iterations < max_iterations:
         iterations += 1
-        if not _solve(N, mu, damping, g, x):
+        for i in range(6):
+            D[i] = 1.0 if damping == IDENTITY else max(D[i], N[i, i])
+        if not _solve(N, D, mu, g, x):
             if damping == UNDAMPED or mu > 1e6:
                 outcome = SINGULAR
                 break
             mu = max(10.0 * mu, 1e-6)
             continue
         length = _square(N, x)
-        if length < tolerance**2 and damping != UNDAMPED and mu > 1e-9 and _solve(N, 0.0, damping, g, x):
+        least = tolerance if 2 * iterations < max_iterations else max(tolerance, _CREEPING)
+        if length < least**2 and damping != UNDAMPED and mu > 1e-9 and _solve(N, D, 0.0, g, x):
             length = _square(N, x)
         _moved(p, t, x, coordinates, p_new, t_new)
         new = _normal_equations(
             rays, weights, points, p_new, t_new, prior_p, prior_t, information, coordinates, N_new, g_new, led_new
         )
         promised = 2.0 * (g * x).sum() - _square(N, x)
-        if (length < tolerance**2 or promised < _ROUNDING * cost) and new < np.inf:
+        if (length < least**2 or promised < _ROUNDING * cost) and new < np.inf:
             outcome = CONVERGED
         elif damping != UNDAMPED:
             gain = (cost - new) / promised
             if not gain > 0.0:
                 mu = max(10.0 * mu, 1e-6)
                 continue
-            mu = 0.1 * mu if gain > 0.75 else (2.0 * mu if gain < 0.25 else mu)
+            mu *= max(0.1, 1.0 - (2.0 * gain - 1.0) ** 3)
         elif not new < np.inf:
             break
         p[:], t[:], g[:], N[:], led_cost[:], cost = p_new, t_new, g_new, N_new, led_new, new
     _normal_equations(rays, weights, points, p, t, prior_p, prior_t, information, LOCAL, N, g, led_cost)
-    if outcome == CONVERGED and not _solve(N, 0.0, UNDAMPED, g, x):
+    covariance = np.full((6, 6), np.nan)
+    if outcome == CONVERGED and not _invert(N, covariance):
         outcome = SINGULAR
     _matrix_from_mrp(p, C)
-    return outcome, iterations, C, t, led_cost, cost, N
+    return outcome, iterations, C, t, led_cost, cost, covariance
 
 
 @njit(cache=True)
-def _square(N, x):
+def _invert(N: Array, inverse: Array) -> bool:
+    unit, x = np.zeros(6), np.empty(6)
+    for i in range(6):
+        unit[:] = 0.0
+        unit[i] = 1.0
+        if not _solve(N, unit, 0.0, unit, x):
+            inverse[:] = np.nan
+            return False
+        inverse[i] = x
+    for i in range(6):
+        for j in range(i):
+            inverse[i, j] = inverse[j, i] = 0.5 * (inverse[i, j] + inverse[j, i])
+    return True
+
+
+@njit(cache=True)
+def _square(N: Array, x: Array) -> float:
     total = 0.0
     for i in range(6):
         for j in range(6):

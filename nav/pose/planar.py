@@ -22,9 +22,11 @@ Source: D. Oberkampf, D. DeMenthon, L. Davis, Iterative pose estimation using co
 import numpy as np
 from numba import njit
 
+from dockair.rotations import Array
+
 
 @njit(cache=True)
-def _plane(points, axes):
+def _plane(points: Array, axes: Array) -> Array:
     """Fill axes (3, 3) with rows e_1, e_2, e_3 (normal); return the mean of the points, NaN when they lie on a line."""
     n, mean, normal = len(points), np.zeros(3), np.zeros(3)
     for i in range(n):
@@ -54,7 +56,7 @@ def _plane(points, axes):
 
 
 @njit(cache=True)
-def _axes_along(ray):
+def _axes_along(ray: Array) -> Array:
     """(3, 3) R_CC' whose first column is the ray."""
     R, k = np.empty((3, 3)), 1 if abs(ray[1]) < abs(ray[2]) else 2
     y = np.zeros(3)
@@ -67,7 +69,7 @@ def _axes_along(ray):
 
 
 @njit(cache=True)
-def _affine_fit(rays, points, R, axes, mean):
+def _affine_fit(rays: Array, points: Array, R: Array, axes: Array, mean: Array) -> tuple[Array, Array]:
     """Return A (2, 2) and m_0 (2,) of Eq. (1); A is NaN when the LEDs do not span a plane."""
     n, S, T, m0, A = len(rays), np.zeros((2, 2)), np.zeros((2, 2)), np.zeros(2), np.full((2, 2), np.nan)
     for i in range(n):
@@ -91,7 +93,7 @@ def _affine_fit(rays, points, R, axes, mean):
 
 
 @njit(cache=True)
-def two_poses(rays, points_D):
+def two_poses(rays: Array, points_D: Array) -> tuple[Array, Array]:
     """Both poses that scaled orthography allows.
 
     Args:
@@ -134,7 +136,7 @@ def two_poses(rays, points_D):
 
 
 @njit(cache=True)
-def mirrored(R_CD, p_CD, points_D):
+def mirrored(R_CD: Array, p_CD: Array, points_D: Array) -> tuple[Array, Array]:
     """The other attitude of Eq. (2): the LEDs' plane reflected about the line of sight to their middle.
 
     Args:
@@ -175,3 +177,28 @@ def mirrored(R_CD, p_CD, points_D):
         for j in range(3):
             p[i] -= R[i, j] * mean[j]
     return R, p
+
+
+@njit(cache=True)
+def position_for_attitude(rays: Array, points_D: Array, R_CD: Array) -> Array:
+    """(3,) p_CD [m] that brings the LEDs nearest to their rays, attitude given: linear least squares.
+
+    Minimises sum |(I - b b')(R_CD q + p)|^2; the solution in front of the camera.
+
+    Args:
+        rays: (n, 3) unit lines of sight b in camera axes.
+        points_D: (n, 3) LEDs q in drogue axes [m].
+        R_CD: (3, 3) attitude.
+    """
+    M, y, in_front = np.zeros((3, 3)), np.zeros(3), 0.0
+    for i in range(len(rays)):
+        for j in range(3):
+            for k in range(3):
+                across = (1.0 if j == k else 0.0) - rays[i, j] * rays[i, k]
+                M[j, k] += across
+                for m in range(3):
+                    y[j] -= across * R_CD[k, m] * points_D[i, m]
+    p = np.linalg.solve(M, y)
+    for i in range(len(rays)):
+        in_front += (rays[i] * p).sum()
+    return p if in_front >= 0.0 else -p

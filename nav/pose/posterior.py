@@ -4,16 +4,16 @@ A frame is taken whole: the cost of its lines of sight plus that of the prior is
 average of two Gaussians is formed. Far away or nearly frontal the lines of sight are a bent valley with two floors
 (`planar`): a ring that noise makes look tilted looks nearer too, by a square law that no covariance of one floor
 describes. The prior chooses the floor and the place along the valley, which also keeps the range free of bias.
+Where the prior cannot choose, each floor k with cost J_k and covariance P_k is returned with its evidence (Laplace)
 
-Where the prior cannot choose, both floors count: with cost J_k and covariance P_k at floor k,
+    log_evidence = -J_k / 2 + (log det P_k - log det P_prior) / 2                        (1)
 
-    weight_k ~ exp(-J_k / 2) sqrt(det P_k),     mean and covariance of the mixture                      (1)
+and the frame's disagreement with the prior is the likelihood ratio
 
-so that a belief that may be on the wrong floor says so, and later frames can still change it. The frame's disagreement
-with the prior is the likelihood ratio
+    gate = J_k - min [lines of sight alone],                                             (2)
 
-    gate = min [lines of sight + prior] - min [lines of sight],                                         (2)
-
+A prior can tilt the valley so far that the floor it dislikes is one no more, only a shoulder; then the average of two
+Gaussians, prior and the frame's own pose on that side, stands for it. Eq. (2) is
 chi-square with 6 degrees of freedom where the problem is linear: then it is the squared Mahalanobis distance of the
 frame's own pose from the prior. A pose that comes without its lines of sight is averaged with the prior as a Gaussian.
 """
@@ -22,84 +22,77 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dockair.nav.pose.descent import Descent, PosePrior
+from dockair.nav.pose.descent import PosePrior
 from dockair.nav.pose.estimate import PoseEstimate
 from dockair.nav.pose.levenberg_marquardt import levenberg_marquardt
 from dockair.rotations import Array, exp, log
 
 _SAME_FLOOR_CHI2 = 1e-3  # squared distance, in sigmas, below which two ends of a descent are one floor
-_NEGLIGIBLE_WEIGHT = 1e-9  # against the best floor's
+_SHOULDER_CHI2 = 9.0  # distance from the floors at which a shoulder is worth its own hypothesis: 3 sigma
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PosePosterior:
-    """Pose after a frame."""
+    """A pose that explains prior and frame."""
 
     R_CD: Array  #: (3, 3)
     p_CD: Array  #: (3,) [m]
     covariance: Array  #: (6, 6) of (phi, delta) in camera axes [rad, m]
+    log_evidence: float  #: Eq. (1), less what all floors and priors of one frame have in common
     gate_chi2: float  #: Eq. (2)
 
 
-def posterior(prior: PosePrior, pose: PoseEstimate) -> PosePosterior | None:
-    """Return the pose that explains prior and frame together; None when no minimum was found.
+def posteriors(prior: PosePrior, pose: PoseEstimate) -> list[PosePosterior]:
+    """Return every floor to which prior, pose and its alternative lead; empty when there is none.
 
     Args:
         prior: the belief before the frame.
-        pose: a converged estimate from the frame alone; its alternative is considered too.
+        pose: a converged estimate from the frame alone.
     """
     solutions = [pose] if pose.alternative is None else [pose, pose.alternative]
+    free_chi2 = min(solution.chi2 for solution in solutions)
+    log_det = float(np.linalg.slogdet(prior.covariance)[1])
+    gaussians = [_gaussian(prior, log_det, solution, free_chi2) for solution in solutions]
     if pose.measurement is None:
-        return min((_gaussian(prior, solution) for solution in solutions), key=lambda p: p.gate_chi2)
-    starts = [(prior.R_CD, prior.p_CD), *((s.R_CD, s.p_CD) for s in solutions)]
-    ends = [levenberg_marquardt(pose.measurement, R, p, prior=prior) for R, p in starts]
-    floors = sorted((end for end in ends if end.converged), key=lambda end: end.cost)
-    if not floors:
-        return None
-    gate = floors[0].cost - min(s.chi2 for s in solutions)
-    return _mixture([_floor(floors[0], gate), *(_floor(end, gate) for end in floors[1:])], [f.cost for f in floors])
+        return gaussians
+    floors: list[PosePosterior] = []
+    for R, p in [(prior.R_CD, prior.p_CD), *((s.R_CD, s.p_CD) for s in solutions)]:
+        end = levenberg_marquardt(pose.measurement, R, p, prior=prior)
+        if end.converged:
+            floor = PosePosterior(
+                R_CD=end.R_CD,
+                p_CD=end.p_CD,
+                covariance=end.covariance,
+                log_evidence=0.5 * (float(np.linalg.slogdet(end.covariance)[1]) - log_det - end.cost),
+                gate_chi2=end.cost - free_chi2,
+            )
+            _add(floors, floor, _SAME_FLOOR_CHI2)
+    for gaussian in gaussians:
+        _add(floors, gaussian, _SHOULDER_CHI2)
+    return floors
 
 
-def _floor(end: Descent, gate: float) -> PosePosterior:
-    return PosePosterior(R_CD=end.R_CD, p_CD=end.p_CD, covariance=np.linalg.inv(end.information), gate_chi2=gate)
+def _add(floors: list[PosePosterior], new: PosePosterior, least_chi2: float) -> None:
+    """Append a floor unless it is as near to a known one, in that one's sigmas."""
+    for floor in floors:
+        step = np.concatenate([log(new.R_CD @ floor.R_CD.T), new.p_CD - floor.p_CD])
+        if step @ np.linalg.solve(floor.covariance, step) < least_chi2:
+            return
+    floors.append(new)
 
 
-def _mixture(floors: list[PosePosterior], costs: list[float]) -> PosePosterior:
-    """Return the best floor, or mean and covariance of Eq. (1) if another one has weight."""
-    best = floors[0]
-    steps, weights = [np.zeros(6)], [1.0]
-    covariances = [best.covariance]
-    for floor, cost in zip(floors[1:], costs[1:], strict=True):
-        step = np.concatenate([log(floor.R_CD @ best.R_CD.T), floor.p_CD - best.p_CD])
-        nearest = min(float((step - s) @ np.linalg.solve(best.covariance, step - s)) for s in steps)
-        ratio = np.linalg.det(np.linalg.solve(best.covariance, floor.covariance))
-        weight = float(np.exp(-0.5 * (cost - costs[0])) * np.sqrt(max(ratio, 0.0)))
-        if nearest > _SAME_FLOOR_CHI2 and weight > _NEGLIGIBLE_WEIGHT:
-            steps.append(step)
-            weights.append(weight)
-            covariances.append(floor.covariance)
-    if len(steps) == 1:
-        return best
-    w = np.array(weights) / np.sum(weights)
-    mean = w @ np.array(steps)
-    covariance = sum(wk * (Pk + np.outer(s - mean, s - mean)) for wk, Pk, s in zip(w, covariances, steps, strict=True))
-    return PosePosterior(
-        R_CD=exp(mean[:3]) @ best.R_CD,
-        p_CD=best.p_CD + mean[3:],
-        covariance=np.asarray(covariance),
-        gate_chi2=best.gate_chi2,
-    )
-
-
-def _gaussian(prior: PosePrior, pose: PoseEstimate) -> PosePosterior:
+def _gaussian(prior: PosePrior, log_det: float, pose: PoseEstimate, free_chi2: float) -> PosePosterior:
     """Average two Gaussians; the covariance in Joseph's form."""
     S = np.linalg.inv(prior.covariance + pose.covariance)
     innovation = np.concatenate([log(pose.R_CD @ prior.R_CD.T), pose.p_CD - prior.p_CD])
     K = prior.covariance @ S
     step, A = K @ innovation, np.eye(6) - K
+    covariance = A @ prior.covariance @ A.T + K @ pose.covariance @ K.T
+    distance = float(innovation @ S @ innovation)
     return PosePosterior(
         R_CD=exp(step[:3]) @ prior.R_CD,
         p_CD=prior.p_CD + step[3:],
-        covariance=A @ prior.covariance @ A.T + K @ pose.covariance @ K.T,
-        gate_chi2=float(innovation @ S @ innovation),
+        covariance=covariance,
+        log_evidence=0.5 * (float(np.linalg.slogdet(covariance)[1]) - log_det - distance - pose.chi2),
+        gate_chi2=distance + pose.chi2 - free_chi2,
     )

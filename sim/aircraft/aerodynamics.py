@@ -15,7 +15,8 @@ Surfaces are (elevator, aileron, rudder), positive with the trailing edge down o
 nose left. The tables are forward-right-down; the kernel turns its inputs and outputs with `FLU_FROM_FRD`, here and
 nowhere else, so that everything outside is forward-left-up.
 
-Valid within a few degrees of the trim's angle of attack and sideslip (`linear_range_rad` of the sheet), low Mach number.
+Valid within 3 degrees of the trim's angle of attack and 5 degrees of sideslip (CX, CZ and Cm within 0.01 of
+the tables), and at low Mach numbers.
 Not modelled: curvature of the tables, Mach effects, leading-edge flaps, speed brake, unsteady lift, gust gradients.
 Source: Stevens, Lewis & Johnson, Aircraft Control and Simulation, section 3.5 and appendix A (NASA TP-1538).
 """
@@ -58,7 +59,6 @@ class AirframeParameters:
     yawing_moment_aileron: Array  #: (12,)
     yawing_moment_rudder: Array  #: (12,)
     damping: Array  #: (9, 12) CXq, CYr, CYp, CZq, Clr, Clp, Cmq, Cnr, Cnp
-    linear_range_rad: float
     actuator_bandwidth_rad_s: float
     surface_limits_rad: Array  #: (3,) elevator, aileron, rudder
     surface_rate_limits_rad_s: Array  #: (3,)
@@ -98,7 +98,7 @@ class LinearAerodynamics:
 
 
 def flow_angles(v_B: Array) -> tuple[float, float, float]:
-    """Airspeed [m/s], angle of attack and sideslip [rad] of a velocity relative to the air (3,), forward-left-up, Eq. (1).
+    """Airspeed [m/s], angle of attack and sideslip [rad], Eq. (1), of a velocity relative to the air (3,), body axes.
 
     Positive angle of attack: air from below. Positive sideslip: air from the right.
     """
@@ -107,7 +107,7 @@ def flow_angles(v_B: Array) -> tuple[float, float, float]:
 
 
 def static_coefficients(parameters: AirframeParameters, alpha_rad: float, elevator_rad: float) -> Array:
-    """(6,) CX, CY, CZ, Cl, Cm, Cn in straight symmetric flight, from the tables themselves, about the centre of gravity."""
+    """(6,) CX, CY, CZ, Cl, Cm, Cn in straight symmetric flight, of the tables, about the centre of gravity."""
     p = parameters
     CX = _bilinear(p.elevator_rad, p.angle_of_attack_rad, p.axial_force, elevator_rad, alpha_rad)
     CZ = float(np.interp(alpha_rad, p.angle_of_attack_rad, p.normal_force))
@@ -150,9 +150,8 @@ def linearise(
 
 
 def _half_intervals(p: AirframeParameters) -> tuple[float, float]:
-    return 0.5 * float(p.angle_of_attack_rad[1] - p.angle_of_attack_rad[0]), 0.5 * float(
-        p.elevator_rad[1] - p.elevator_rad[0]
-    )
+    alpha, elevator = p.angle_of_attack_rad, p.elevator_rad
+    return 0.5 * float(alpha[1] - alpha[0]), 0.5 * float(elevator[1] - elevator[0])
 
 
 def _fill_lateral(D: Array, p: AirframeParameters, alpha_rad: float) -> None:

@@ -1,18 +1,18 @@
 """Gains of the receiver's flight control: linear-quadratic feedback and exact steering along a commanded path.
 
-Feedback minimises the integral of x'Q x + z'Q_z z + u'R u of the linear model with two additions: z, the integral of the
-velocity's error, and the gust g as the flight control thinks of it, dg/dt = -(V/L) g + noise:
+Feedback minimises the integral of x'Q x + z'Q_z z + u'R u of the linear model with two additions: z, the integral of
+the velocity's error, and the gust g as the flight control thinks of it, dg/dt = -(V/L) g + noise:
 
     u = -K x - K_z z - K_g g,     K = R^-1 B' P,     P of the algebraic Riccati equation              (1)
 
 Q and R are diagonal, one over the square of what is tolerated [Bryson & Ho, section 5.2].
 
-Steering: to follow a reference velocity r with derivatives r', r'' (per axis a chain S of integrators), state and
-input must be Pi and Gamma times (r, r', r''), the solution of the regulator equations
+Steering: to follow w, a reference velocity r and its first three derivatives (per axis a chain S of integrators),
+state and input must be Pi w and Gamma w, the solution of the regulator equations
 
-    Pi S = A Pi + B Gamma,     C Pi = (1, 0, 0) for the three velocities, 0 for the heading           (2)
+    Pi S = A Pi + B Gamma,     C Pi = (1, 0, 0, 0) for the three velocities, 0 for the heading        (2)
 
-so that u = Gamma w - K (x - Pi w) tracks without error in the linear model what has no third derivative, and the
+so that u = Gamma w - K (x - Pi w) tracks without error in the linear model what has no fourth derivative, and the
 feedback's gains do not shape the answer to commands.
 Source: Francis, The linear multivariable regulator problem, SIAM J. Control Optim. 15 (1977).
 """
@@ -24,6 +24,8 @@ from scipy.linalg import solve_continuous_are
 
 from dockair.rotations import Array
 from dockair.sim.aircraft.linear_model import ATTITUDE, INPUTS, RATE, STATES, VELOCITY, LinearModel
+
+CHAIN = 4  #: the reference and three derivatives of it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -45,8 +47,8 @@ class Gains:
     K: Array  #: (4, 13)
     K_integral: Array  #: (4, 3)
     K_gust: Array  #: (4, 3)
-    Pi: Array  #: (13, 9) on r, r', r''
-    Gamma: Array  #: (4, 9)
+    Pi: Array  #: (13, 12) on the chain: three axes of r, of its first, second, third derivative
+    Gamma: Array  #: (4, 12)
 
 
 def design(model: LinearModel, tolerances: Tolerances, gust_rate_1_s: float) -> Gains:
@@ -71,18 +73,15 @@ def design(model: LinearModel, tolerances: Tolerances, gust_rate_1_s: float) -> 
 
 
 def _steering(model: LinearModel) -> tuple[Array, Array]:
-    """Solve Eq. (2) by stacking its columns: the unknown is the vector of (Pi; Gamma)."""
+    """Solve Eq. (2), M X - E X S = (0; outputs) with X = (Pi; Gamma), by stacking the columns of X."""
     C = np.zeros((4, STATES))
     C[:3, VELOCITY], C[3, ATTITUDE.stop - 1] = np.eye(3), 1.0
-    S = np.kron(np.eye(3, k=1), np.eye(3))  # d/dt (r, r', r'') = S (r, r', r'')
-    outputs = np.zeros((4, 9))
-    outputs[:3, :3] = np.eye(3)
+    S = np.kron(np.eye(CHAIN, k=1), np.eye(3))
+    right = np.zeros((STATES + INPUTS, len(S)))
+    right[STATES : STATES + 3, :3] = np.eye(3)
     M = np.block([[model.A, model.B], [C, np.zeros((4, INPUTS))]])
     E = np.zeros_like(M)
     E[:STATES, :STATES] = np.eye(STATES)
-    # M X - E X S = (0; outputs)
-    size = STATES + INPUTS
-    stacked = np.kron(np.eye(9), M) - np.kron(S.T, E)
-    right = np.concatenate([np.zeros((STATES, 9)), outputs])
-    X = np.linalg.solve(stacked, right.T.reshape(-1)).reshape(9, size).T
+    stacked = np.kron(np.eye(len(S)), M) - np.kron(S.T, E)
+    X = np.linalg.solve(stacked, right.T.reshape(-1)).reshape(len(S), -1).T
     return X[:STATES], X[STATES:]

@@ -46,10 +46,11 @@ def level_trim(parameters: AirframeParameters, airspeed_m_s: float, air: Air) ->
     """
     qbar_S = 0.5 * air.density_kg_m3 * airspeed_m_s**2 * parameters.wing_area_m2
     weight = parameters.mass_kg * STANDARD_GRAVITY_M_S2
-    slope = float(parameters.normal_force[-1] - parameters.normal_force[0]) / float(
-        np.ptp(parameters.angle_of_attack_rad)
-    )
-    guess = np.array([-weight / (qbar_S * slope), 0.0]) if qbar_S > 0.0 else np.zeros(2)
+    if not qbar_S > 0.0:
+        raise DockairError("airspeed_m_s", expected="an airspeed > 0", got=airspeed_m_s)
+    table = parameters.angle_of_attack_rad
+    lift_slope = float(parameters.normal_force[0] - parameters.normal_force[-1]) / float(table[-1] - table[0])
+    guess = np.array([weight / (qbar_S * lift_slope), 0.0])
 
     def imbalance(x: Array) -> Array:
         C = static_coefficients(parameters, float(x[0]), float(x[1]))
@@ -59,7 +60,6 @@ def level_trim(parameters: AirframeParameters, airspeed_m_s: float, air: Air) ->
     alpha, elevator = (float(x) for x in solution.x)
     thrust = weight * np.sin(alpha) - qbar_S * static_coefficients(parameters, alpha, elevator)[0]
     available = thrust_range(parameters, airspeed_m_s, air)
-    table = parameters.angle_of_attack_rad
     inside = (
         np.max(np.abs(imbalance(solution.x))) < 1e-9
         and table[0] < alpha < table[-1]

@@ -2,19 +2,19 @@
 
 A source of spectrum s (W per metre of wavelength) makes, per joule that enters the lens,
 
-    S = Int s(l) T(l) eta(l) l/(h c) dl                            electrons (per J, or per m^2 s for irradiance)     (1)
+    S = Int s(l) T(l) eta(l) l/(h c) dl                            electrons (per J, or per m^2 s for irradiance)  (1)
     T = transmittance x long-pass ramp,  eta = quantum efficiency x fill factor
 
 Point source of intensity I in W/sr at slant range r, angle t off the lens's axis, a = pi (f/2N)^2 its aperture:
 
-    e = S I a cos t / r^2  t_exp             (whole blob)                                                             (2)
-    I = I_0 cos^m psi                        (LED, psi off the LED's axis)                                            (3)
+    e = S I a cos t / r^2  t_exp             (whole blob)                                                        (2)
+    I = I_0 cos^m psi                        (LED, psi off the LED's axis)                                       (3)
     I = E R r1 r2 / 4                        (glint: Sun's irradiance E on a mirror-like convex surface with
-                                              principal radii r1, r2 and reflectance R; any angle of incidence)       (4)
+                                              principal radii r1, r2 and reflectance R; any angle of incidence)  (4)
 
 Extended source of radiance L, per pixel of side p:
 
-    e = S L (pi / 4 N^2) p^2 cos^4 t  t_exp,    L = rho E/pi (Lambertian),  L = E/Omega_sun (Sun's disc)              (5)
+    e = S L (pi / 4 N^2) p^2 cos^4 t  t_exp,    L = rho E/pi (Lambertian),  L = E/Omega_sun (Sun's disc)         (5)
 
 Not modelled: LED temperature, absorption in air (0.5 % in 50 m), change of the filter's edge with incidence.
 Eq. (4) holds for r1, r2 much smaller than the range.
@@ -53,7 +53,8 @@ class CameraParameters:
     converter_bits: int
     clock_hz: float
     outputs: int
-    overhead_slots: float
+    row_clocks: float
+    overhead_setting: float
     transfer_s: float
     veiling_glare: float
     veiling_decay_rad: float
@@ -82,7 +83,6 @@ class LightParameters:
     air_transmittance: float
     sun_angular_radius_rad: float
     glint_reflectance: float
-    glint_bow_radius_m: float
     glint_grazing_rad: float
 
 
@@ -120,9 +120,7 @@ def sun_detection(parameters: CameraParameters, light: LightParameters) -> float
     return light.air_transmittance * float(np.trapezoid(irradiance * detection(parameters, wavelength), wavelength))
 
 
-def responses(
-    parameters: CameraParameters, leds: LedParameters, light: LightParameters, camera: Camera
-) -> Responses:
+def responses(parameters: CameraParameters, leds: LedParameters, light: LightParameters, camera: Camera) -> Responses:
     """Return the constant factors of Eqs. (2) to (5) for one camera and one exposure."""
     aperture = np.pi * (camera.focal_length_m / (2.0 * parameters.f_number)) ** 2
     pixel = np.pi / (4.0 * parameters.f_number**2) * camera.pixel_pitch_m**2 * parameters.exposure_s

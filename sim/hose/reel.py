@@ -1,12 +1,13 @@
 """The reel: holds a tension, within limits of speed and stroke; and the tube that leads the hose inside the pod.
 
     tau dF/dt = T_s + k (T_s - T) - F                                                                    (1)
-    F_hose    = F g(v) + F_b b(v) - d v                                                                  (2)
+    F_hose    = F g(v) + F_b b(v) - d v + max(0, F_0 - k_s q - d_s v)                                    (2)
 
 F is the motor's pull on the hose (positive winds in), T the hose's tension at the exit, T_s the set-point, a fraction
 of the static tension at full trail. g falls from 1 to 0 as the winding speed v comes within a band of the take-up
-limit; b rises from 0 to 1 beyond the pay-out limit: a brake. With T_s below the static tension the hose rests on its
-outer stop and runs out again by itself after the receiver has left; with T_s equal to it, it would not.
+limit; b rises from 0 to 1 beyond the pay-out limit: a brake. The last term is the outer stop's buffer, with F_0 such
+that the hose rests on it at q = 0, its full trail. With T_s below the static tension the hose does rest there, and
+runs out again by itself after the receiver has left; with T_s equal to it, it would not.
 
 Inside the pod the hose lies straight in a tube. A link that is half drawn in, a length s of its l, must turn the hose
 at the exit and not at its own front joint: with the outer hose at an angle theta to the pod's axis, its own angle has
@@ -44,6 +45,9 @@ class ReelParameters:
     brake_force_n: float
     drum_mass_kg: float
     drum_damping_n_s_m: float
+    buffer_stiffness_n_m: float
+    buffer_damping_n_s_m: float
+    buffer_travel_m: float
     stop_time_constant_s: float
     guide_stiffness_n_m: float
     guide_damping_ratio: float
@@ -63,19 +67,23 @@ class Reel:
         self.set_point_n = parameters.set_point_fraction * static_root_tension_n
         self._blend = 1.0 - np.exp(-step_s / parameters.response_time_s)
         self.motor_force_n = self._wanted(static_root_tension_n)
+        self._buffer_preload_n = static_root_tension_n - self.motor_force_n
 
-    def step(self, tension_n: float, rate_m_s: float) -> float:
+    def step(self, tension_n: float, position_m: float, rate_m_s: float) -> float:
         """Advance by one tick; return the force on the hose [N], positive winds in.
 
         Args:
             tension_n: at the exit.
+            position_m: wound in, 0 at full trail.
             rate_m_s: of winding, positive in.
         """
         p = self._parameters
         self.motor_force_n += self._blend * (self._wanted(tension_n) - self.motor_force_n)  # Eq. (1)
         drive = min(max((p.take_up_speed_m_s - rate_m_s) / p.speed_band_m_s, 0.0), 1.0)
         brake = min(max((-rate_m_s - p.pay_out_speed_m_s) / p.speed_band_m_s, 0.0), 1.0)
-        return self.motor_force_n * drive + p.brake_force_n * brake - p.drum_damping_n_s_m * rate_m_s  # Eq. (2)
+        buffer = self._buffer_preload_n - p.buffer_stiffness_n_m * position_m - p.buffer_damping_n_s_m * rate_m_s
+        motor = self.motor_force_n * drive + p.brake_force_n * brake
+        return motor - p.drum_damping_n_s_m * rate_m_s + max(buffer, 0.0)  # Eq. (2)
 
     def _wanted(self, tension_n: float) -> float:
         """Motor's pull asked for; it cannot push the hose out."""

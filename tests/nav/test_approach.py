@@ -1,4 +1,6 @@
-"""Guidance against a plain plant: a receiver that follows the velocity asked for with a first-order lag."""
+"""Guidance against a plain plant: a receiver that flies the velocity asked for a response time later."""
+
+from collections import deque
 
 import numpy as np
 import pytest
@@ -8,7 +10,7 @@ from dockair.nav.guidance.phases import Phase
 
 RATE_HZ = 100
 DEPTH_M = 0.3  # ring plane to coupling
-LAG_S = 0.6
+DELAY_S = 0.25  # as the flight control answers a command that comes with its rate
 
 
 class Plant:
@@ -17,6 +19,7 @@ class Plant:
     def __init__(self, offset=(4.0, 0.3, -0.2), bias=(0.0, 0.0, 0.0), drogue=lambda t: np.zeros(3), holds=True):
         self.p_WP, self.bias, self.drogue, self.holds = np.zeros(3), np.array(bias), drogue, holds
         self.p_WD0, self.v, self.t, self.latched, self.take_in = np.array(offset), np.zeros(3), 0.0, False, 0.0
+        self.waiting = deque([np.zeros(3)] * round(DELAY_S * RATE_HZ), maxlen=round(DELAY_S * RATE_HZ))
         self.closure_at_contact = self.radial_at_contact = np.nan
 
     @property
@@ -26,7 +29,8 @@ class Plant:
 
     def step(self, command):
         before, dt = self.p_WD - self.p_WP, 1.0 / RATE_HZ
-        self.v += (command.velocity_m_s + self.bias - self.v) * dt / LAG_S + command.acceleration_m_s2 * dt
+        self.v = self.waiting[0] + self.bias
+        self.waiting.append(command.velocity_m_s)
         self.p_WP = self.p_WP + self.v * dt
         self.t += dt
         after = self.p_WD - self.p_WP

@@ -1,5 +1,6 @@
 """The command line: one line for each mistake, exit status, nothing but one object on stdout with --json."""
 
+import errno
 import json
 import os
 import subprocess
@@ -225,6 +226,29 @@ def test_interrupting_a_flight_is_no_traceback(command, flights, monkeypatch):
     status, _, err = command("fly")
     assert status == 130
     assert "Traceback" not in err
+
+
+def test_a_full_disk_is_one_line_and_status_three(command, flights, monkeypatch):
+    def fly(*_, **__):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "out/default-0/episode.rrd")
+
+    monkeypatch.setitem(sys.modules, "dockair.scenarios.loop", SimpleNamespace(fly=fly))
+    status, out, err = command("fly")
+    assert (status, out) == (3, "")
+    assert err == "dockair: out/default-0/episode.rrd: expected room to write, got a full disk\n"
+
+
+@pytest.mark.parametrize("arguments", [["scenarios"], ["scenarios", "--json"], ["--help"]])
+def test_a_reader_that_has_gone_is_no_traceback(arguments):
+    reading, writing = os.pipe()
+    os.close(reading)
+    try:
+        done = subprocess.run(
+            [sys.executable, "-m", "dockair", *arguments], stdout=writing, stderr=subprocess.PIPE, text=True
+        )
+    finally:
+        os.close(writing)
+    assert done.stderr == ""
 
 
 @pytest.mark.parametrize(("identical", "expected_status"), [(True, 0), (False, 1)])

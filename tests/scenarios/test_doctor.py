@@ -63,11 +63,11 @@ def test_another_backend_that_was_chosen_is_named_instead_of_packages(monkeypatc
 
 
 @pytest.mark.parametrize(
-    ("environment", "chosen"),
-    [({}, "egl"), ({"DISPLAY": ""}, "egl"), ({"DISPLAY": ":0"}, None), ({"DISPLAY": ":0", "MUJOCO_GL": "egl"}, "egl")],
+    ("environment", "chosen"), [({}, "egl"), ({"DISPLAY": ":0"}, "egl"), ({"MUJOCO_GL": "glfw"}, "glfw")]
 )
-def test_egl_is_chosen_where_nobody_chose_and_there_is_no_screen(environment, chosen):
-    assert doctor._render_environment(environment).get("MUJOCO_GL") == chosen
+def test_egl_is_chosen_on_linux_where_nobody_chose(monkeypatch, environment, chosen):
+    monkeypatch.setattr(doctor.sys, "platform", "linux")
+    assert doctor._render_environment(environment)["MUJOCO_GL"] == chosen
 
 
 def test_a_machine_is_fit_when_only_what_is_not_needed_is_missing():

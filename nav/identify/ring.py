@@ -1,0 +1,242 @@
+"""Which blobs are the ring, and which LED is which: `FOUND`, `AMBIGUOUS` or `NOT_FOUND`, never a guess.
+
+    candidates ► prior gate ► triples (three-point circles | Hough peaks) ► octagon look-up ► exact fit ► decision
+                                                                                   ellipse ► numbering ◄ roll
+
+`hypotheses` proposes rings, fits them and says how likely each is an accident; it must be less likely than the settings
+allow. Two rings that both pass and are not the same are `AMBIGUOUS`, so is one whose roll prior falls between two
+numberings, and one that may be an accident; no ring of at least four LEDs is `NOT_FOUND`.
+
+The ring looks the same every 45 degrees. With a prior (the roll of LED 0, or where each LED is expected) the LEDs get
+their numbers; without one, LED 0 is the LED nearest to the left (-u) of the centre, and numbers are right up to that
+symmetry. Roll is the angle of LED 0 in the image seen from the centre, from left (0) toward up (pi/2), averaged over
+the LEDs less their 45 degrees each: the drogue's roll for a ring without tilt.
+
+Cost is bounded: at most `max_candidates` (nearest to the prior, else the brightest, else the first), all their triples,
+`max_fits` exact fits.
+"""
+
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dockair.calibration import Camera
+from dockair.errors import DockairError
+from dockair.nav.identify.ellipse import MIN_POINTS, Ellipse, fit_ellipse, places_on_circle
+from dockair.nav.identify.hypotheses import METHODS, MIN_LEDS, IdentifySettings, ScoredFit, ring_fits
+from dockair.nav.identify.perspective import SLOTS, RingFit
+from dockair.nav.identify.prior import RingPrior, make_prior, ring_from_leds
+from dockair.rotations import Array
+
+
+class IdentificationStatus(Enum):
+    """Outcome of an identification."""
+
+    FOUND = "found"
+    AMBIGUOUS = "ambiguous"  #: several rings, or a ring whose numbers the roll prior cannot settle
+    NOT_FOUND = "not found"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Identification:
+    """The ring among the candidates. Without a ring `members` is empty and positions are NaN."""
+
+    status: IdentificationStatus
+    members: NDArray[np.int64]  #: (m,) indices of the LEDs among the candidates
+    led_numbers: NDArray[np.int64]  #: (m,) 0-7, see the module; -1 when AMBIGUOUS
+    centre_px: Array  #: (2,) image of the ring's centre (not the ellipse's centre)
+    radius_px: float  #: the radius a frontal ring would have at the centre's depth
+    roll_rad: float  #: of LED 0 in the image; NaN when AMBIGUOUS
+    led_pixels_px: Array  #: (8, 2) where each numbered LED is or, hidden, should be
+    ellipse: Ellipse | None
+    rms_px: float  #: of the fit's residuals
+
+
+def _nothing(status: IdentificationStatus) -> Identification:
+    empty = np.empty(0, np.int64)
+    return Identification(
+        status=status, members=empty, led_numbers=empty, centre_px=np.full(2, np.nan), radius_px=np.nan,
+        roll_rad=np.nan, led_pixels_px=np.full((SLOTS, 2), np.nan), ellipse=None, rms_px=np.nan,
+    )  # fmt: skip
+
+
+def identify(
+    centroids_px: Array,
+    method: str = "three_point",
+    settings: IdentifySettings | None = None,
+    *,
+    camera: Camera | None = None,
+    sigma_px: float | None = None,
+    brightness: Array | None = None,
+    expected_centre_px: Array | None = None,
+    expected_radius_px: float | None = None,
+    expected_roll_rad: float | None = None,
+    expected_led_px: Array | None = None,
+    expected_sigma_px: float | None = None,
+) -> Identification:
+    """Find the ring among candidates and number its LEDs.
+
+    Args:
+        centroids_px: (n, 2) candidates (u, v), full-frame pixels; rows that are not finite are passed over.
+        method: "three_point" or "circle_hough".
+        settings: None for the defaults.
+        camera: for its focal length, principal point and distortion; None for the default one.
+        sigma_px: of a candidate's coordinate, in place of the settings'.
+        brightness: (n,) any measure; decides who stays when there are too many candidates and no prior.
+        expected_centre_px: (2,) where the ring's centre should be.
+        expected_radius_px: what its radius should be.
+        expected_roll_rad: what its roll should be, as the module defines it.
+        expected_led_px: (8, 2) where each LED should be; stands for the three above where they are not given.
+        expected_sigma_px: standard deviation of the expected centre.
+
+    Raises:
+        DockairError: unknown method, wrong shapes.
+    """
+    settings = settings or IdentifySettings()
+    camera = camera or Camera()
+    if method not in METHODS:
+        raise DockairError("identify.method", expected="a method", got=method, exists=METHODS)
+    points = np.asarray(centroids_px, dtype=float)
+    if points.ndim != 2 or points.shape[1] != 2:
+        raise DockairError("identify.centroids_px", expected="an array of shape (n, 2)", got=points.shape)
+    prior = make_prior(
+        settings.radius_range_px, settings.centre_tolerance_radii, settings.radius_tolerance,
+        expected_centre_px, expected_radius_px, expected_roll_rad, expected_led_px, expected_sigma_px,
+    )  # fmt: skip
+    index = _candidates(points, prior, brightness, settings.max_candidates)
+    if len(index) < MIN_LEDS:
+        return _nothing(IdentificationStatus.NOT_FOUND)
+    chosen = _undistorted(points[index], camera)
+    sigma = settings.sigma_px if sigma_px is None else sigma_px
+    status, fit = IdentificationStatus.NOT_FOUND, None
+    if prior.prediction_px is not None:
+        tight = prior.tightened(settings.predicted_radius_tolerance, settings.predicted_roll_tolerance_rad)
+        fits = ring_fits(chosen, method, tight, camera, sigma, settings)
+        shape = settings.predicted_shape_tolerance * tight.expected_radius_px + settings.predicted_shape_sigmas * sigma
+        fits = [one for one in fits if _shape_error(chosen, one.fit, tight) <= shape]
+        status, fit = _decide(fits, tight, settings.max_false_rings_predicted, settings)
+    if fit is None:
+        limit = settings.max_false_rings_with_prior if prior.has_centre else settings.max_false_rings
+        status, fit = _decide(ring_fits(chosen, method, prior, camera, sigma, settings), prior, limit, settings)
+    if fit is None:
+        return _nothing(status)
+    return _numbered(chosen, index, fit, prior, camera, settings)
+
+
+def _undistorted(points: Array, camera: Camera) -> Array:
+    """Pixels of the same camera without distortion."""
+    if camera.distortion is None:
+        return points
+    rays = camera.rays_from_pixels(points)
+    return -camera.focal_length_px * rays[:, 1:] / rays[:, :1] + np.array(camera.principal_point_px)
+
+
+def _candidates(points: Array, prior: RingPrior, brightness: Array | None, most: int) -> NDArray[np.int64]:
+    """Indices of the candidates that take part."""
+    index = np.flatnonzero(np.isfinite(points).all(axis=1))
+    if prior.has_centre:
+        # perspective makes the near side of a ring larger, by at most a tenth beyond 2 m
+        reach = prior.gate[2] + 1.15 * prior.radius_range_px[1]
+        distance = np.hypot(*(points[index] - prior.centre_px).T)
+        index, distance = index[distance <= reach], distance[distance <= reach]
+        rank = np.abs(distance - prior.expected_radius_px)
+    else:
+        rank = np.zeros(len(index)) if brightness is None else -np.asarray(brightness, dtype=float)[index]
+    return np.sort(index[np.argsort(rank, kind="stable")[:most]])
+
+
+def _decide(
+    fits: list[ScoredFit], prior: RingPrior, most_false_rings: float, settings: IdentifySettings
+) -> tuple[IdentificationStatus, RingFit | None]:
+    """The one ring that is no accident, if there is one."""
+    expected = [one for one in fits if _is_expected(one.fit, prior)]
+    if not expected:
+        return IdentificationStatus.NOT_FOUND, None
+    credible = [one.fit for one in expected if one.log10_false_rings <= np.log10(most_false_rings)]
+    # a ring whose roll is as expected beats one whose roll is not; if there is none, `_numbered` says AMBIGUOUS
+    rightly_rolled = [fit for fit in credible if _roll(fit, prior)[1] <= settings.roll_tolerance_rad]
+    credible = rightly_rolled or credible
+    if not credible:
+        return IdentificationStatus.AMBIGUOUS, None
+    best = credible[0]
+    mine = set(best.candidate[best.candidate >= 0].tolist())
+    for rival in credible[1:]:
+        theirs = set(rival.candidate[rival.candidate >= 0].tolist())
+        # fewer LEDs, most of them the same: this ring seen less well. Anything else is another ring.
+        if len(theirs) >= len(mine) or len(theirs & mine) < 3:
+            return IdentificationStatus.AMBIGUOUS, None
+    return IdentificationStatus.FOUND, best
+
+
+def _is_expected(fit: RingFit, prior: RingPrior) -> bool:
+    """Whether a fitted ring lies where, and is as large as, the prior says."""
+    inside = not prior.has_centre or np.hypot(*(fit.centre_px - prior.centre_px)) <= prior.centre_tolerance_px
+    return bool(inside and prior.radius_range_px[0] <= fit.radius_px <= prior.radius_range_px[1])
+
+
+def _shape_error(points: Array, fit: RingFit, prior: RingPrior) -> float:
+    """How far [px] the LEDs depart from a prediction's shape."""
+    filled = np.flatnonzero(fit.candidate >= 0)
+    return prior.shape_error_px(points[fit.candidate[filled]], (filled - _roll(fit, prior)[0]) % SLOTS)
+
+
+def _roll(fit: RingFit, prior: RingPrior) -> tuple[int, float]:
+    """Slot of LED 0, and how far [rad] the roll then is from the expected one (0 when none is expected)."""
+    spacing = 2.0 * np.pi / SLOTS
+    wanted = 0.0 if np.isnan(prior.roll_rad) else prior.roll_rad
+    turns = (wanted - ring_from_leds(fit.slots_px)[2]) / spacing
+    slot = int(np.round(turns))
+    return slot, 0.0 if np.isnan(prior.roll_rad) else abs(turns - slot) * spacing
+
+
+def _numbered(
+    points: Array,
+    index: NDArray[np.int64],
+    fit: RingFit,
+    prior: RingPrior,
+    camera: Camera,
+    settings: IdentifySettings,
+) -> Identification:
+    """Numbers for the LEDs of a fit, from the roll prior or the convention, checked on the ellipse's circle."""
+    filled = np.flatnonzero(fit.candidate >= 0)
+    members = fit.candidate[filled]
+    # with five LEDs on a short arc the ellipse is loose; the fit's own eight places always make one
+    ellipse = fit_ellipse(points[members]) if len(members) > MIN_POINTS else fit_ellipse(fit.slots_px)
+    slot_of_led_0, roll_error = _roll(fit, prior)
+    certain = roll_error <= settings.roll_tolerance_rad and _ellipse_agrees(points[members], filled, ellipse)
+    numbers = (filled - slot_of_led_0) % SLOTS
+    order = np.argsort(numbers)
+    led_pixels = np.roll(fit.slots_px, -slot_of_led_0, axis=0)
+    roll = ring_from_leds(led_pixels)[2]
+    if camera.distortion is not None:
+        led_pixels = camera.pixels_from_points(_rays(led_pixels, camera))
+        centre = camera.pixels_from_points(_rays(fit.centre_px[None], camera))[0]
+    else:
+        centre = fit.centre_px
+    return Identification(
+        status=IdentificationStatus.FOUND if certain else IdentificationStatus.AMBIGUOUS,
+        members=index[members[order]],
+        led_numbers=numbers[order] if certain else np.full(len(numbers), -1),
+        centre_px=centre,
+        radius_px=fit.radius_px,
+        roll_rad=roll if certain else np.nan,
+        led_pixels_px=led_pixels if certain else np.full((SLOTS, 2), np.nan),
+        ellipse=ellipse,
+        rms_px=fit.rms_px,
+    )
+
+
+def _rays(pixels: Array, camera: Camera) -> Array:
+    """(n, 3) points at depth 1 of a camera without distortion."""
+    ab = (pixels - np.array(camera.principal_point_px)) / camera.focal_length_px
+    return np.column_stack([np.ones(len(ab)), -ab])
+
+
+def _ellipse_agrees(points: Array, slots: NDArray[np.int64], ellipse: Ellipse | None) -> bool:
+    """Whether the places on the ellipse's circle have the same order and gaps as the fit's slots."""
+    if ellipse is None:
+        return False
+    places = places_on_circle(ellipse.to_circle(points), SLOTS).slot
+    return bool(((places - slots) % SLOTS == (places[0] - slots[0]) % SLOTS).all())

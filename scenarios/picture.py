@@ -1,0 +1,177 @@
+"""One small picture of a flight, from the files it wrote: the approach from the side, a frame, the time histories."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow.parquet as pq
+
+from dockair.errors import DockairError
+from dockair.rotations import Array
+from dockair.scenarios import flight_log, message_log
+
+FILE_NAME = "flight.png"
+FRAME_AT_M = 1.5  # the frame shown is the one with most LEDs named when the ring is about this far ahead of the tip
+_SIZE_IN, _DPI = (11.0, 6.2), 110
+_TRUTH, _BELIEF, _FOUND, _GREY = "#1f77b4", "#ff7f0e", "#34c759", "#9a9a9a"
+_PHASE_COLOURS = {
+    "pre_contact": "#dfe7ee",
+    "approach": "#cfe3f7",
+    "contact": "#cdeccf",
+    "hold": "#b5e2ba",
+    "disconnect": "#ece3f4",
+    "breakaway": "#f6d5d2",
+}
+
+
+def picture_of_flight(out_dir: str | Path) -> Path:
+    """Draw `flight.png` into a flight's folder and return its path.
+
+    Raises:
+        DockairError: there is no flight in the folder.
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    folder = Path(out_dir)
+    path = folder / flight_log.FILE_NAME
+    if not path.is_file():
+        raise DockairError(str(path), expected="a flight's log", got="no such file")
+    flight = pq.read_table(path)
+    frame = _chosen_frame(folder, flight)
+    figure = Figure(figsize=_SIZE_IN, dpi=_DPI, layout="constrained")
+    FigureCanvasAgg(figure)
+    rows = figure.add_gridspec(2, 1, height_ratios=[0.85, 1.0])
+    _draw_side_view(figure.add_subplot(rows[0]), flight)
+    below = rows[1].subgridspec(2, 2 if frame is not None else 1, width_ratios=[0.8, 2] if frame is not None else [1])
+    if frame is not None:
+        _draw_frame(figure.add_subplot(below[:, 0]), *frame)
+    upper = figure.add_subplot(below[0, -1])
+    _draw_approach(upper, flight)
+    _draw_errors(figure.add_subplot(below[1, -1], sharex=upper), flight)
+    figure.savefig(folder / FILE_NAME)
+    return folder / FILE_NAME
+
+
+def _values(flight: Any, name: str) -> Array:
+    return np.asarray(flight[name].to_numpy(zero_copy_only=False))
+
+
+def _points(flight: Any, name: str, unit: str = "m") -> Array:
+    return np.column_stack([_values(flight, f"{name}_{axis}_{unit}") for axis in "xyz"])
+
+
+def _draw_side_view(axes: Any, flight: Any) -> None:
+    tip, drogue = _points(flight, "truth_p_WP"), _points(flight, "truth_p_WD")
+    held = np.flatnonzero(_values(flight, "truth_latched"))
+    moment = int(held[0]) if len(held) else int(np.argmin(np.linalg.norm(tip - drogue, axis=1)))
+    hose = np.array(flight["truth_p_WH_m"][moment].as_py()).reshape(-1, 3)
+    phases = flight["nav_phase"].to_pylist()
+    axes.plot(hose[:, 0], hose[:, 2], color="#3a3a3a", lw=2.5, label="hose")
+    axes.plot(drogue[:, 0], drogue[:, 2], color=_GREY, lw=0.8, label="drogue's path")
+    axes.plot(*drogue[moment, [0, 2]], marker="o", ms=8, mfc="none", mec="#3a3a3a", mew=2.0, ls="none")
+    before = np.arange(moment + 1)
+    axes.plot(tip[before, 0], tip[before, 2], color=_TRUTH, lw=1.6, label="probe's tip, to contact")
+    axes.plot(tip[moment:, 0], tip[moment:, 2], color=_TRUTH, lw=0.8, alpha=0.5, label="and after")
+    axes.plot(*tip[0, [0, 2]], marker="o", ms=4, color=_TRUTH, ls="none")
+    words = "contact" if len(held) else f"nearest, {phases[moment].replace('_', ' ')}"
+    time_s = _values(flight, "time_s")[moment]
+    axes.annotate(
+        f"{words} at {time_s:.1f} s", tip[moment, [0, 2]], xytext=(0, -34), textcoords="offset points", ha="center",
+        fontsize=9, arrowprops={"arrowstyle": "-", "color": _GREY},
+    )  # fmt: skip
+    axes.annotate("pod", (0.0, 0.0), xytext=(4, 4), textcoords="offset points", fontsize=9)
+    axes.set(xlabel="forward of the pod [m]", ylabel="up [m]", title="From the left side, tanker's axes")
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.legend(loc="upper left", fontsize=8, frameon=False)
+
+
+def _chosen_frame(folder: Path, flight: Any) -> tuple[Any, tuple[int, int], Any, Any, float] | None:
+    """Return pixels, (left column, top row), named LEDs and candidates [px] and range [m] of the frame to show."""
+    if not (folder / message_log.MESSAGES).is_file():
+        return None
+    ahead, named = _values(flight, "nav_p_PD_B_x_m"), _values(flight, "nav_leds_named")
+    stamps = _values(flight, "nav_frame_time_stamp_s")
+    fresh = np.flatnonzero(np.diff(stamps, prepend=np.nan) > 0.0)
+    if len(fresh) == 0:
+        return None
+    chosen = int(fresh[np.argmin(np.abs(ahead[fresh] - FRAME_AT_M) + 10.0 * (8 - named[fresh]))])
+    messages = message_log.read_messages(folder, pixels=False)
+    tick = next(tick for k, tick in enumerate(messages) if k == chosen)
+    estimate = next(row for k, row in enumerate(message_log.read_estimates(folder)) if k == chosen)
+    if tick.frame is None or tick.png is None:
+        return None
+    leds, candidates = (np.asarray(estimate[name]).reshape(-1, 2) for name in ("led_pixels_px", "candidates_px"))
+    corner = tick.frame.window.column_start, tick.frame.window.row_start
+    return message_log.pixels_from_png(tick.png), corner, leds, candidates, float(ahead[chosen])
+
+
+def _draw_frame(
+    axes: Any, pixels: Array, corner: tuple[int, int], leds: Array, candidates: Array, ahead_m: float
+) -> None:
+    left, top = corner
+    rows, columns = pixels.shape
+    extent = (left - 0.5, left + columns - 0.5, top + rows - 0.5, top - 0.5)
+    axes.imshow(np.sqrt(pixels / 255.0), cmap="gray", extent=extent, vmin=0.0, vmax=1.0, interpolation="nearest")
+    axes.scatter(*candidates.T, s=70, facecolors="none", edgecolors="#ffd60a", linewidths=0.8)
+    centre = np.nanmean(leds, axis=0) if np.isfinite(leds).any() else np.zeros(2)
+    for number, led in enumerate(leds):
+        if np.isfinite(led).all():
+            u, v = led + 0.16 * (centre - led)
+            axes.text(u, v, str(number), color=_FOUND, fontsize=9, ha="center", va="center")
+    axes.set(xlabel="u [px]", ylabel="v [px]", title=f"Near-infrared frame, {ahead_m:.1f} m to go")
+    axes.set_xlim(extent[0], extent[1])
+    axes.set_ylim(extent[2], extent[3])
+    axes.tick_params(labelsize=8)
+
+
+def _shade_phases(axes: Any, flight: Any, *, named: bool) -> None:
+    time_s, phases = _values(flight, "time_s"), flight["nav_phase"].to_pylist()
+    begins = [k for k, phase in enumerate(phases) if k == 0 or phase != phases[k - 1]]
+    for begin, end in zip(begins, [*begins[1:], len(phases) - 1], strict=True):
+        axes.axvspan(time_s[begin], time_s[end], color=_PHASE_COLOURS.get(phases[begin], "white"), lw=0.0, zorder=0)
+        if named and time_s[end] - time_s[begin] > 0.07 * time_s[-1]:
+            middle = 0.5 * (time_s[begin] + time_s[end])
+            label = phases[begin].replace("_", "-")
+            axes.text(middle, 0.98, label, transform=axes.get_xaxis_transform(), fontsize=8, ha="center", va="top")
+    axes.set_xlim(time_s[0], time_s[-1])
+
+
+def _legend_beside(axes: Any) -> None:
+    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8, frameon=False)
+
+
+def _draw_approach(axes: Any, flight: Any) -> None:
+    time_s = _values(flight, "time_s")
+    _shade_phases(axes, flight, named=True)
+    axes.plot(time_s, _values(flight, "truth_p_PD_B_x_m"), color=_TRUTH, lw=1.4, label="ring ahead of\nthe tip [m]")
+    across = np.hypot(_values(flight, "truth_p_PD_B_y_m"), _values(flight, "truth_p_PD_B_z_m"))
+    axes.plot(time_s, across, color="#8e44ad", lw=1.2, label="ring off the\nprobe's line [m]")
+    axes.plot(time_s, -_values(flight, "truth_v_PD_B_x_m_s"), color="#2e8b57", lw=1.2, label="closing speed\n[m/s]")
+    axes.axhline(0.0, color=_GREY, lw=0.6)
+    _legend_beside(axes)
+    low, high = axes.get_ylim()
+    axes.set_ylim(low, high + 0.18 * (high - low))  # room for the phases' names
+    axes.tick_params(labelbottom=False, labelsize=8)
+
+
+def _draw_errors(axes: Any, flight: Any) -> None:
+    time_s = _values(flight, "time_s")
+    _shade_phases(axes, flight, named=False)
+    valid = _values(flight, "nav_valid").astype(bool)
+    sizes = []
+    for axis, colour, label in (("x", _BELIEF, "along"), ("y", _TRUTH, "left"), ("z", "#8e44ad", "up")):
+        error_mm = 1e3 * (_values(flight, f"nav_p_PD_B_{axis}_m") - _values(flight, f"truth_p_PD_B_{axis}_m"))
+        error_mm = np.where(valid, error_mm, np.nan)
+        sizes.append(error_mm)
+        axes.plot(time_s, error_mm, color=colour, lw=0.9, label=label)
+    sigma_mm = 3e3 * _values(flight, "nav_sigma_p_PD_B_x_m")
+    axes.plot(time_s, sigma_mm, color=_BELIEF, lw=0.7, ls=":", label="3 sigma, along")
+    axes.plot(time_s, -sigma_mm, color=_BELIEF, lw=0.7, ls=":")
+    finite = np.abs(np.concatenate(sizes))[np.isfinite(np.concatenate(sizes))]
+    limit = 1.6 * float(np.percentile(finite, 99.0)) if len(finite) else 1.0
+    axes.set_ylim(-max(limit, 1.0), max(limit, 1.0))
+    axes.set(xlabel="time [s]")
+    axes.set_ylabel("belief - truth [mm]", fontsize=9)
+    _legend_beside(axes)
+    axes.tick_params(labelsize=8)

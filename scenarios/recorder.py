@@ -1,0 +1,126 @@
+"""Everything that is kept of a flight, behind one object: the loop appends control ticks and asks for the result."""
+
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Self
+
+from dockair.errors import DockairError
+from dockair.scenarios.flight_log import FlightLog
+from dockair.scenarios.message_log import MessageLog, read_messages
+from dockair.scenarios.metrics import Result, summarise
+from dockair.scenarios.referee import Outcome
+
+if TYPE_CHECKING:  # the loop imports this module
+    from dockair.scenarios.loop import Flight, Tick
+
+RECORD = ("full", "window", "none")
+
+
+class Recorder:
+    """Keeps a flight in memory, and its messages on disk while it goes on; use it in a `with` statement.
+
+    Args:
+        flight: that is about to begin.
+        out: folder that takes the files; None keeps only what the result needs.
+        record: "window" or "full" keep the frames as they were delivered, "none" keeps no messages.
+
+    Raises:
+        DockairError: `record` is none of these.
+    """
+
+    def __init__(self, flight: "Flight", out: str | Path | None, record: str) -> None:
+        if record not in RECORD:
+            raise DockairError("record", expected="what to keep of the frames", got=record, exists=RECORD)
+        self._folder = None if out is None else Path(out)
+        self._log = FlightLog()
+        self._messages: MessageLog | None = None
+        if self._folder is not None:
+            self._folder.mkdir(parents=True, exist_ok=True)
+            if record != "none" and flight.recipe is not None:
+                self._messages = MessageLog(self._folder, flight.recipe)
+
+    def append(self, tick: "Tick") -> None:
+        """Take one control tick."""
+        self._log.append(tick.truth, tick.imu, tick.frame, tick.solution)
+        if self._messages is not None:
+            self._messages.append(tick.imu, tick.frame, tick.solution)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        if self._messages is not None:
+            self._messages.close()
+
+    def finish(self, flight: "Flight", outcome: Outcome, seed: int, wall_time_s: float) -> Result:
+        """Return the result; with a folder, write result.json, flight.parquet, episode.rrd and flight.png there.
+
+        Args:
+            flight: that is over.
+            outcome: of the referee.
+            seed: that was flown.
+            wall_time_s: that the flight took, without what is written here.
+        """
+        log = self._log
+        result = summarise(
+            scenario=flight.scenario.name,
+            seed=seed,
+            outcome=outcome.value,
+            contact=flight.referee.contact,
+            collided_with=flight.referee.collided_with,
+            truths=log.truths,
+            solutions=log.solutions,
+            frames=log.frames,
+            mounting=flight.sheets.mounting,
+            truth_navigation=flight.scenario.navigation.is_truth,
+            wall_time_s=wall_time_s,
+            out_dir=self._folder,
+        )
+        if self._folder is not None:
+            self._write(flight, result, self._folder)
+        return result
+
+    def _write(self, flight: "Flight", result: Result, folder: Path) -> None:
+        from dockair.scenarios.picture import picture_of_flight
+        from dockair.scenarios.recording import write_episode
+        from dockair.sim.shapes import shapes_of
+
+        result.write(folder)
+        self._log.write_parquet(folder)
+        write_episode(
+            folder,
+            self._log,
+            flight.sheets,
+            name=f"{result.scenario}-{result.seed}",
+            shapes=shapes_of(flight.world.model),
+            messages=read_messages(folder, pixels=False) if self._messages is not None else (),
+            summary=summary_of(result),
+        )
+        picture_of_flight(folder)
+
+
+def summary_of(result: Result) -> str:
+    """Return a result as a Markdown table."""
+    rows: list[tuple[str, object]] = [("seed", result.seed), ("attempts", result.attempts)]
+    if result.truth_navigation:
+        rows.append(("navigation", "perfect: the truth in place of the camera"))
+    if result.contact is not None:
+        contact = result.contact
+        rows += [
+            ("contact after", f"{contact.time_s:.2f} s"),
+            ("off the basket's centre", f"{contact.radial_offset_m:.3f} m"),
+            ("closing speed", f"{contact.closure_speed_m_s:.2f} m/s"),
+            ("probe against drogue axis", f"{contact.angle_deg:.1f} deg"),
+        ]
+    if result.hold is not None:
+        rows += [("held for", f"{result.hold.duration_s:.1f} s"), ("taken in", f"{result.hold.take_in_max_m:.2f} m")]
+    rows += [
+        ("range error (RMS)", f"{1e3 * result.nav.range_rmse_m:.1f} mm"),
+        ("lateral error (RMS)", f"{1e3 * result.nav.lateral_rmse_m:.1f} mm"),
+        ("mean NEES (of 9)", f"{result.nav.nees_mean:.1f}"),
+        ("frames used", f"{result.nav.frames_used} of {result.frames}"),
+    ]
+    lines = [f"# {result.outcome.replace('_', ' ')}", "", f"{result.scenario}", "", "| | |", "|---|---|"]
+    return "\n".join(lines + [f"| {label} | {value} |" for label, value in rows])

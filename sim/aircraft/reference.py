@@ -1,0 +1,73 @@
+"""From a commanded increment of velocity to one that an aircraft can fly: smooth, with limited acceleration and jerk.
+
+The command (u, a), velocity and acceleration in body axes, is turned into the axes of W. With the second-order low
+pass F = w^2 / (s^2 + 2 zeta w s + w^2) the reference velocity r follows, in each axis,
+
+    r' = F(d),     d = sat(a + k (F(u) - r)),     |d| <= a_max,     |r''| <= j_max                    (1)
+
+A command whose a is the rate of its own u comes out as r = F(u), without overshoot; one without a as a step response
+of bandwidth k. r and its first three derivatives are known exactly and are what the regulator steers along.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from dockair.messages import ReceiverCommand
+from dockair.rotations import Array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ReferenceLimits:
+    """Constants of Eq. (1); axes forward, left, up."""
+
+    gain_1_s: Array  #: (3,) k
+    bandwidth_rad_s: float  #: w
+    damping: float  #: zeta
+    acceleration_m_s2: Array  #: (3,) a_max
+    jerk_m_s3: Array  #: (3,) j_max
+    velocity_m_s: float  #: a longer u is shortened to this
+
+
+class Reference:
+    """Eq. (1), one tick at a time."""
+
+    def __init__(self, limits: ReferenceLimits, step_s: float) -> None:
+        self._velocity_limit = limits.velocity_m_s
+        self._constants = np.vstack([limits.gain_1_s, limits.acceleration_m_s2, limits.jerk_m_s3])
+        self._bandwidth, self._damping, self._step_s = limits.bandwidth_rad_s, limits.damping, step_s
+        self._smooth = np.zeros((2, 3))  # F(u) and its rate
+        self.chain: Array = np.zeros((4, 3))  #: r and its first three derivatives (rows), W axes [m/s, m/s^2, ...]
+
+    def start(self, velocity_W: Array, R_WB: Array, command: ReceiverCommand) -> None:
+        """Start from a velocity (3,) beyond trim, at rest with a command."""
+        self._smooth[:], self.chain[:] = 0.0, 0.0
+        self._smooth[0] = R_WB @ self._shortened(command.velocity_m_s)
+        self.chain[0] = velocity_W
+
+    def step(self, R_WB: Array, command: ReceiverCommand) -> Array:
+        """(4, 3) the chain, advanced by one tick under a command that is in the axes of R_WB (3, 3)."""
+        u_W, a_W = R_WB @ self._shortened(command.velocity_m_s), R_WB @ command.acceleration_m_s2
+        _advance(self.chain, self._smooth, u_W, a_W, self._constants, self._bandwidth, self._damping, self._step_s)
+        return self.chain
+
+    def _shortened(self, u: Array) -> Array:
+        size = float(np.sqrt(u @ u))
+        return u if size <= self._velocity_limit else u * (self._velocity_limit / size)
+
+
+@njit(cache=True)
+def _advance(chain, smooth, u, a, constants, w, zeta, step):  # type: ignore[no-untyped-def]
+    """Eq. (1) over one tick, in place."""
+    for i in range(3):
+        k, a_max, jerk_max = constants[0, i], constants[1, i], constants[2, i]
+        smooth[1, i] += step * (w * w * (u[i] - smooth[0, i]) - 2.0 * zeta * w * smooth[1, i])
+        smooth[0, i] += step * smooth[1, i]
+        d = min(max(a[i] + k * (smooth[0, i] - chain[0, i]), -a_max), a_max)
+        snap = w * w * (d - chain[1, i]) - 2.0 * zeta * w * chain[2, i]
+        jerk = min(max(chain[2, i] + step * snap, -jerk_max), jerk_max)
+        chain[3, i] = (jerk - chain[2, i]) / step
+        chain[2, i] = jerk
+        chain[1, i] += step * jerk
+        chain[0, i] += step * chain[1, i]

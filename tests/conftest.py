@@ -1,0 +1,95 @@
+"""A world with a receiver on rails, for tests that are not about the receiver's flying."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dockair.calibration import Mounting
+from dockair.clock import Clock
+from dockair.messages import ReceiverCommand
+from dockair.parameters import load_parameters
+from dockair.rotations import Array
+from dockair.sim.air.atmosphere import standard_atmosphere
+from dockair.sim.hose.chain import DrogueParameters, HoseParameters
+from dockair.sim.hose.coupling import CouplingParameters
+from dockair.sim.hose.reel import ReelParameters
+from dockair.sim.outlines import TankerParameters
+from dockair.sim.world import World, WorldParameters, WorldStart
+
+SHEETS: dict[str, type[Any]] = {
+    "hose": HoseParameters,
+    "drogue": DrogueParameters,
+    "reel": ReelParameters,
+    "coupling": CouplingParameters,
+    "tanker": TankerParameters,
+}
+
+
+@dataclass
+class ReceiverOnRails:
+    """Takes up the commanded velocity within 17 ms and does not turn, whatever pushes it; no air."""
+
+    mass_kg: float = 9300.0
+    inertia_B: Array = field(
+        default_factory=lambda: np.array([[12874.0, 0.0, 1331.0], [0.0, 75674.0, 0.0], [1331.0, 0.0, 85552.0]])
+    )
+    trim_R_WB: Array = field(default_factory=lambda: np.eye(3))
+    airspeed_m_s: float = 180.0
+    angle_of_attack_rad: float = 0.0
+    sideslip_rad: float = 0.0
+    throttle: float = 0.5
+    gain_1_s: float = 60.0
+    force_W: Array = field(default_factory=lambda: np.zeros(3))  #: last force returned
+
+    def step(
+        self,
+        *,
+        R_WB: Array,
+        v_WB: Array,
+        w_WB_B: Array,
+        air_velocity_W: Array,
+        specific_force_B: Array,
+        command: ReceiverCommand,
+    ) -> tuple[Array, Array]:
+        self.specific_force_B, self.air_velocity_W = specific_force_B, air_velocity_W
+        self.force_W = self.mass_kg * (
+            np.array([0.0, 0.0, 9.80665]) + self.gain_1_s * (command.velocity_m_s - v_WB)
+        )
+        return self.force_W, R_WB @ (self.inertia_B @ (-self.gain_1_s * w_WB_B))
+
+
+def make_world(
+    *,
+    receiver: Any = None,
+    gusts: Any = None,
+    airspeed_m_s: float = 180.0,
+    altitude_m: float = 6000.0,
+    p_PD_B: tuple[float, float, float] = (4.0, 0.0, 0.0),
+    settle_s: float = 0.0,
+    rate_hz: int = 1000,
+    **overrides: dict[str, float],
+) -> World:
+    """A world from the sheets; `overrides` by sheet."""
+    sheets = {name: load_parameters(name, cls, overrides.get(name)) for name, cls in SHEETS.items()}
+    parameters = WorldParameters(
+        **sheets,
+        mounting=Mounting(R_BC=np.eye(3), p_BC=np.array([3.3, -0.45, 0.75]), p_BP=np.array([6.0, -0.9, 0.6])),
+        air=standard_atmosphere(altitude_m),
+        airspeed_m_s=airspeed_m_s,
+        sun_direction_W=np.array([0.0, 0.0, 1.0]),
+    )
+    start = WorldStart(p_PD_B=np.array(p_PD_B), settle_s=settle_s)
+    return World(parameters, receiver or ReceiverOnRails(), gusts, start, Clock(rate_hz))
+
+
+@pytest.fixture(name="make_world")
+def _make_world() -> Callable[..., World]:
+    return make_world
+
+
+@pytest.fixture
+def receiver_on_rails() -> type[ReceiverOnRails]:
+    return ReceiverOnRails

@@ -1,0 +1,142 @@
+"""`episode.rrd` is a file that the viewer accepts, holds the very pixels that were delivered, and what §7 of it says."""
+
+import subprocess
+import sys
+
+import cv2
+import numpy as np
+import pytest
+from PIL import Image
+
+from dockair.messages import Window
+from dockair.scenarios.flight_log import FlightLog
+from dockair.scenarios.message_log import MessageLog, NavigatorRecipe, read_messages
+from dockair.scenarios.picture import picture_of_flight
+from dockair.scenarios.recording import believed_ring_px, drawn_ticks, padded_shape, write_episode
+from dockair.scenarios.recording_plots import plot_series
+from dockair.sim.shapes import Shape
+
+TICKS = 60
+
+
+@pytest.fixture
+def flown(hand_made, tmp_path):
+    """A folder with a recorded flight of 0.6 s, its log and what was delivered."""
+    log = FlightLog()
+    entries = hand_made.ticks(TICKS)
+    with MessageLog(tmp_path, NavigatorRecipe(class_name="a:B", sheets=hand_made.sheets)) as messages:
+        for truth, imu, frame, solution in entries:
+            log.append(truth, imu, frame, solution)
+            messages.append(imu, frame, solution)
+    log.write_parquet(tmp_path)
+    return tmp_path, log, entries
+
+
+def _box(kind: str) -> Shape:
+    half = np.array([0.2, 0.2, 0.5])
+    return Shape(
+        name=kind, body="receiver", kind=kind, p_m=np.zeros(3), q_wxyz=np.array([1.0, 0, 0, 0]), half_size_m=half,
+        rgba=np.array([0.4, 0.4, 0.4, 1.0]), vertices_m=np.eye(3), triangles=np.array([[0, 1, 2]]),
+    )  # fmt: skip
+
+
+def _write(folder, log, sheets, **changes):
+    shapes = [_box(kind) for kind in ("ellipsoid", "box", "cylinder", "capsule", "mesh")]
+    messages = read_messages(folder, pixels=False)
+    return write_episode(folder, log, sheets, **({"name": "test", "shapes": shapes, "messages": messages} | changes))
+
+
+def _columns(path) -> dict[str, list]:
+    """Read `entity:component` -> values back, as the file holds them."""
+    from rerun.chunk import RrdReader
+
+    columns: dict[str, list] = {}
+    for chunk in RrdReader(path).stream():
+        batch = chunk.to_record_batch()
+        for name in batch.schema.names:
+            columns.setdefault(f"{chunk.entity_path}:{name}", []).extend(batch[name].to_pylist())
+    return columns
+
+
+def test_the_viewer_accepts_the_file(flown, hand_made):
+    folder, log, _ = flown
+    path = _write(folder, log, hand_made.sheets, summary="# contact")
+    done = subprocess.run([sys.executable, "-m", "rerun", "rrd", "verify", str(path)], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert "verified without error" in done.stdout + done.stderr
+
+
+def test_frames_in_the_recording_are_the_delivered_pixels(flown, hand_made):
+    folder, log, entries = flown
+    columns = _columns(_write(folder, log, hand_made.sheets))
+    pngs = [png for name, values in columns.items() if "pixels_" in name and "blob" in name for png in values if png]
+    delivered = [frame for _, _, frame, _ in entries if frame is not None]
+    assert len(pngs) == len(delivered) == TICKS // 2
+    decoded = [cv2.imdecode(np.array(png[0], np.uint8), cv2.IMREAD_UNCHANGED) for png in pngs]
+    for frame, canvas in zip(delivered, decoded, strict=True):
+        rows, columns_count = frame.window.shape
+        np.testing.assert_array_equal(canvas[:rows, :columns_count], frame.pixels)
+        assert not canvas[rows:].any() and not canvas[:, columns_count:].any()
+
+
+def test_the_recording_holds_every_view_that_is_promised(flown, hand_made):
+    folder, log, _ = flown
+    entities = {name.rpartition(":")[0].split(":")[0] for name in _columns(_write(folder, log, hand_made.sheets))}
+    promised = [
+        "/camera/candidates", "/camera/leds", "/camera/ring", "/camera/window/outline", "/world/tanker",
+        "/world/hose", "/world/drogue", "/world/receiver", "/world/receiver/belief/ring", "/world/receiver/capsules",
+        "/plots/range/truth", "/plots/range/belief", "/plots/lateral_error/upper", "/plots/closing/truth",
+        "/plots/gyro/z", "/plots/reel/position", "/states/phase", "/states/frame",
+    ]  # fmt: skip
+    assert sorted(set(promised) - entities) == []
+
+
+def test_a_flight_without_frames_is_recorded_too(flown, hand_made):
+    folder, log, _ = flown
+    columns = _columns(_write(folder, log, hand_made.sheets, messages=(), shapes=()))
+    assert not [name for name in columns if "pixels_" in name]
+    assert [name for name in columns if name.startswith("/world/drogue")]
+
+
+def test_overlays_are_drawn_at_the_ticks_with_a_new_frame(flown, hand_made):
+    """Frames arrive at every second control tick, counted from the second (index 1)."""
+    _, log, _ = flown
+    assert drawn_ticks(log, 100)[1:] == list(range(1, TICKS, 2))
+
+
+def test_the_believed_ring_passes_through_the_leds_when_the_belief_is_true(make_hand_made):
+    flight = make_hand_made(error_B=np.zeros(3))
+    truth, _, _, solution = flight.tick(10)
+    from dataclasses import replace
+
+    solution = replace(solution, R_BD=truth.R_WB.T @ truth.R_WD)
+    ring = believed_ring_px(solution, flight.sheets, count=48)
+    np.testing.assert_allclose(ring[:-1:6], flight.leds_px(truth), atol=1e-9)
+
+
+def test_windows_are_padded_to_the_next_multiple():
+    assert padded_shape(Window(0, 129, 10, 138)) == (256, 128)
+    assert padded_shape(Window(0, 1088, 0, 2048)) == (1152, 2048)
+
+
+def test_plots_show_truth_and_belief_as_they_are(flown):
+    _, log, _ = flown
+    series = plot_series(log)
+    np.testing.assert_allclose(series["range_error/error"][2], 5.0, atol=1e-9)  # 5 mm, put in by hand
+    np.testing.assert_allclose(series["lateral_error/upper"][2], 30.0, atol=1e-9)  # 3 sigma of 10 mm
+    np.testing.assert_allclose(series["range/truth"][2], 4.0, atol=1e-9)
+
+
+def test_the_picture_of_a_flight_is_small_and_not_blank(flown):
+    folder, _, _ = flown
+    path = picture_of_flight(folder)
+    assert path.stat().st_size < 300_000
+    pixels = np.asarray(Image.open(path).convert("L"))
+    assert pixels.shape[1] > 800
+    assert pixels.std() > 10.0
+
+
+def test_a_picture_needs_no_frames(flown):
+    folder, _, _ = flown
+    (folder / "messages.parquet").unlink()
+    assert picture_of_flight(folder).stat().st_size > 10_000

@@ -1,0 +1,133 @@
+"""Air loads on hose and drogue."""
+
+import numpy as np
+import pytest
+
+from dockair.parameters import load_parameters
+from dockair.rotations import exp
+from dockair.sim.hose.chain import DrogueParameters, HoseParameters
+from dockair.sim.hose.loads import drogue_drag, hose_load_per_length, load_coefficients, tow_loads
+
+HOSE = load_parameters("hose", HoseParameters)
+DROGUE = load_parameters("drogue", DrogueParameters)
+DENSITY, VISCOSITY = 0.66, 2.4e-5
+K = load_coefficients(HOSE, DROGUE, DENSITY, VISCOSITY)
+DIAMETER = 2.0 * HOSE.radius_m
+
+
+def _tow(rng, links=3):
+    """A crooked tow in motion: positions, axes, velocities, angular velocities, air."""
+    R = np.array([exp(0.3 * rng.normal(size=3)) for _ in range(links + 1)])
+    position, v, w = (rng.normal(size=(links + 1, 3)) for _ in range(3))
+    air = np.array([-180.0, 0.0, 0.0]) + 5.0 * rng.normal(size=(links + 1, 3))
+    return position, R, 10.0 * v, w, air
+
+
+def test_critical_angle_of_a_heavy_towed_cable():
+    """A long cable without drogue trails straight where gravity balances the drag across it.
+
+    Per metre, across the cable: w cos(theta) = 1/2 rho d C_n V^2 sin^2(theta), theta from the stream. Hence
+    cos(theta) = -k + sqrt(k^2 + 1), k = w / (rho d C_n V^2).
+    """
+    speed, weight = 40.0, 9.80665 * HOSE.line_density_kg_m  # slow, so that the angle is large
+    k = weight / (DENSITY * DIAMETER * HOSE.normal_drag_coefficient * speed**2)
+    cos_theta = -k + np.sqrt(k**2 + 1.0)
+    sin_theta = np.sqrt(1.0 - cos_theta**2)
+    t_W = np.array([cos_theta, 0.0, sin_theta])  # toward the tanker: forward and up
+    across = np.array([-sin_theta, 0.0, cos_theta])
+    load = hose_load_per_length(t_W, np.array([-speed, 0.0, 0.0]), K)
+    assert (load - np.array([0.0, 0.0, weight])) @ across == pytest.approx(0.0, abs=1e-9 * weight)
+
+
+def test_hose_along_the_stream_feels_the_friction_law_of_its_flat_plate_and_nothing_across():
+    """Nearly along the stream, at angle a: Re_f = pi d V / (2 nu sin a), C_f = 0.0464 Re_f^(-1/6), on pi d per metre."""
+    speed, angle = 180.0, 1e-3
+    t_W = np.array([np.cos(angle), 0.0, np.sin(angle)])
+    reynolds = np.pi * DIAMETER * speed / (2.0 * VISCOSITY * np.sin(angle))
+    friction = 0.5 * DENSITY * HOSE.friction_coefficient * reynolds ** (-1 / 6) * np.pi * DIAMETER * speed**2
+    load = hose_load_per_length(t_W, np.array([-speed, 0.0, 0.0]), K)
+    assert -load @ t_W == pytest.approx(friction * np.cos(angle) ** 2, rel=1e-12)
+    exactly_along = hose_load_per_length(np.array([1.0, 0.0, 0.0]), np.array([-speed, 0.0, 0.0]), K)
+    np.testing.assert_array_equal(exactly_along[1:], 0.0)
+
+
+def test_reynolds_number_is_that_of_the_normal_velocity():
+    """At 120 m/s and 3000 m the total speed is at the drag crisis, the normal one far below: C_n must be 1.2."""
+    k = load_coefficients(HOSE, DROGUE, 0.909, 1.863e-5)
+    angle, speed = np.deg2rad(14.0), 120.0
+    assert speed * DIAMETER / 1.863e-5 > HOSE.crisis_reynolds
+    t_W = np.array([np.cos(angle), 0.0, np.sin(angle)])
+    load = hose_load_per_length(t_W, np.array([-speed, 0.0, 0.0]), k)
+    normal = 0.5 * 0.909 * HOSE.normal_drag_coefficient * DIAMETER * (speed * np.sin(angle)) ** 2
+    assert load @ np.array([-np.sin(angle), 0.0, np.cos(angle)]) == pytest.approx(normal, rel=1e-12)
+
+
+def test_drag_crisis_is_passed_without_a_jump():
+    reynolds = np.linspace(0.3, 2.0, 2000) * HOSE.crisis_reynolds
+    across = reynolds * VISCOSITY / DIAMETER
+    force = np.array([-hose_load_per_length(np.array([1.0, 0, 0]), np.array([0, 0, -u]), K)[2] for u in across])
+    coefficient = force / (0.5 * DENSITY * DIAMETER * across**2)
+    assert coefficient[0] == pytest.approx(HOSE.normal_drag_coefficient)
+    assert coefficient[-1] == pytest.approx(HOSE.supercritical_drag_coefficient)
+    assert np.abs(np.diff(coefficient)).max() < 0.01
+    assert np.all(np.diff(coefficient) <= 1e-12)
+
+
+def test_air_at_rest_never_feeds_energy_into_the_tow():
+    rng = np.random.default_rng(7)
+    for _ in range(300):
+        position, R, v, w, air = _tow(rng)
+        wrench = tow_loads(position, R, v, w, 0.0 * air, rng.uniform(0.0, 2.0), K)
+        assert np.sum(wrench[:, :3] * v) + np.sum(wrench[:, 3:] * w) <= 0.0
+
+
+def test_loads_depend_on_the_relative_velocity_only():
+    position, R, v, w, air = _tow(np.random.default_rng(8))
+    drift = np.array([30.0, -20.0, 10.0])
+    np.testing.assert_allclose(
+        tow_loads(position, R, v, w, air, 0.4, K),
+        tow_loads(position + 7.0, R, v + drift, w, air + drift, 0.4, K),
+        rtol=1e-9,
+        atol=1e-9,
+    )
+
+
+def test_loads_turn_with_the_scene():
+    position, R, v, w, air = _tow(np.random.default_rng(9))
+    Q = exp(np.array([0.0, 0.0, 1.1]))
+    turned = tow_loads(position @ Q.T, Q @ R, v @ Q.T, w @ Q.T, air @ Q.T, 0.4, K)
+    wrench = tow_loads(position, R, v, w, air, 0.4, K)
+    np.testing.assert_allclose(turned, np.hstack([wrench[:, :3] @ Q.T, wrench[:, 3:] @ Q.T]), rtol=1e-9, atol=1e-9)
+
+
+def test_link_that_is_half_in_the_pod_bears_half_the_load_a_quarter_of_its_length_behind_its_middle():
+    position, R = np.zeros((2, 3)), np.array([exp(np.array([0.0, -0.2, 0.0]))] * 2)
+    v = w = np.zeros((2, 3))
+    air = np.array([[-180.0, 0.0, 0.0]] * 2)
+    length = HOSE.link_length_m
+    free = tow_loads(position, R, v, w, air, 0.0, K)[0]
+    half = tow_loads(position, R, v, w, air, 0.5 * length, K)[0]
+    np.testing.assert_allclose(free[3:], 0.0, atol=1e-9)
+    np.testing.assert_allclose(half[:3], 0.5 * free[:3], rtol=1e-12)
+    np.testing.assert_allclose(half[3:], np.cross(-0.25 * length * R[0, :, 0], half[:3]), rtol=1e-9, atol=1e-9)
+    np.testing.assert_array_equal(tow_loads(position, R, v, w, air, length, K)[0], 0.0)
+
+
+def test_drogue_drag_is_the_sheet_coefficient_on_its_disc_along_the_wind():
+    u = np.array([-170.0, 20.0, -30.0])
+    expected = 0.5 * DENSITY * 0.8 * np.pi * 0.25 * 0.5**2 * np.linalg.norm(u) * u
+    np.testing.assert_allclose(drogue_drag(u, K), expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize("axis", [1, 2])
+def test_drogue_turns_into_the_wind_and_its_turning_is_damped(axis):
+    position, v = np.zeros((2, 3)), np.zeros((2, 3))
+    air = np.array([[-180.0, 0.0, 0.0]] * 2)
+    tilt = np.zeros(3)
+    tilt[axis] = 0.1
+    R = np.array([np.eye(3), exp(tilt)])
+    moment = tow_loads(position, R, v, np.zeros((2, 3)), air, 0.0, K)[1, 3 + axis]
+    assert moment < 0.0
+    w = np.zeros((2, 3))
+    w[1, axis] = 1.0
+    assert tow_loads(position, np.array([np.eye(3)] * 2), v, w, air, 0.0, K)[1, 3 + axis] < 0.0
