@@ -173,6 +173,10 @@ class RelativeFilter:
             sigma[i] = np.sqrt(np.linalg.eigvalsh(H @ covariance @ H.T)[-1])
         return pixels, sigma
 
+    def rate_B(self, time_s: float) -> Array:
+        """(3,) angular velocity w_WB_B that the gyro says at a time, body axes [rad/s]."""
+        return self._rate(time_s)
+
     def _take_gyro(self, time_s: float, w_B: Array) -> None:
         before = self._gyro_times[-1] if self._gyro_times else -np.inf
         if time_s <= before:

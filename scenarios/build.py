@@ -1,7 +1,7 @@
 """Makes a scenario's world, sensors and navigator: the only place where as-built and nominal values are both known."""
 
 from dataclasses import dataclass, replace
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
@@ -10,8 +10,10 @@ from dockair.clock import Clock
 from dockair.messages import Navigates
 from dockair.nav.guidance.approach import GuidanceSettings
 from dockair.nav.guidance.phases import PhaseLimits
+from dockair.nav.navigator import Navigator, NavigatorSettings
 from dockair.parameters import load_parameters
 from dockair.rotations import Array, matrix_from_yaw_pitch_roll
+from dockair.scenarios.exact_json import name_of
 from dockair.scenarios.message_log import NavigatorRecipe
 from dockair.scenarios.schema import Scenario
 from dockair.scenarios.truth_navigation import TruthNavigator
@@ -20,13 +22,16 @@ from dockair.sim.air.turbulence import DrydenField, TurbulenceParameters, gust_s
 from dockair.sim.aircraft.aerodynamics import AirframeParameters
 from dockair.sim.aircraft.flight_control import FlightControlParameters
 from dockair.sim.aircraft.receiver import Receiver
+from dockair.sim.as_built import AsBuilt, AsBuiltParameters, draw_as_built
+from dockair.sim.camera.camera import CameraParameters, LedParameters, LightParameters, NearInfraredCamera
 from dockair.sim.hose.chain import DrogueParameters, HoseParameters
 from dockair.sim.hose.coupling import CouplingParameters
 from dockair.sim.hose.reel import ReelParameters
 from dockair.sim.hose.rest import rest_shape
+from dockair.sim.imu import Gyro, GyroParameters
 from dockair.sim.outlines import TankerParameters
 from dockair.sim.world import World, WorldParameters, WorldStart
-from dockair.streams import random_stream
+from dockair.streams import counter_key, random_stream
 
 SETTLE_S = 12.0  # hose and gusts run this long before the flight: several periods of the drogue's swing
 SUN_OVERHEAD = np.array([0.0, 0.0, 1.0])  # lights the scene of a scenario without Sun
@@ -62,8 +67,8 @@ class Parts:
     """What a flight is made of."""
 
     world: World
-    camera: Any  # sim.camera.camera.NearInfraredCamera, or None where the truth navigates
-    gyro: Any
+    camera: NearInfraredCamera | None  #: None where the truth navigates
+    gyro: Gyro
     navigator: Navigates
     recipe: NavigatorRecipe | None  #: how to make that navigator again, for a replay; None for the truth
     sheets: NavigationSheets
@@ -98,12 +103,18 @@ def build(scenario: Scenario, seed: int) -> Parts:
     start = WorldStart(p_PD_B=scenario.start.p_PD_B + offset, settle_s=SETTLE_S)
     world = World(parameters, receiver, _gusts(scenario, seed, clock), start, clock)
     sheets = _navigation_sheets(scenario, parameters, receiver)
-    gyro = _gyro(scenario, seed)
+    leds, as_built = _as_built(scenario, seed, sheets)
+    gyro = Gyro(
+        _sheet(scenario, "gyro", GyroParameters),
+        scenario.rates.gyro_hz,
+        random_stream(seed, "gyro"),
+        as_built.mounting.R_BI,
+    )
     if scenario.navigation.is_truth:
         camera, recipe = None, None
         navigator: Navigates = TruthNavigator(sheets, guidance_settings(scenario))
     else:
-        camera = _camera(scenario, seed, sheets, world)
+        camera = _camera(scenario, seed, leds, as_built, world)
         recipe = _recipe(scenario, sheets)
         navigator = recipe.build()
     periods = Periods(
@@ -127,9 +138,7 @@ def guidance_settings(scenario: Scenario) -> GuidanceSettings:
     """Return the guidance that the scenario asks for."""
     g = scenario.guidance
     limits = PhaseLimits(stabilise_s=g.stabilise_s, take_in_m=g.take_in_m, hold_s=g.hold_s)
-    return GuidanceSettings(
-        stand_off_m=scenario.start.aft_m, closure_speed_m_s=g.closure_speed_m_s, limits=limits
-    )
+    return GuidanceSettings(stand_off_m=scenario.start.aft_m, closure_speed_m_s=g.closure_speed_m_s, limits=limits)
 
 
 def _sheet(scenario: Scenario, name: str, cls: type[T]) -> T:
@@ -167,9 +176,7 @@ def _gusts(scenario: Scenario, seed: int, clock: Clock) -> DrydenField | None:
 def _navigation_sheets(scenario: Scenario, world: WorldParameters, receiver: Receiver) -> NavigationSheets:
     """Nominal values only: nothing drawn for this flight goes in."""
     wind_W = np.array([-world.airspeed_m_s, 0.0, 0.0])
-    rest = rest_shape(
-        world.hose, world.drogue, wind_W, world.air.density_kg_m3, world.air.kinematic_viscosity_m2_s
-    )
+    rest = rest_shape(world.hose, world.drogue, wind_W, world.air.density_kg_m3, world.air.kinematic_viscosity_m2_s)
     camera, ring = scenario.hardware.camera, scenario.hardware.ring
     start = StartGeometry(
         p_PD_B=scenario.start.p_PD_B,
@@ -204,22 +211,15 @@ def _gyro_sheet(scenario: Scenario) -> GyroSheet:
     )
 
 
-def _gyro(scenario: Scenario, seed: int) -> Gyro:
-    parameters = _sheet(scenario, "gyro", GyroParameters)
-    return Gyro(parameters, scenario.rates.gyro_hz, random_stream(seed, "gyro"))
-
-
-def _camera(scenario: Scenario, seed: int, sheets: NavigationSheets, world: World) -> NearInfraredCamera:
-    """Draw the hardware as it was built, and make its camera."""
+def _as_built(scenario: Scenario, seed: int, sheets: NavigationSheets) -> tuple[LedParameters, AsBuilt]:
+    """Draw the hardware as it was built."""
     leds = _sheet(scenario, "leds", LedParameters)
-    as_built = draw_as_built(
-        sheets.camera,
-        sheets.ring,
-        sheets.mounting,
-        _sheet(scenario, "as_built", AsBuiltParameters),
-        leds,
-        random_stream(seed, "as_built"),
-    )
+    parameters = _sheet(scenario, "as_built", AsBuiltParameters)
+    rng = random_stream(seed, "as_built")
+    return leds, draw_as_built(sheets.camera, sheets.ring, sheets.mounting, parameters, leds, rng)
+
+
+def _camera(scenario: Scenario, seed: int, leds: LedParameters, as_built: AsBuilt, world: World) -> NearInfraredCamera:
     return NearInfraredCamera(
         _sheet(scenario, "camera", CameraParameters),
         leds,

@@ -44,7 +44,7 @@ def _vector(name: str, unit: str, limit: float, low: float | None = None) -> lis
     return [Entry(f"{name}_{axis}", unit, -limit if low is None else low, limit) for axis in "xyz"]
 
 
-#: The observation, in order: what the navigation believes and the newest gyro sample. Never the truth.
+#: The observation, in order: what the navigation believes and wants, and the newest gyro sample. Never the truth.
 OBSERVATION = (
     Entry("valid", "0 or 1", 0.0, 1.0),
     *_vector("p_PD_B", "m", 100.0),
@@ -56,6 +56,9 @@ OBSERVATION = (
     Entry("frame_age", "s", 0.0, FRAME_AGE_LIMIT_S),
     Entry("leds_seen", "count", 0.0, 8.0),
     *_vector("gyro", "rad/s", 20.0),
+    *_vector("navigator_command_velocity", "m/s", VELOCITY_LIMIT_M_S),
+    *_vector("navigator_command_acceleration", "m/s^2", ACCELERATION_LIMIT_M_S2),
+    Entry("time", "s", 0.0, 600.0),
 )
 #: The action, in order: `ReceiverCommand`, beyond the trimmed flight path, body axes.
 ACTION = (*_vector("velocity", "m/s", VELOCITY_LIMIT_M_S), *_vector("acceleration", "m/s^2", ACCELERATION_LIMIT_M_S2))
@@ -224,7 +227,6 @@ class DockEnv(gymnasium.Env[NDArray[np.float64], NDArray[np.float32]]):
             "is_success": outcome is Outcome.CONTACT,
             "outcome": outcome.value if outcome is not None else "",
             "phase": tick.solution.phase,
-            "command": np.concatenate([tick.solution.command.velocity_m_s, tick.solution.command.acceleration_m_s2]),
             "truth": _truth_info(tick.truth, self._distance_m(tick.truth)),
         }
 
@@ -247,6 +249,9 @@ def observation_from(solution: NavSolution, tick: Tick) -> NDArray[np.float64]:
         [age_s if np.isfinite(age_s) else FRAME_AGE_LIMIT_S],
         [np.isfinite(solution.led_pixels_px[:, 0]).sum()],
         gyro,
+        solution.command.velocity_m_s,
+        solution.command.acceleration_m_s2,
+        [solution.time_stamp_s],
     ]
     return np.nan_to_num(np.concatenate(parts).astype(np.float64), nan=0.0, posinf=np.inf, neginf=-np.inf)
 

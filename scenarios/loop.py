@@ -13,9 +13,11 @@ from pathlib import Path
 from dockair.messages import CameraFrame, ImuSample, NavSolution, ReceiverCommand
 from dockair.scenarios.build import build
 from dockair.scenarios.metrics import Result
+from dockair.scenarios.recorder import Recorder
 from dockair.scenarios.referee import Outcome, Referee
 from dockair.scenarios.schema import Scenario
 from dockair.scenarios.truth_navigation import TruthNavigator
+from dockair.sim.camera.camera import NearInfraredCamera
 from dockair.sim.truth import Truth
 
 Progress = Callable[[Truth, NavSolution], None]
@@ -73,7 +75,7 @@ class Flight:
             if truth.tick % self._periods.gyro == 0:
                 imu.append(self.gyro.step(truth.time_s, truth.w_WB_B))
             if self.camera is not None and truth.tick % self._periods.camera == 0:
-                self._expose(truth.time_s)
+                self._expose(self.camera, truth.time_s)
         frame = self._delivered(truth.time_s)
         if isinstance(self.navigator, TruthNavigator):
             self.navigator.truth = truth
@@ -88,11 +90,11 @@ class Flight:
         if self.camera is not None:
             self.camera.close()
 
-    def _expose(self, time_s: float) -> None:
+    def _expose(self, camera: NearInfraredCamera, time_s: float) -> None:
         window = None if self._full_frames else self._window
-        frame = self.camera.expose(self.world.data, time_s, self._frame_number, window)
+        frame = camera.expose(self.world.data, time_s, self._frame_number, window)
         self._frame_number += 1
-        self._in_transfer.append((time_s + self.camera.latency_s(frame), frame))
+        self._in_transfer.append((time_s + camera.latency_s(frame), frame))
 
     def _delivered(self, time_s: float) -> CameraFrame | None:
         """Return the oldest frame whose transfer is over, if there is one."""
@@ -129,6 +131,6 @@ def fly(
                 if progress is not None:
                     progress(tick.truth, tick.solution)
             recorder.append(tick)
+        return recorder.finish(flight, tick.outcome, seed, time.perf_counter() - begun)
     finally:
         flight.close()
-    return recorder.finish(flight, tick.outcome, seed, time.perf_counter() - begun)

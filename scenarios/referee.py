@@ -1,7 +1,8 @@
 """Says from the truth how a flight ended.
 
-contact: the coupling held the probe. miss: the tip passed the ring's plane, was not held and touched nothing. rim_strike: the probe touched the drogue and was not held. abort: the navigation broke away
-before the ring's plane. collision: anything of the receiver but its probe touched something. timeout: none of these.
+contact: the coupling held the probe. miss: the tip passed the ring's plane, was not held and touched nothing.
+rim_strike: the probe touched the drogue and was not held. abort: the navigation broke away before the ring's plane.
+collision: anything of the receiver but its probe touched something. timeout: none of these.
 
 Radial offset and closure speed are taken where the tip crosses the ring's plane from behind (the last crossing before
 the coupling holds); the angle between probe and drogue axis when it holds.

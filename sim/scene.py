@@ -20,7 +20,7 @@ import mujoco
 import numpy as np
 
 from dockair.calibration import Camera, Mounting
-from dockair.rotations import Array, quaternion_from_matrix
+from dockair.rotations import Array
 from dockair.sim.air.atmosphere import STANDARD_GRAVITY_M_S2
 from dockair.sim.basket import add_drogue, grey, sliding
 from dockair.sim.hose.chain import DrogueParameters, HoseParameters
@@ -176,10 +176,9 @@ def _add_receiver(spec: Any, parameters: SceneParameters) -> None:
     body = spec.worldbody.add_body(name="receiver")
     body.add_freejoint(name="receiver")
     body.explicitinertial, body.mass = True, parameters.receiver_mass_kg
-    # MuJoCo sorts the principal moments of a `fullinertia` but leaves `iquat` as it was; so both are set here
-    moments, axes = np.linalg.eigh(inertia)
-    axes[:, 0] *= np.sign(np.linalg.det(axes))
-    body.inertia, body.iquat = moments, quaternion_from_matrix(axes)
+    # Without `ipos` MuJoCo takes the inertial frame as not given, and drops the turn of its axes in silence
+    body.ipos = [0.0, 0.0, 0.0]
+    body.fullinertia = [*np.diag(inertia), inertia[0, 1], inertia[0, 2], inertia[1, 2]]
     contact = {"contype": _RECEIVER, "conaffinity": 0, "friction": sliding(parameters.drogue.friction)}
     _add_pieces(body, receiver_pieces(mounting), "", _RECEIVER_REFLECTANCE, contact)
     _add_probe(body, mounting, coupling, parameters.drogue.friction)

@@ -1,22 +1,38 @@
-"""A third person's view of the world, in the visible; nothing that flies looks through it.
+"""A third person's view of the world; nothing that flies looks through it.
 
-The eye follows the receiver's probe from behind and to the left. LEDs are drawn as small bright spheres, which they
-are not to the eye: near infrared is invisible.
+The eye follows a point from behind and to the left. Greys are near-infrared reflectances in the scene's
+own light, with the shadow side filled in; LEDs are drawn as small bright spheres, which they are not: near infrared is invisible.
 """
 
+import os
+import sys
 from typing import Any
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from dockair.errors import MachineError
 from dockair.rotations import Array
 
 _DISTANCE_M = 9.0
-_AZIMUTH_DEG = -52.0  # MuJoCo's: direction of view from x toward y; the eye is behind and to the left
-_ELEVATION_DEG = -14.0
-_LED_RADIUS_M = 0.012
+_AZIMUTH_DEG = -30.0  # MuJoCo's: of the direction of view, from x toward y
+_ELEVATION_DEG = -8.0
+_LED_RADIUS_M = 0.018
 _LED_RGBA = np.array([1.0, 0.35, 0.45, 1.0], dtype=np.float32)
+_FILL_LIGHT = 0.35  # ambient light added: the shadow side must be seen too
+_OVERSAMPLING = 2  # the picture is drawn finer and averaged, which smooths edges without multisampling
+_SPARE_GEOMS = 100
+
+
+def gl_context(width_px: int, height_px: int) -> Any:
+    """Make an off-screen context; which kind does not depend on who imported mujoco first."""
+    chosen = os.environ.get("MUJOCO_GL", "egl" if sys.platform.startswith("linux") else "")
+    if chosen == "egl":
+        from mujoco.egl import GLContext
+
+        return GLContext(width_px, height_px)
+    return mujoco.GLContext(width_px, height_px)
 
 
 class ThirdPersonView:
@@ -26,11 +42,29 @@ class ThirdPersonView:
         model: of the world.
         width_px: of the picture.
         height_px: of the picture.
+
+    Raises:
+        MachineError: no off-screen OpenGL here.
     """
 
     def __init__(self, model: mujoco.MjModel, width_px: int, height_px: int) -> None:
-        self._model = model
-        self._renderer = mujoco.Renderer(model, height_px, width_px)
+        self._model, self._shape = model, (height_px, width_px)
+        width, height = _OVERSAMPLING * width_px, _OVERSAMPLING * height_px
+        try:
+            self._context = gl_context(width, height)
+            self._context.make_current()
+            self._renderer = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100.value)
+        except Exception as error:  # whatever the driver's loader raises, the cause is the machine
+            raise MachineError(
+                "render",
+                expected=f"an off-screen OpenGL context ({error})",
+                remedy="install libegl1 libgl1-mesa-dri libopengl0 (Debian, Ubuntu: apt-get install)",
+            ) from error
+        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._renderer)
+        mujoco.mjr_resizeOffscreen(width, height, self._renderer)
+        self._scene = mujoco.MjvScene(model, model.ngeom + _SPARE_GEOMS)
+        self._scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = 0
+        self._option = mujoco.MjvOption()
         self._camera = mujoco.MjvCamera()
         self._camera.distance, self._camera.azimuth = _DISTANCE_M, _AZIMUTH_DEG
         self._camera.elevation = _ELEVATION_DEG
@@ -40,25 +74,37 @@ class ThirdPersonView:
         """(height, width, 3) picture of the world now, a new array.
 
         Args:
-            data: of the world.
+            data: of the world; not changed.
             look_at_W: (3,) point in the middle of the picture [m].
         """
         self._camera.lookat[:] = look_at_W
-        self._renderer.update_scene(data, self._camera)
+        everything = mujoco.mjtCatBit.mjCAT_ALL.value
+        mujoco.mjv_updateScene(self._model, data, self._option, None, self._camera, everything, self._scene)
+        for light in self._scene.lights[: self._scene.nlight]:
+            light.ambient[:] = _FILL_LIGHT
         for led in self._leds:
             self._add_led(data.site_xpos[led])
-        return np.array(self._renderer.render())
+        height, width = self._shape
+        rect = mujoco.MjrRect(0, 0, _OVERSAMPLING * width, _OVERSAMPLING * height)
+        fine = np.empty((rect.height, rect.width, 3), dtype=np.uint8)
+        self._context.make_current()
+        mujoco.mjr_render(rect, self._scene, self._renderer)
+        mujoco.mjr_readPixels(fine, None, rect, self._renderer)
+        blocks = fine.reshape(height, _OVERSAMPLING, width, _OVERSAMPLING, 3)
+        linear = blocks.mean(axis=(1, 3))[::-1] / 255.0  # OpenGL's rows run upward
+        return np.asarray(255.0 * np.sqrt(linear), dtype=np.uint8)  # for a screen's gamma
 
     def close(self) -> None:
         """Free the off-screen context."""
-        self._renderer.close()
+        self._context.make_current()
+        self._renderer.free()
+        self._context.free()
 
     def _add_led(self, position_W: Any) -> None:
-        scene = self._renderer.scene
-        if scene.ngeom >= scene.maxgeom:
+        if self._scene.ngeom >= self._scene.maxgeom:
             return
-        geom = scene.geoms[scene.ngeom]
+        geom = self._scene.geoms[self._scene.ngeom]
         size, axes = np.full(3, _LED_RADIUS_M), np.eye(3).ravel()
         mujoco.mjv_initGeom(geom, mujoco.mjtGeom.mjGEOM_SPHERE, size, position_W, axes, _LED_RGBA)
         geom.emission = 1.0
-        scene.ngeom += 1
+        self._scene.ngeom += 1

@@ -55,9 +55,7 @@ class ReceiverOnRails:
         command: ReceiverCommand,
     ) -> tuple[Array, Array]:
         self.specific_force_B, self.air_velocity_W = specific_force_B, air_velocity_W
-        self.force_W = self.mass_kg * (
-            np.array([0.0, 0.0, 9.80665]) + self.gain_1_s * (command.velocity_m_s - v_WB)
-        )
+        self.force_W = self.mass_kg * (np.array([0.0, 0.0, 9.80665]) + self.gain_1_s * (command.velocity_m_s - v_WB))
         return self.force_W, R_WB @ (self.inertia_B @ (-self.gain_1_s * w_WB_B))
 
 

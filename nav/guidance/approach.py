@@ -73,7 +73,7 @@ class Guidance:
         self._motion = DrogueMotion(settings.swing, self._dt, settings.response_time_s)
         self._u: Array = np.zeros(3)
         delay = round(settings.response_time_s * control_rate_hz)
-        self._given = deque([np.zeros(2)] * delay, maxlen=delay)  # commands across that are not flown yet
+        self._given: deque[Array] = deque([np.zeros(2)] * delay, maxlen=delay)  # commands across that are not flown yet
         self._flown: Array = np.zeros(2)  # y_r now
         self._seen = False
         self._mean_along = self._closure = 0.0

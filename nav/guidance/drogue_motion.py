@@ -29,7 +29,7 @@ class SwingSettings:
     frequency_hz: tuple[float, float] = (0.33, 0.40)
     damping: float = 0.15  # of the swing, between its bare pendulum and what the gusts' own spectrum adds
     swing_acceleration_density: float = 0.15  # [m/s^2/sqrt(Hz)], excursion of some 0.07 m at 0.33 Hz
-    drift_acceleration_density: float = 0.02  # [m/s^2/sqrt(Hz)], gusts slower than the swing
+    drift_acceleration_density: float = 0.05  # [m/s^2/sqrt(Hz)], gusts slower than the swing
     position_sigma_m: float = 0.01  # of the fused relative position, its error being correlated over frames
     rate_sigma_m_s: float = 0.06  # of its rate, likewise
 

@@ -42,7 +42,7 @@ class IdentifySettings:
     radius_range_px: tuple[float, float] = (12.0, 700.0)  # 0.5 m ring at 60 m and at 1 m, 2909 px focal length
     max_tilt_rad: float = np.deg2rad(40.0)  # more, and four LEDs of a frontal ring pass for four of a tilted one
     max_candidates: int = 60  # 34 220 triples
-    max_fits: int = 10
+    max_fits: int = 16
     sigma_px: float = 0.10  # of a centroid when the caller does not say; DESIGN's budget
     ring_sigma: float = 0.0012  # LED position error over the ring's radius: 0.3 mm of 250 mm
     tolerance_sigmas: float = 4.0  # one true LED in 3000 falls outside in either coordinate
@@ -102,8 +102,10 @@ def ring_fits(
             p = max(len(points) - 3, 1) * np.pi * fit.tolerance_px**2 / max(area, np.pi * fit.radius_px**2)
             chance = comb(SLOTS - 3, fit.count - 3) * min(1.0, p) ** (fit.count - 3)
             scored.append(ScoredFit(log10_false_rings=float(np.log10(max(octagons.tested, 1) * chance)), fit=fit))
-        done = _contained(fit.candidate, hypotheses) | _contained(hypotheses[0], hypotheses)
-        hypotheses = hypotheses[~done]
+        # a hypothesis with an impostor may lose the wrong LEDs in its fit: parts of it still get their own
+        size = (hypotheses >= 0).sum(axis=1)
+        repeated = _contained(hypotheses[0], hypotheses) & (size == size[0])
+        hypotheses = hypotheses[~(repeated | _contained(fit.candidate, hypotheses))]
     return sorted(scored, key=lambda one: (one.log10_false_rings, one.fit.rms_px))
 
 

@@ -23,7 +23,7 @@ from dockair.rotations import Array
 SLOTS = 8
 _ANGLE = 2.0 * np.pi * np.arange(SLOTS) / SLOTS
 _COS, _SIN = np.cos(_ANGLE), np.sin(_ANGLE)
-_ITERATIONS = 15
+_ITERATIONS = 15  # of Levenberg-Marquardt
 _DAMPING = 1e-3  # relative, at the start; a frontal ring leaves its tilt undetermined to first order
 _CONVERGED = 1e-6  # relative fall of the squared residuals below which a step is the last
 _FIRST_LOOK = 3.0  # tolerances within which the first fit takes candidates up: it knows the other slots less well
@@ -145,11 +145,8 @@ def _orthonormalise(pose):  # type: ignore[no-untyped-def]
     for k in range(3):
         pose[1, k] /= a_length
         along += pose[1, k] * pose[2, k]
-    for k in range(3):
-        pose[2, k] -= along * pose[1, k]
-    b_length = np.sqrt(pose[2, 0] ** 2 + pose[2, 1] ** 2 + pose[2, 2] ** 2)
-    for k in range(3):
-        pose[2, k] /= b_length
+    pose[2] -= along * pose[1]
+    pose[2] /= np.sqrt(pose[2, 0] ** 2 + pose[2, 1] ** 2 + pose[2, 2] ** 2)
 
 
 @njit(cache=True)
@@ -294,7 +291,6 @@ def _drop_outliers(points, candidate, pose, squares, tolerance, tolerance_per_ra
 def _fit_ring(points, first_candidate, tolerance, tolerance_per_radius):  # type: ignore[no-untyped-def]
     candidate = first_candidate.copy()
     pose, squares = _best_pose(points, candidate)
-    limit = 0.0
     for look in (_FIRST_LOOK, 1.0):
         candidate, pose, squares, limit = _drop_outliers(
             points, candidate, pose, squares, look * tolerance, look * tolerance_per_radius
@@ -305,5 +301,4 @@ def _fit_ring(points, first_candidate, tolerance, tolerance_per_radius):  # type
         if (collected != candidate).any() and (collected >= 0).sum() >= 4:
             candidate = collected
             pose, squares = _best_pose(points, candidate)
-    candidate, pose, squares, limit = _drop_outliers(points, candidate, pose, squares, tolerance, tolerance_per_radius)
-    return candidate, pose, squares, limit
+    return _drop_outliers(points, candidate, pose, squares, tolerance, tolerance_per_radius)

@@ -118,7 +118,9 @@ def identify(
         fits = [one for one in fits if _shape_error(chosen, one.fit, tight) <= shape]
         status, fit = _decide(fits, tight, settings.max_false_rings_predicted, settings)
     if fit is None:
-        limit = settings.max_false_rings_with_prior if prior.has_centre else settings.max_false_rings
+        # a ring that contradicts a prediction needs as good a case as one that nothing was known of
+        nominal = prior.has_centre and prior.prediction_px is None
+        limit = settings.max_false_rings_with_prior if nominal else settings.max_false_rings
         status, fit = _decide(ring_fits(chosen, method, prior, camera, sigma, settings), prior, limit, settings)
     if fit is None:
         return _nothing(status)

@@ -143,12 +143,7 @@ def _contour_tracing(mask, stride):  # type: ignore[no-untyped-def]
 def label_two_pass(mask: Mask, connectivity: int = 8) -> tuple[Labels, int]:
     """Labels (rows, columns) int32 and their number, by two passes with a table of equivalences.
 
-    Args:
-        mask: (rows, columns) bool.
-        connectivity: 8 or 4.
-
-    Raises:
-        DockairError: wrong shape, dtype or connectivity.
+    Arguments and errors as for `label_contour_tracing`.
     """
     labels, parent = first_pass(mask, connectivity)
     return _second_pass(labels, parent)
@@ -157,12 +152,7 @@ def label_two_pass(mask: Mask, connectivity: int = 8) -> tuple[Labels, int]:
 def first_pass(mask: Mask, connectivity: int = 8) -> tuple[Labels, Indices]:
     """Provisional labels and the table of equivalences: parent[label] is an equal, not larger label.
 
-    Args:
-        mask: (rows, columns) bool.
-        connectivity: 8 or 4.
-
-    Raises:
-        DockairError: wrong shape, dtype or connectivity.
+    Arguments and errors as for `label_contour_tracing`.
     """
     return _first_pass(np.ascontiguousarray(_checked(mask, connectivity)), connectivity == 8)
 

@@ -135,6 +135,22 @@ def _mark_piece(patch, row, column, mark, corners, stack):  # type: ignore[no-un
 
 
 @njit(cache=True)
+def _append_piece(out, n, patch, top, left, piece, row, start, stop):  # type: ignore[no-untyped-def]
+    """Write the runs of one piece, found along the component's old runs; the new number of runs."""
+    for k in range(len(row)):
+        inside = False
+        for j in range(start[k], stop[k] + 1):
+            belongs = j < stop[k] and patch[row[k] - top, j - left] == piece
+            if belongs and not inside:
+                out[0, n], out[1, n] = row[k], j
+            elif inside and not belongs:
+                out[2, n] = j
+                n += 1
+            inside = belongs
+    return n
+
+
+@njit(cache=True)
 def _open_components(row, start, stop, offset, element, spare_below, corners):  # type: ignore[no-untyped-def]
     half = max(element.shape[0] // 2, 1)
     # opening can cut a run into pieces, but never into more than it has pixels
@@ -143,38 +159,27 @@ def _open_components(row, start, stop, offset, element, spare_below, corners):  
     out_offset = np.zeros(capacity + 1, np.int32)
     n, count = 0, 0
     for c in range(len(offset) - 1):
-        first, last = offset[c], offset[c + 1]
-        area = (stop[first:last] - start[first:last]).sum()
+        r, a, b = row[offset[c] : offset[c + 1]], start[offset[c] : offset[c + 1]], stop[offset[c] : offset[c + 1]]
+        area = (b - a).sum()
         if area < spare_below:
-            for k in range(first, last):
-                out[0, n], out[1, n], out[2, n] = row[k], start[k], stop[k]
-                n += 1
-            count += 1
+            out[0, n : n + len(r)], out[1, n : n + len(r)], out[2, n : n + len(r)] = r, a, b
+            n, count = n + len(r), count + 1
             out_offset[count] = n
             continue
-        top, left = row[first] - half, start[first:last].min() - half
-        patch = np.zeros((row[last - 1] + half + 1 - top, stop[first:last].max() + half - left), np.int32)
-        for k in range(first, last):
-            patch[row[k] - top, start[k] - left : stop[k] - left] = 1
+        top, left = r[0] - half, a.min() - half
+        patch = np.zeros((r[-1] + half + 1 - top, b.max() + half - left), np.int32)
+        for k in range(len(r)):
+            patch[r[k] - top, a[k] - left : b[k] - left] = 1
         patch = _opened(patch, element)
         stack = np.empty((area, 2), np.int32)
-        mark = 1
-        for k in range(first, last):  # along the old runs: everything that is left lies in them
-            for j in range(start[k] - left, stop[k] - left):
-                if patch[row[k] - top, j] == 1:
-                    mark += 1
-                    _mark_piece(patch, row[k] - top, j, mark, corners, stack)
-        for piece in range(2, mark + 1):
-            for k in range(first, last):
-                inside = False
-                for j in range(start[k], stop[k] + 1):
-                    belongs = j < stop[k] and patch[row[k] - top, j - left] == piece
-                    if belongs and not inside:
-                        out[0, n], out[1, n] = row[k], j
-                    elif inside and not belongs:
-                        out[2, n] = j
-                        n += 1
-                    inside = belongs
+        pieces = 0
+        for k in range(len(r)):
+            for j in range(a[k] - left, b[k] - left):
+                if patch[r[k] - top, j] == 1:
+                    pieces += 1
+                    _mark_piece(patch, r[k] - top, j, pieces + 1, corners, stack)
+        for piece in range(pieces):
+            n = _append_piece(out, n, patch, top, left, piece + 2, r, a, b)
             count += 1
             out_offset[count] = n
     return out[0, :n].copy(), out[1, :n].copy(), out[2, :n].copy(), out_offset[: count + 1].copy()

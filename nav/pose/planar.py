@@ -190,7 +190,7 @@ def position_for_attitude(rays: Array, points_D: Array, R_CD: Array) -> Array:
         points_D: (n, 3) LEDs q in drogue axes [m].
         R_CD: (3, 3) attitude.
     """
-    M, y, in_front = np.zeros((3, 3)), np.zeros(3), 0.0
+    M, y, in_front = 1e-12 * np.eye(3), np.zeros(3), 0.0  # regular even when all rays are one
     for i in range(len(rays)):
         for j in range(3):
             for k in range(3):

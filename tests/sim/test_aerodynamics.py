@@ -36,15 +36,18 @@ def force_and_moment(
     return np.concatenate([force, moment])
 
 
-def test_published_trim_of_the_nominal_f16_is_reproduced() -> None:
-    """502 ft/s at sea level, level, centre of gravity at 0.35: alpha 0.03691 rad, elevator -0.7588 degrees.
-
-    Stevens & Lewis, table 3.6-3. Their air data are rounded (2.377e-3 slug/ft^3, 32.17 ft/s^2).
-    """
-    nominal = load_parameters("airframe", AirframeParameters, {"centre_of_gravity": 0.35})
-    trim = level_trim(nominal, 502.0 * 0.3048, standard_atmosphere(0.0))
-    assert trim.alpha_rad == pytest.approx(0.03691, abs=2e-5)
-    assert np.degrees(trim.elevator_rad) == pytest.approx(-0.7588, abs=2e-3)
+@pytest.mark.parametrize(
+    ("centre_of_gravity", "alpha_rad", "elevator_deg"),
+    [(0.30, 0.03936, -1.931), (0.35, 0.03691, -0.7588), (0.38, 0.03544, -0.05590)],
+)
+def test_published_trim_of_the_f16_is_reproduced(
+    centre_of_gravity: float, alpha_rad: float, elevator_deg: float
+) -> None:
+    """Level flight at 502 ft/s, sea level [Stevens & Lewis, table 3.6-3], in the table's own rounded air and gravity."""
+    airframe = load_parameters("airframe", AirframeParameters, {"centre_of_gravity": centre_of_gravity})
+    trim = level_trim(airframe, 502.0 * 0.3048, standard_atmosphere(0.0))
+    assert trim.alpha_rad == pytest.approx(alpha_rad, abs=5e-5)
+    assert np.degrees(trim.elevator_rad) == pytest.approx(elevator_deg, abs=1e-3)
 
 
 @pytest.mark.parametrize(("airspeed_m_s", "altitude_m"), FLIGHTS)
@@ -137,7 +140,7 @@ def test_linear_coefficients_stay_near_the_tables_within_three_degrees(airspeed_
 
 
 def test_moving_the_centre_of_gravity_moves_the_force_not_the_aircraft() -> None:
-    """Moments about a centre of gravity further aft by d chords: M' = M + d c (e_x x F)... forward-left-up."""
+    """Moments about a centre of gravity further aft by d: M' = M + d e_x x F."""
     aft = load_parameters("airframe", AirframeParameters, {"centre_of_gravity": 0.35})
     d = (0.35 - AIRFRAME.centre_of_gravity) * AIRFRAME.chord_m
     change = {"alpha": 0.09, "beta": 0.03, "w_B": (0.2, -0.1, 0.1), "surfaces": (0.02, 0.1, -0.1)}

@@ -40,7 +40,7 @@ def test_critical_angle_of_a_heavy_towed_cable():
 
 
 def test_hose_along_the_stream_feels_the_friction_law_of_its_flat_plate_and_nothing_across():
-    """Nearly along the stream, at angle a: Re_f = pi d V / (2 nu sin a), C_f = 0.0464 Re_f^(-1/6), on pi d per metre."""
+    """At a small angle a: Re_f = pi d V / (2 nu sin a), C_f = 0.0464 Re_f^(-1/6), on pi d per metre."""
     speed, angle = 180.0, 1e-3
     t_W = np.array([np.cos(angle), 0.0, np.sin(angle)])
     reynolds = np.pi * DIAMETER * speed / (2.0 * VISCOSITY * np.sin(angle))

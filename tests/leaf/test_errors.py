@@ -1,0 +1,19 @@
+from dockair.errors import DockairError, MachineError
+
+
+def test_one_line_says_where_expected_got_and_what_exists():
+    error = DockairError("gust.model", expected="a model", got="karman", exists=["none", "dryden"])
+    assert str(error) == "gust.model: expected a model, got 'karman'; exists: none, dryden"
+    assert error.exit_code == 2
+
+
+def test_zero_is_said_and_nothing_is_not():
+    assert str(DockairError("n", expected="n > 0", got=0)) == "n: expected n > 0, got 0"
+    assert str(DockairError("file", expected="a file", got=None)) == "file: expected a file"
+
+
+def test_machine_error_says_the_remedy_and_leaves_with_3():
+    error = MachineError("EGL", expected="an off-screen context", remedy="apt install libegl1")
+    assert str(error) == "EGL: expected an off-screen context; apt install libegl1"
+    assert error.exit_code == 3
+    assert isinstance(error, DockairError)

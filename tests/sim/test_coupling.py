@@ -1,0 +1,138 @@
+"""The coupling: its states, and the probe flown into it on rails."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dockair.messages import ReceiverCommand
+from dockair.parameters import load_parameters
+from dockair.rotations import exp
+from dockair.sim.hose.coupling import CouplingParameters, CouplingState, ProbeInCoupling, next_coupling_state
+
+COUPLING = load_parameters("coupling", CouplingParameters)
+SEATED = ProbeInCoupling(distance_m=0.0, angle_rad=0.05, closing_speed_m_s=1.2, pull_n=0.0)
+READY, LATCHED, BARRED = CouplingState.READY, CouplingState.LATCHED, CouplingState.BARRED
+
+
+@pytest.mark.parametrize(
+    ("before", "probe", "after"),
+    [
+        (READY, SEATED, LATCHED),
+        (READY, replace(SEATED, distance_m=COUPLING.capture_distance_m + 1e-6), READY),
+        (READY, replace(SEATED, angle_rad=COUPLING.angle_limit_rad + 1e-6), READY),
+        (READY, replace(SEATED, closing_speed_m_s=-0.01), READY),
+        (READY, replace(SEATED, closing_speed_m_s=COUPLING.closing_speed_max_m_s + 1e-6), BARRED),
+        (LATCHED, replace(SEATED, pull_n=COUPLING.release_force_n - 1.0), LATCHED),
+        (LATCHED, replace(SEATED, pull_n=-10.0 * COUPLING.release_force_n), LATCHED),
+        (LATCHED, replace(SEATED, pull_n=COUPLING.release_force_n + 1.0), BARRED),
+        (BARRED, SEATED, BARRED),
+        (BARRED, replace(SEATED, distance_m=COUPLING.rearm_distance_m + 1e-6), READY),
+    ],
+)
+def test_coupling_goes_from_state_to_state_as_tabled(before, probe, after):
+    assert next_coupling_state(before, probe, COUPLING) is after
+
+
+def _fly_in(make_world, receiver_on_rails, *, y=0.0, z=0.0, speed=1.2, pitch_rad=0.0):
+    """Push the probe from 0.35 m behind the ring to 0.5 m past the coupling; stop where it latches."""
+    receiver = receiver_on_rails(trim_R_WB=exp(np.array([0.0, pitch_rad, 0.0])))
+    world = make_world(receiver=receiver, p_PD_B=(0.35, y, z))
+    command = ReceiverCommand(velocity_m_s=np.array([speed, 0.0, 0.0]))
+    touched = False
+    for _ in range(round(1000 * 1.15 / speed)):
+        truth = world.step(command)
+        touched = touched or truth.probe_touches_drogue
+        assert truth.receiver_touches == ""
+        if truth.latched:
+            break
+    return world, truth, touched
+
+
+@pytest.mark.parametrize("speed", [0.3, 1.0, 1.2, 1.5, 2.5])
+def test_probe_pushed_through_the_centre_latches(make_world, receiver_on_rails, speed):
+    _, truth, _ = _fly_in(make_world, receiver_on_rails, speed=speed)
+    assert truth.latched
+
+
+@pytest.mark.parametrize(("y", "z"), [(0.1, 0.0), (-0.15, 0.0), (0.0, 0.15), (0.0, -0.15), (0.1, 0.1)])
+def test_basket_leads_a_probe_that_comes_in_beside_the_centre_to_the_coupling(make_world, receiver_on_rails, y, z):
+    world, truth, touched = _fly_in(make_world, receiver_on_rails, y=y, z=z)
+    assert touched and truth.latched
+    for _ in range(500):
+        truth = world.step(ReceiverCommand(velocity_m_s=np.array([1.2, 0.0, 0.0])))
+    assert truth.latched
+    np.testing.assert_allclose(truth.p_DP, [COUPLING.depth_m, 0.0, 0.0], atol=0.005)
+
+
+@pytest.mark.parametrize(("y", "z"), [(0.3, 0.0), (-0.3, 0.0), (0.0, 0.3), (0.0, -0.3)])
+def test_probe_at_the_rim_strikes_it_and_does_not_latch(make_world, receiver_on_rails, y, z):
+    _, truth, touched = _fly_in(make_world, receiver_on_rails, y=y, z=z)
+    assert touched and not truth.latched
+
+
+def test_probe_well_outside_the_rim_touches_nothing(make_world, receiver_on_rails):
+    _, truth, touched = _fly_in(make_world, receiver_on_rails, y=0.45)
+    assert not touched and not truth.latched
+
+
+@pytest.mark.parametrize("speed", [2.8, 3.5])
+def test_probe_that_comes_in_too_fast_does_not_latch_not_even_in_the_rebound(make_world, receiver_on_rails, speed):
+    _, truth, touched = _fly_in(make_world, receiver_on_rails, speed=speed)
+    assert touched and not truth.latched
+
+
+def test_probe_at_an_angle_latches_only_once_the_drogue_has_turned_to_it(make_world, receiver_on_rails):
+    """Nose 12 degrees down to a drogue that points 3.5 up."""
+    _, truth, touched = _fly_in(make_world, receiver_on_rails, pitch_rad=np.deg2rad(12.0))
+    angle = np.arccos(truth.R_WB[:, 0] @ truth.R_WD[:, 0])
+    assert touched
+    assert not truth.latched or angle <= COUPLING.angle_limit_rad + 0.01
+
+
+def test_tip_never_goes_through_the_basket(make_world, receiver_on_rails):
+    """Struck at the limit of speed, off centre: 2.6 mm a tick, and the tip stays inside the cone of the ribs."""
+    world = make_world(p_PD_B=(0.35, 0.18, 0.0))
+    drogue, tip = world.parameters.drogue, COUPLING.probe_tip_radius_m
+    for _ in range(250):
+        p_DP = world.step(ReceiverCommand(velocity_m_s=np.array([2.6, 0.0, 0.0]))).p_DP
+        along = (p_DP[0] - tip - drogue.rim_x_m) / (drogue.throat_x_m - drogue.rim_x_m)
+        if 0.0 < along < 1.0:
+            throat = COUPLING.socket_radius_m + drogue.rib_radius_m
+            ribs = 0.5 * drogue.ring_diameter_m * (1.0 - along) + throat * along
+            assert np.hypot(p_DP[1], p_DP[2]) < ribs
+
+
+def test_receiver_that_backs_off_is_let_go_at_the_outer_stop_once_and_not_taken_again(make_world, receiver_on_rails):
+    world, truth, _ = _fly_in(make_world, receiver_on_rails)
+    speed, pulls, released_at, latched_again = 1.2, [], None, False
+    for tick in range(5000):
+        if tick > 800:
+            speed = max(speed - 0.002, -1.0)
+        truth = world.step(ReceiverCommand(velocity_m_s=np.array([speed, 0.0, 0.0])))
+        if truth.latched:
+            pulls.append(truth.coupling_force_n)
+            latched_again = latched_again or released_at is not None
+        elif released_at is None:
+            released_at = truth
+    assert not latched_again
+    assert released_at.coupling_force_n > COUPLING.release_force_n
+    assert COUPLING.release_force_n * 0.9 < max(pulls) <= COUPLING.release_force_n
+    assert abs(released_at.reel_position_m) < 0.1  # at the outer stop, not on the way
+    assert truth.p_DP[0] < -0.3 and np.linalg.norm(truth.v_WD) < 1.0
+
+
+def test_coupling_force_is_what_the_probe_feels(make_world, receiver_on_rails):
+    """Newton for the receiver: m a = own force + weight + coupling's force, along the drogue's axis."""
+    receiver = receiver_on_rails()
+    world = make_world(receiver=receiver, p_PD_B=(0.35, 0.0, 0.0))
+    checked = 0
+    for _ in range(1500):
+        before = world.truth
+        truth = world.step(ReceiverCommand(velocity_m_s=np.array([1.2, 0.0, 0.0])))
+        if before.latched and not before.probe_touches_drogue:
+            weight = receiver.mass_kg * np.array([0.0, 0.0, -9.80665])
+            felt = receiver.mass_kg * truth.a_WB - receiver.force_W - weight
+            assert felt @ before.R_WD[:, 0] == pytest.approx(truth.coupling_force_n, abs=1.0)
+            checked += 1
+    assert checked > 500

@@ -1,0 +1,159 @@
+"""The compiled model: names, geometry, who touches whom, what the camera looks past."""
+
+import mujoco
+import numpy as np
+import pytest
+
+from dockair.calibration import Camera, LedRing
+from dockair.rotations import matrix_from_yaw_pitch_roll
+
+
+@pytest.fixture
+def world(make_world):
+    return make_world(p_PD_B=(4.0, 0.0, 0.0))
+
+
+def _first_hit(world, start, toward, exclude_name=""):
+    """Name of the first geom on the way from a point in a direction, and its distance; "" for none."""
+    geom = np.full(1, -1, dtype=np.int32)
+    direction = np.asarray(toward, dtype=float)
+    distance = mujoco.mj_ray(world.model, world.data, np.asarray(start, dtype=float), direction, None, 1, -1, geom)
+    return (world.model.geom(int(geom[0])).name, distance) if geom[0] >= 0 else ("", np.inf)
+
+
+def test_names_that_others_build_on_exist(world):
+    bodies = {world.model.body(i).name for i in range(world.model.nbody)}
+    links = world.parameters.hose.links
+    assert {"tanker", "drogue", "receiver", *(f"hose_{i}" for i in range(links))} < bodies
+    geoms = {world.model.geom(i).name for i in range(world.model.ngeom)}
+    for prefix in ("probe_", "basket_", "coupling_", "fuselage_", "tanker_", "hose_", "canopy_"):
+        assert any(name.startswith(prefix) for name in geoms), prefix
+    assert "" not in geoms
+
+
+def test_led_sites_are_the_ring_and_lie_in_no_geom(world):
+    """Ten millimetres aft of the rim, on the faces of their housings: a sight line from aft reaches every LED."""
+    R_WD, p_WD = world.truth.R_WD, world.truth.p_WD
+    for k, p_DL in enumerate(LedRing(diameter_m=world.parameters.drogue.ring_diameter_m).positions_D):
+        p_WL = p_WD + R_WD @ p_DL
+        np.testing.assert_allclose(world.data.site(f"led_{k}").xpos, p_WL, atol=1e-12)
+        for yaw, pitch in ((0.0, 0.0), (1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)):
+            aft = -R_WD @ matrix_from_yaw_pitch_roll(yaw, pitch, 0.0)[:, 0]
+            name, distance = _first_hit(world, p_WL + 3.0 * aft, -aft)
+            assert distance > 3.0, (k, yaw, pitch, name)
+
+
+def test_all_leds_are_seen_by_the_camera_from_near_contact_to_thirty_metres(make_world):
+    for distance in (1.5, 3.0, 4.0, 10.0, 30.0):
+        world = make_world(p_PD_B=(distance, 0.0, 0.0))
+        p_WC = world.truth.p_WB + world.truth.R_WB @ world.parameters.mounting.p_BC
+        for k in range(8):
+            sight = world.data.site(f"led_{k}").xpos - p_WC
+            name, hit = _first_hit(world, p_WC, sight / np.linalg.norm(sight))
+            assert hit > np.linalg.norm(sight), (distance, k, name)
+
+
+def test_nothing_of_the_receiver_but_its_probe_stands_in_the_camera_view(world):
+    """Rays over the whole sensor, toed in as mounted; a probe may be in view, a nose at the edge not even that."""
+    camera = Camera()
+    u, v = np.meshgrid(np.linspace(0, camera.width_px - 1, 25), np.linspace(0, camera.height_px - 1, 15))
+    R_BC = matrix_from_yaw_pitch_roll(np.deg2rad(-3.0), 0.0, 0.0)
+    rays = camera.rays_from_pixels(np.column_stack([u.ravel(), v.ravel()])) @ (world.truth.R_WB @ R_BC).T
+    p_WC = world.truth.p_WB + world.truth.R_WB @ world.parameters.mounting.p_BC
+    receiver = world.model.body("receiver").id
+    for ray in rays:
+        name, _ = _first_hit(world, p_WC, ray)
+        if name and not name.startswith("probe_"):
+            assert world.model.geom(name).bodyid[0] != receiver, name
+
+
+def test_probe_ends_exactly_at_the_mounting_point(world):
+    """Its tip is a sphere; the foremost point of the whole probe along the body's x axis is P."""
+    p_BP = world.parameters.mounting.p_BP
+    tip = world.model.geom("probe_tip")
+    assert tip.pos[0] + tip.size[0] == pytest.approx(p_BP[0], abs=1e-12)
+    np.testing.assert_allclose(tip.pos[1:], p_BP[1:], atol=1e-12)
+    ahead = world.truth.p_WP + np.array([1.0, 0.0, 0.0])
+    name, distance = _first_hit(world, ahead, [-1.0, 0.0, 0.0])
+    assert name == "probe_tip" and distance == pytest.approx(1.0, abs=1e-6)
+
+
+def test_receiver_has_the_mass_and_inertia_it_was_given(world, receiver_on_rails):
+    """The compiled inertia, turned back from its principal axes, is the matrix that went in."""
+    body = world.model.body("receiver")
+    R = np.zeros(9)
+    mujoco.mju_quat2Mat(R, body.iquat)
+    R = R.reshape(3, 3)
+    given = receiver_on_rails()
+    assert body.mass[0] == given.mass_kg
+    np.testing.assert_allclose(R @ np.diag(body.inertia) @ R.T, given.inertia_B, atol=1e-6 * given.inertia_B.max())
+    np.testing.assert_array_equal(body.ipos, 0.0)
+
+
+def test_tow_has_the_masses_of_its_sheets(world):
+    hose, drogue = world.parameters.hose, world.parameters.drogue
+    links = sum(world.model.body(f"hose_{i}").mass[0] for i in range(hose.links))
+    assert links == pytest.approx(hose.line_density_kg_m * hose.length_m)
+    assert world.model.body("drogue").mass[0] == drogue.mass_kg
+
+
+def test_only_the_named_pairs_touch(world):
+    """Probe with basket, coupling, hose; the receiver's rest with hose, drogue, tanker; nothing else with anything."""
+    model = world.model
+    allowed = {
+        frozenset(pair)
+        for pair in (
+            *(("probe", other) for other in ("drogue", "hose")),
+            *(("receiver", other) for other in ("drogue", "hose", "tanker")),
+        )
+    }
+
+    def group(geom):
+        if model.geom(geom).name.startswith("probe_"):
+            return "probe"
+        body = model.body(int(model.geom_bodyid[geom])).name
+        return "hose" if body.startswith("hose_") else body
+
+    for a in range(model.ngeom):
+        for b in range(a):
+            touch = (
+                model.geom_contype[a] & model.geom_conaffinity[b] or model.geom_contype[b] & model.geom_conaffinity[a]
+            )
+            drawn_only = any(
+                model.geom(g).name.startswith(("canopy_", "led_housing_")) and group(g) == "drogue" for g in (a, b)
+            )
+            expected = frozenset((group(a), group(b))) in allowed and not drawn_only
+            assert bool(touch) == expected, (model.geom(a).name, model.geom(b).name)
+
+
+def test_probe_tip_cannot_pass_between_two_ribs(world):
+    drogue, coupling = world.parameters.drogue, world.parameters.coupling
+    spacing = 2.0 * 0.5 * drogue.ring_diameter_m * np.sin(np.pi / drogue.ribs)
+    assert spacing - 2.0 * drogue.rib_radius_m < 2.0 * coupling.probe_tip_radius_m
+
+
+def test_probe_on_the_centre_line_reaches_the_coupling_point_untouched(world):
+    coupling = world.parameters.coupling
+    assert coupling.socket_radius_m > coupling.probe_tip_radius_m
+    R_WD, p_WD = world.truth.R_WD, world.truth.p_WD
+    for angle in np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False):
+        offset = coupling.probe_tip_radius_m * np.array([0.0, np.cos(angle), np.sin(angle)])
+        start = p_WD + R_WD @ (offset - np.array([0.5, 0.0, 0.0]))
+        name, distance = _first_hit(world, start, R_WD[:, 0])
+        assert name == "coupling_body"
+        assert distance == pytest.approx(0.5 + coupling.depth_m + coupling.stop_gap_m, abs=1e-6)
+
+
+def test_light_is_the_sun_alone(world):
+    model = world.model
+    assert model.nlight == 1 and not model.light_castshadow[0]
+    np.testing.assert_allclose(model.light_dir[0], [0.0, 0.0, -1.0], atol=1e-12)
+    assert not model.vis.headlight.active
+    assert model.vis.quality.offsamples == 0
+
+
+def test_every_colour_is_grey(world):
+    rgba = world.model.geom_rgba
+    np.testing.assert_array_equal(rgba[:, :1], rgba[:, 1:2])
+    np.testing.assert_array_equal(rgba[:, :1], rgba[:, 2:3])
+    assert rgba[:, 3].min() == 1.0
