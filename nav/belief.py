@@ -33,9 +33,10 @@ from numba import njit
 
 from dockair.calibration import Mounting
 from dockair.nav.pose.descent import PosePrior
+from dockair.nav.pose.difference import pose_difference
 from dockair.nav.pose.estimate import PoseEstimate
 from dockair.nav.pose.posterior import posteriors
-from dockair.rotations import Array, exp, log
+from dockair.rotations import Array, exp
 
 _MERGE_CHI2 = 9.0  # squared distance in sigmas below which two are told as one: 3 sigma
 _LOG_NEGLIGIBLE = -14.0  # logarithm of the relative weight, about 1e-6, at which a hypothesis dies
@@ -90,7 +91,7 @@ def corrected(beliefs: Sequence[Belief], pose: PoseEstimate, mounting: Mounting,
         for after in posteriors(prior, pose):
             if after.gate_chi2 > gate:
                 continue
-            step = T @ np.concatenate([log(after.R_CD @ prior.R_CD.T), after.p_CD - prior.p_CD])
+            step = T @ pose_difference(after.R_CD, after.p_CD, prior.R_CD, prior.p_CD)
             P, P_aa = belief.P, T @ after.covariance @ T.T
             K = np.linalg.solve(P[:6, :6], P[:6, 6:]).T  # Eq. (3)
             P_va = K @ P_aa
@@ -123,8 +124,8 @@ def mixture(beliefs: Sequence[Belief]) -> Belief:
 
 
 def _difference(belief: Belief, other: Belief) -> Array:
-    turn = log(belief.R_BD @ other.R_BD.T)
-    return np.concatenate([turn, belief.p_BD - other.p_BD, belief.v_BD - other.v_BD])
+    difference = pose_difference(belief.R_BD, belief.p_BD, other.R_BD, other.p_BD)
+    return np.concatenate([difference, belief.v_BD - other.v_BD])
 
 
 def _kept(found: list[Belief]) -> list[Belief]:

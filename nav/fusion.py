@@ -10,8 +10,13 @@ A frame is taken at its capture time: the belief is rolled back to the stamp, co
 again, in whatever order frames arrive. Between gyro samples the rate is linear. The gate is the frame's likelihood
 ratio against the prediction, chi-square with 6 degrees of freedom (`pose.posterior`).
 
+Errors of calibration and mounting are constant in the camera: frames neither show them nor average them. They stand
+beside the filter and join the covariance where it goes out. A camera turned by dtheta, misplaced by dp, of scale 1 + k:
+
+    phi += dtheta,    p_PD += dtheta x c + dp + k c,    c = s - p_BC                                  (2)
+
 Not modelled: gyro bias as a state (at 10 deg/h it moves a drogue 10 m away by 0.5 mm/s; it is in the gyro's noise),
-errors of calibration and mounting (constant in the camera, so no frame shows them), the drogue's swing as a system.
+single LEDs out of place (0.3 mm is 0.3 px at 3 m: say so in the frame's sigma_px), the drogue's swing as a system.
 """
 
 from bisect import bisect_right
@@ -40,6 +45,11 @@ class FusionSettings:
     bias_correlation_s: float = 1.0  # the gyro's bias counts as noise of this correlation time; of the filter's memory
     gate_probability: float = 0.9999  # a good frame is refused once in 10 000
     buffer_s: float = 0.25  # how late a frame may be
+    #: Hardware beside its sheets, 1 sigma each: 0.05 degrees of mounting and 1 px of principal point; 2 mm of mounting;
+    #: 0.05 % of focal length and 0.3 mm of the ring's diameter of 0.5 m (as-built hardware is drawn so).
+    camera_axes_sigma_rad: float = 9.4e-4
+    camera_place_sigma_m: float = 2e-3
+    camera_scale_sigma: float = 7.8e-4
     rate_average_s: float = 0.01  # gyro samples averaged for Eq. (1): noise against lag, 5 samples at 500 Hz
 
 
@@ -140,6 +150,7 @@ class RelativeFilter:
         sigma_w2 = gyro.noise_density_rad_s_rthz**2 / self._settings.rate_average_s + gyro.bias_sigma_rad_s**2
         covariance = belief.P.copy()
         covariance[6:, 6:] += sigma_w2 * skew(p_BP) @ skew(p_BP).T
+        covariance[:6, :6] += self._calibration_covariance(belief.p_BD - self._mounting.p_BC)
         return FilterState(
             time_s=time_s,
             R_BD=belief.R_BD,
@@ -176,6 +187,16 @@ class RelativeFilter:
     def rate_B(self, time_s: float) -> Array:
         """(3,) angular velocity w_WB_B that the gyro says at a time, body axes [rad/s]."""
         return self._rate(time_s)
+
+    def _calibration_covariance(self, p_CD_B: Array) -> Array:
+        """(6, 6) of (phi, p_PD_B), Eq. (2), for the ring centre p_CD_B (3,) from the camera [m]."""
+        settings, covariance = self._settings, np.zeros((6, 6))
+        axes2, lever = settings.camera_axes_sigma_rad**2, skew(p_CD_B)
+        covariance[:3, :3] = axes2 * np.eye(3)
+        covariance[:3, 3:], covariance[3:, :3] = axes2 * lever, axes2 * lever.T
+        covariance[3:, 3:] = axes2 * lever @ lever.T + settings.camera_place_sigma_m**2 * np.eye(3)
+        covariance[3:, 3:] += settings.camera_scale_sigma**2 * np.outer(p_CD_B, p_CD_B)
+        return covariance
 
     def _take_gyro(self, time_s: float, w_B: Array) -> None:
         before = self._gyro_times[-1] if self._gyro_times else -np.inf

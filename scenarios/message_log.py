@@ -4,17 +4,22 @@
 |--------------------|------------------------------------------------------------------------------------|
 | messages.parquet   | gyro samples and, if one arrived, the frame: lossless PNG, window, stamp, exposure, gain |
 | estimates.parquet  | every field of `NavSolution`; all numbers as 64-bit floats                         |
-| navigator.json     | the navigator's class, its calibration sheets and settings, floats to the last bit |
+| navigator.json     | the navigator's class, its calibration sheets and settings, floats to the last bit,      |
+|                    | and a digest of the navigation's sources                                                 |
 
 Frames are encoded in a thread of their own: OpenCV releases the interpreter lock meanwhile, so that the control loop
 waits only when the encoder is more than `QUEUE_TICKS` behind. No truth enters these files.
 """
 
 import json
+import platform
 import queue
 import threading
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, is_dataclass
+from hashlib import blake2b
+from importlib.metadata import version
+from importlib.resources import as_file, files
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -34,7 +39,8 @@ from dockair.scenarios.exact_json import decode, encode, import_by_name
 QUEUE_TICKS = 200  # ticks waiting for the encoder; at 50 frames/s of 2.2 MB full frames at most 220 MB
 ROW_GROUP_TICKS = 100
 MESSAGES, ESTIMATES, NAVIGATOR = "messages.parquet", "estimates.parquet", "navigator.json"
-_PNG = [cv2.IMWRITE_PNG_COMPRESSION, 1]
+#: Sensor noise has no patterns to look back for: Huffman coding alone is smaller and quicker than a search.
+_PNG = [cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PNG_STRATEGY_HUFFMAN_ONLY]
 
 _FLOATS = pa.list_(pa.float64())
 _WINDOW_COLUMNS = [f.name for f in fields(Window)]
@@ -68,7 +74,12 @@ class NavigatorRecipe:
 
     def write(self, out_dir: Path) -> None:
         """Write `navigator.json`."""
-        table = {"navigator": self.class_name, "sheets": encode(self.sheets), "settings": encode(self.settings)}
+        table = {
+            "navigator": self.class_name,
+            "code": code_fingerprint(),
+            "sheets": encode(self.sheets),
+            "settings": encode(self.settings),
+        }
         (out_dir / NAVIGATOR).write_text(json.dumps(table, indent=1, allow_nan=False) + "\n", encoding="utf-8")
 
     @classmethod
@@ -77,6 +88,24 @@ class NavigatorRecipe:
         table = json.loads(_existing(out_dir, NAVIGATOR).read_text(encoding="utf-8"))
         sheets, settings = decode(table["sheets"]), decode(table["settings"])
         return cls(class_name=table["navigator"], sheets=sheets, settings=settings)
+
+
+def code_fingerprint() -> str:
+    """Return a digest of the navigation's sources, and of Python's and its libraries' versions."""
+    package = files("dockair.nav")
+    digest = blake2b(digest_size=16)
+    with as_file(package) as folder:
+        for path in sorted(folder.rglob("*.py")):
+            digest.update(path.relative_to(folder).as_posix().encode() + path.read_bytes())
+    for library in ("numpy", "scipy", "numba", "opencv-python-headless", "filterpy"):
+        digest.update(f"{library} {version(library)}".encode())
+    digest.update(platform.python_version().encode())
+    return digest.hexdigest()
+
+
+def recorded_code(out_dir: str | Path) -> str:
+    """Return the `code_fingerprint` of the recording."""
+    return str(json.loads(_existing(Path(out_dir), NAVIGATOR).read_text(encoding="utf-8")).get("code", ""))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -189,12 +218,9 @@ def _message_row(imu: tuple[ImuSample, ...], frame: CameraFrame | None) -> dict[
         "gyro_angular_rate_rad_s": [float(rate) for sample in imu for rate in sample.angular_rate_rad_s],
     }
     if frame is not None:
-        done, png = cv2.imencode(".png", frame.pixels, _PNG)
-        if not done:
-            raise OSError("a camera frame could not be encoded as PNG")
         row |= {name: getattr(frame.window, name) for name in _WINDOW_COLUMNS}
         row |= {"frame_time_stamp_s": frame.time_stamp_s, "exposure_s": frame.exposure_s, "gain": frame.gain}
-        row["png"] = png.tobytes()
+        row["png"] = png_from_pixels(frame.pixels)
     return row
 
 
@@ -237,6 +263,14 @@ def _tick_from_row(row: dict[str, Any], pixels: bool) -> TickMessages:
         gain=row["gain"],
     )
     return TickMessages(imu=imu, frame=frame, png=png)
+
+
+def png_from_pixels(pixels: NDArray[np.uint8]) -> bytes:
+    """Return a lossless PNG of (rows, columns) pixels."""
+    done, png = cv2.imencode(".png", pixels, _PNG)
+    if not done:
+        raise OSError("a camera frame could not be encoded as PNG")
+    return png.tobytes()
 
 
 def pixels_from_png(png: bytes) -> NDArray[np.uint8]:

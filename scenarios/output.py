@@ -1,5 +1,7 @@
 """What the command line shows to people: tables on stdout, progress on stderr."""
 
+import os
+import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
@@ -92,7 +94,9 @@ def show_result(result: Mapping[str, Any], shortfalls: Sequence[str] | None, fol
     console = Console(highlight=False)
     colour = "green" if result["outcome"] == "contact" else "yellow"
     mark = "  (perfect navigation: the truth in place of the camera)" if result.get("truth_navigation") else ""
-    console.print(f"[bold {colour}]{result['outcome']}[/]  {result['scenario']}, seed {result['seed']}{mark}")
+    console.print(
+        f"[bold {colour}]{result['outcome']}[/]  {result['scenario']}, seed {result['seed']}{mark}", soft_wrap=True
+    )
     table = Table(show_header=False, box=None, padding=(0, 1))
     table.add_column()
     table.add_column(justify="right")
@@ -107,7 +111,8 @@ def show_result(result: Mapping[str, Any], shortfalls: Sequence[str] | None, fol
     for path in sorted(folder.iterdir()):
         console.print(f"  {path}  [dim]{path.stat().st_size / 1e6:.2f} MB[/]", soft_wrap=True)
     if (folder / "episode.rrd").exists():
-        console.print(f"look at it: rerun --bind 127.0.0.1 {folder / 'episode.rrd'}", soft_wrap=True)
+        viewer = os.path.relpath(Path(sys.executable).parent / "rerun")
+        console.print(f"look at it: {viewer} --bind 127.0.0.1 {folder / 'episode.rrd'}", soft_wrap=True)
 
 
 def show_scenarios(scenarios: Sequence["Scenario"]) -> None:

@@ -3,8 +3,10 @@
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import pyarrow.parquet as pq
+from numpy.typing import NDArray
 
 from dockair.errors import DockairError
 from dockair.rotations import Array
@@ -12,6 +14,7 @@ from dockair.scenarios import flight_log, message_log
 
 FILE_NAME = "flight.png"
 FRAME_AT_M = 1.5  # the frame shown is the one with most LEDs named when the ring is about this far ahead of the tip
+_GROW_PX = 3
 _SIZE_IN, _DPI = (11.0, 6.2), 110
 _TRUTH, _BELIEF, _FOUND, _GREY = "#1f77b4", "#ff7f0e", "#34c759", "#9a9a9a"
 _PHASE_COLOURS = {
@@ -91,10 +94,7 @@ def _chosen_frame(folder: Path, flight: Any) -> tuple[Any, tuple[int, int], Any,
     if not (folder / message_log.MESSAGES).is_file():
         return None
     ahead, named = _values(flight, "nav_p_PD_B_x_m"), _values(flight, "nav_leds_named")
-    stamps = _values(flight, "nav_frame_time_stamp_s")
-    fresh = np.flatnonzero(np.diff(stamps, prepend=np.nan) > 0.0)
-    if len(fresh) == 0:
-        return None
+    fresh = _fresh(flight)
     chosen = int(fresh[np.argmin(np.abs(ahead[fresh] - FRAME_AT_M) + 10.0 * (8 - named[fresh]))])
     messages = message_log.read_messages(folder, pixels=False)
     tick = next(tick for k, tick in enumerate(messages) if k == chosen)
@@ -111,8 +111,11 @@ def _draw_frame(
 ) -> None:
     left, top = corner
     rows, columns = pixels.shape
+    grown = cv2.dilate(
+        pixels, np.ones((_GROW_PX, _GROW_PX), np.uint8)
+    )  # an LED is a few pixels wide: nobody would see it
     extent = (left - 0.5, left + columns - 0.5, top + rows - 0.5, top - 0.5)
-    axes.imshow(np.sqrt(pixels / 255.0), cmap="gray", extent=extent, vmin=0.0, vmax=1.0, interpolation="nearest")
+    axes.imshow(np.sqrt(grown / 255.0), cmap="gray", extent=extent, vmin=0.1, vmax=0.7, interpolation="antialiased")
     axes.scatter(*candidates.T, s=70, facecolors="none", edgecolors="#ffd60a", linewidths=0.8)
     centre = np.nanmean(leds, axis=0) if np.isfinite(leds).any() else np.zeros(2)
     for number, led in enumerate(leds):
@@ -158,20 +161,27 @@ def _draw_approach(axes: Any, flight: Any) -> None:
 def _draw_errors(axes: Any, flight: Any) -> None:
     time_s = _values(flight, "time_s")
     _shade_phases(axes, flight, named=False)
-    valid = _values(flight, "nav_valid").astype(bool)
-    sizes = []
+    shown = _fresh(flight)
+    sizes_mm = []
     for axis, colour, label in (("x", _BELIEF, "along"), ("y", _TRUTH, "left"), ("z", "#8e44ad", "up")):
-        error_mm = 1e3 * (_values(flight, f"nav_p_PD_B_{axis}_m") - _values(flight, f"truth_p_PD_B_{axis}_m"))
-        error_mm = np.where(valid, error_mm, np.nan)
-        sizes.append(error_mm)
-        axes.plot(time_s, error_mm, color=colour, lw=0.9, label=label)
-    sigma_mm = 3e3 * _values(flight, "nav_sigma_p_PD_B_x_m")
-    axes.plot(time_s, sigma_mm, color=_BELIEF, lw=0.7, ls=":", label="3 sigma, along")
-    axes.plot(time_s, -sigma_mm, color=_BELIEF, lw=0.7, ls=":")
-    finite = np.abs(np.concatenate(sizes))[np.isfinite(np.concatenate(sizes))]
-    limit = 1.6 * float(np.percentile(finite, 99.0)) if len(finite) else 1.0
+        error_mm = 1e3 * (_values(flight, f"nav_p_PD_B_{axis}_m") - _values(flight, f"truth_p_PD_B_{axis}_m"))[shown]
+        sizes_mm.append(np.abs(error_mm))
+        axes.plot(time_s[shown], error_mm, color=colour, lw=0.9, label=label)
+    sigma_mm = 3e3 * _values(flight, "nav_sigma_p_PD_B_x_m")[shown]
+    axes.plot(time_s[shown], sigma_mm, color=_BELIEF, lw=0.8, ls=":", label="3 sigma, along")
+    axes.plot(time_s[shown], -sigma_mm, color=_BELIEF, lw=0.8, ls=":")
+    sizes = np.concatenate(sizes_mm)
+    limit = 1.6 * float(np.nanpercentile(sizes, 95.0)) if np.isfinite(sizes).any() else 1.0
     axes.set_ylim(-max(limit, 1.0), max(limit, 1.0))
     axes.set(xlabel="time [s]")
     axes.set_ylabel("belief - truth [mm]", fontsize=9)
     _legend_beside(axes)
     axes.tick_params(labelsize=8)
+
+
+def _fresh(flight: Any) -> NDArray[np.int64]:
+    """Return the ticks with a new frame; every tick of a flight without camera."""
+    stamps = _values(flight, "nav_frame_time_stamp_s")
+    if not np.isfinite(stamps).any():
+        return np.arange(len(stamps), dtype=np.int64)
+    return np.asarray(np.flatnonzero(np.diff(stamps, prepend=np.nan) > 0.0), dtype=np.int64)

@@ -2,7 +2,8 @@
 
 | entity                              | from               | drawn                                               |
 |-------------------------------------|--------------------|-----------------------------------------------------|
-| camera/window/pixels_*              | message log        | the window's pixels, lossless, at their place       |
+| camera/window/pixels_*              | message log        | the window's pixels, lossless, at their place; of   |
+|                                     |                    | long flights every n-th frame, to keep files small  |
 | camera/{candidates,leds,ring,...}   | NavSolution        | candidates, named LEDs, the believed ring projected |
 | world/{tanker,hose,drogue,receiver} | Truth              | the model's own primitives                          |
 | world/receiver/belief               | NavSolution        | the believed drogue, orange, beside the true one    |
@@ -18,14 +19,13 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 
 from dockair.calibration import NavigationSheets
 from dockair.messages import NavSolution, Window
 from dockair.rotations import Array
 from dockair.scenarios.flight_log import FlightLog
-from dockair.scenarios.message_log import TickMessages, pixels_from_png
+from dockair.scenarios.message_log import TickMessages, pixels_from_png, png_from_pixels
 from dockair.scenarios.recording_layout import BELIEF, CLOSE_UP, FOUND, NEUTRAL, TRUTH, blueprint
 from dockair.scenarios.recording_plots import log_plots
 from dockair.scenarios.recording_scene import log_scene, time_columns
@@ -33,6 +33,8 @@ from dockair.sim.shapes import Shape
 
 FILE_NAME = "episode.rrd"
 PADDING_PX = 128
+FRAME_BYTES = 30_000_000  # of frames in an episode; the message log holds every one of them
+_BATCH = 64
 RATE_HZ = 50  # of everything but the plots, which have the control rate
 _PIXEL_CENTRE = 0.5  # the viewer puts the top left corner of the top left pixel at (0, 0), the project its centre
 
@@ -68,7 +70,7 @@ def write_episode(
     log_scene(recording, log, ticks, sheets, shapes)
     log_plots(recording, log)
     _log_overlays(recording, log, ticks, sheets)
-    _log_frames(recording, log, messages)
+    _log_frames(recording, log, list(messages))
     if summary:
         recording.log("summary", rr.TextDocument(summary, media_type="text/markdown"), static=True)
     recording.flush()
@@ -141,11 +143,11 @@ def padded_shape(window: Window) -> tuple[int, int]:
     return -(-rows // PADDING_PX) * PADDING_PX, -(-columns // PADDING_PX) * PADDING_PX
 
 
-def _log_frames(recording: Any, log: FlightLog, messages: Iterable[TickMessages]) -> None:
+def _log_frames(recording: Any, log: FlightLog, messages: Sequence[TickMessages]) -> None:
     import rerun as rr
 
     before = ""
-    for number, (time_s, window, png) in enumerate(_padded_frames(log, messages)):
+    for number, time_s, window, png in _padded_frames(log, messages):
         recording.set_time("sim_time", duration=time_s)
         recording.set_time("frame", sequence=number)
         entity = f"camera/window/pixels_{'x'.join(str(size) for size in padded_shape(window))}"
@@ -161,21 +163,26 @@ def _log_frames(recording: Any, log: FlightLog, messages: Iterable[TickMessages]
         recording.log("camera/window/outline", box)
 
 
-def _padded_frames(log: FlightLog, messages: Iterable[TickMessages]) -> Iterator[tuple[float, Window, bytes]]:
-    """Yield time of delivery, window and padded PNG of each frame; encoded by threads, a few dozen at a time."""
+def shown_frames(sizes_bytes: Sequence[int]) -> range:
+    """Return which frames are shown: every n-th, n as small as FRAME_BYTES allow."""
+    return range(0, len(sizes_bytes), max(1, -(-sum(sizes_bytes) // FRAME_BYTES)))
 
-    def pad(entry: tuple[float, Window, bytes]) -> tuple[float, Window, bytes]:
-        time_s, window, png = entry
+
+def _padded_frames(log: FlightLog, messages: Sequence[TickMessages]) -> Iterator[tuple[int, float, Window, bytes]]:
+    """Yield number, time of delivery, window and padded PNG of each frame shown; threads encode a few dozen at once."""
+
+    def pad(entry: tuple[int, float, Window, bytes]) -> tuple[int, float, Window, bytes]:
+        number, time_s, window, png = entry
         canvas = np.zeros(padded_shape(window), np.uint8)
         canvas[: window.shape[0], : window.shape[1]] = pixels_from_png(png)
-        return time_s, window, cv2.imencode(".png", canvas, [cv2.IMWRITE_PNG_COMPRESSION, 1])[1].tobytes()
+        return number, time_s, window, png_from_pixels(canvas)
 
-    waiting: list[tuple[float, Window, bytes]] = []
+    frames = [
+        (truth.time_s, tick.frame.window, tick.png)
+        for truth, tick in zip(log.truths, messages, strict=False)
+        if tick.frame is not None and tick.png is not None
+    ]
+    chosen = [(k, *frames[k]) for k in shown_frames([len(png) for _, _, png in frames])]
     with ThreadPoolExecutor(max_workers=2) as pool:
-        for truth, tick in zip(log.truths, messages, strict=False):
-            if tick.frame is not None and tick.png is not None:
-                waiting.append((truth.time_s, tick.frame.window, tick.png))
-            if len(waiting) == 64:
-                yield from pool.map(pad, waiting)
-                waiting.clear()
-        yield from pool.map(pad, waiting)
+        for first in range(0, len(chosen), _BATCH):
+            yield from pool.map(pad, chosen[first : first + _BATCH])

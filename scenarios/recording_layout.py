@@ -18,6 +18,8 @@ PHASES = {
     "clear": [90, 90, 100],
     "breakaway": [255, 69, 58],
 }
+STATUSES = {"pose used": [36, 138, 61], "no frame yet": [90, 90, 100], "truth": [90, 200, 250]}
+OTHER = [200, 80, 60]  #: of a state that is none of these: something was not as it should be
 AXES = [[255, 69, 58], [48, 209, 88], [10, 132, 255]]
 
 CLOSE_UP = "camera/close_up"  #: an entity at the believed ring's centre; the close-up view looks from there
@@ -42,7 +44,7 @@ def blueprint(camera: Camera) -> Any:
         visual_bounds=rrb.VisualBounds2D(x_range=[-half, half], y_range=[-half, half]),
     )
     cameras = rrb.Vertical(sensor, close_up, row_shares=[4, 6])
-    scene = _scene("world", "Scene", eye=(-31.0, 8.5, 1.0), target=(-15.0, -1.0, -2.0))
+    scene = _scene("world", "Scene", eye=(-33.0, 10.5, 2.0), target=(-14.0, 0.5, -1.2))
     drogue = _scene("world/drogue", "At the drogue: belief in orange", eye=(-2.2, 1.5, 0.7), target=(-0.3, 0.0, 0.0))
     views = rrb.Horizontal(cameras, scene, drogue, column_shares=[5, 6, 5])
     return rrb.Blueprint(

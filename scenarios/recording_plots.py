@@ -8,7 +8,7 @@ import numpy as np
 from dockair.rotations import Array
 from dockair.scenarios.flight_log import FlightLog, standard_deviations
 from dockair.scenarios.metrics import true_relative_state
-from dockair.scenarios.recording_layout import AXES, BELIEF, NEUTRAL, PHASES, TRUTH
+from dockair.scenarios.recording_layout import AXES, BELIEF, NEUTRAL, OTHER, PHASES, STATUSES, TRUTH
 
 _SIGMA = [130, 130, 130]
 
@@ -23,10 +23,8 @@ def log_plots(recording: Any, log: FlightLog) -> None:
     for entity, (label, colour, values) in plot_series(log).items():
         recording.log(f"plots/{entity}", rr.SeriesLines(names=label, colors=colour, widths=1.5), static=True)
         recording.send_columns(f"plots/{entity}", times, rr.Scalars.columns(scalars=values))
-    phases = rr.StateConfiguration(values=list(PHASES), labels=list(PHASES), colors=list(PHASES.values()))
-    recording.log("states/phase", phases, static=True)
-    _log_states(recording, log, "states/phase", [s.phase for s in log.solutions])
-    _log_states(recording, log, "states/frame", [s.status for s in log.solutions])
+    _log_states(recording, log, "states/phase", [s.phase for s in log.solutions], PHASES)
+    _log_states(recording, log, "states/frame", [s.status for s in log.solutions], STATUSES)
 
 
 def plot_series(log: FlightLog) -> Mapping[str, tuple[str, Sequence[int], Array]]:
@@ -68,10 +66,15 @@ def _shade(colour: Sequence[int], axis: int) -> list[int]:
     return [c if axis == 1 else c * 3 // 5 for c in colour]
 
 
-def _log_states(recording: Any, log: FlightLog, entity: str, values: Sequence[str]) -> None:
+def _log_states(
+    recording: Any, log: FlightLog, entity: str, values: Sequence[str], colours: Mapping[str, Sequence[int]]
+) -> None:
     import rerun as rr
 
     changes = [k for k, value in enumerate(values) if k == 0 or value != values[k - 1]]
     times = [rr.TimeColumn("sim_time", duration=[log.truths[k].time_s for k in changes])]
     states = [values[k].replace("_", " ") or "none" for k in changes]
+    known = sorted(set(states))
+    look = rr.StateConfiguration(values=known, labels=known, colors=[colours.get(state, OTHER) for state in known])
+    recording.log(entity, look, static=True)
     recording.send_columns(entity, times, rr.StateChange.columns(state=states))

@@ -23,7 +23,14 @@ import numpy as np
 
 from dockair.errors import DockairError
 from dockair.rotations import Array
-from dockair.scenarios.message_log import NavigatorRecipe, estimate_row, read_estimates, read_messages
+from dockair.scenarios.message_log import (
+    NavigatorRecipe,
+    code_fingerprint,
+    estimate_row,
+    read_estimates,
+    read_messages,
+    recorded_code,
+)
 
 FORBIDDEN = ("dockair.sim", "mujoco", "dockair.assets", "dockair.parameters")
 
@@ -46,6 +53,7 @@ class ReplayReport:
     ticks: int
     frames: int
     first_difference: Difference | None
+    same_code: bool = True  #: the navigation's sources and its libraries are those of the flight
     forbidden_modules: tuple[str, ...] = FORBIDDEN
 
     def to_json(self) -> str:
@@ -56,7 +64,8 @@ class ReplayReport:
         if self.first_difference is None:
             return f"identical: {self.ticks} control ticks, {self.frames} frames, every bit of every estimate"
         d = self.first_difference
-        return f"differs at control tick {d.tick}, {d.field}: recorded {d.recorded}, replayed {d.replayed}"
+        why = "" if self.same_code else "; the navigation's code or its libraries have changed since the flight"
+        return f"differs at control tick {d.tick}, {d.field}: recorded {d.recorded}, replayed {d.replayed}{why}"
 
 
 class _RefuseForbiddenModules(MetaPathFinder):
@@ -88,6 +97,7 @@ def replay_in_this_process(out_dir: str | Path) -> ReplayReport:
     """
     folder = Path(out_dir)
     navigator = NavigatorRecipe.read(folder).build()
+    same_code = recorded_code(folder) == code_fingerprint()
     ticks = frames = 0
     for messages, recorded in itertools.zip_longest(read_messages(folder), read_estimates(folder)):
         if messages is None or recorded is None:
@@ -97,10 +107,12 @@ def replay_in_this_process(out_dir: str | Path) -> ReplayReport:
             if name not in recorded or not same_bits(recorded[name], replayed[name]):
                 values = {"recorded": str(recorded.get(name, "nothing")), "replayed": str(replayed[name])}
                 first = Difference(tick=ticks, field=name, **values)
-                return ReplayReport(identical=False, ticks=ticks, frames=frames, first_difference=first)
+                return ReplayReport(
+                    identical=False, ticks=ticks, frames=frames, first_difference=first, same_code=same_code
+                )
         ticks += 1
         frames += messages.frame is not None
-    return ReplayReport(identical=True, ticks=ticks, frames=frames, first_difference=None)
+    return ReplayReport(identical=True, ticks=ticks, frames=frames, first_difference=None, same_code=same_code)
 
 
 def replay(out_dir: str | Path) -> ReplayReport:
@@ -125,6 +137,7 @@ def replay(out_dir: str | Path) -> ReplayReport:
         ticks=table["ticks"],
         frames=table["frames"],
         first_difference=Difference(**first) if first else None,
+        same_code=table["same_code"],
     )
 
 

@@ -72,6 +72,7 @@ def _set_options(spec: Any, step_s: float) -> None:
     spec.option.timestep = step_s
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.gravity = [0.0, 0.0, -STANDARD_GRAVITY_M_S2]
+    spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET  # the world says so when a step diverges
     spec.compiler.degree = False
     spec.compiler.autolimits = False
     sensor = Camera()

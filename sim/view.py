@@ -1,7 +1,7 @@
 """A third person's view of the world; nothing that flies looks through it.
 
-The eye follows a point from behind and to the left. Greys are near-infrared reflectances in the scene's
-own light, with the shadow side filled in; LEDs are drawn as small bright spheres, which they are not: near infrared is invisible.
+The eye follows a point from behind and to the left. Greys are near-infrared reflectances in the scene's own
+light, with the shadow side filled in; LEDs are drawn as small bright spheres, though near infrared is invisible.
 """
 
 import os

@@ -41,6 +41,7 @@ _WAITING_PLACE_M = (-300.0, 0.0, -20.0)  # of the receiver while the hose settle
 __all__ = ["World", "WorldParameters", "WorldStart", "WorldState"]
 
 _STATE = mujoco.mjtState.mjSTATE_INTEGRATION
+_DIVERGED = 1e10  # acceleration at which MuJoCo calls a step unstable [m/s^2 or rad/s^2]
 _GRAVITY = np.array([0.0, 0.0, -STANDARD_GRAVITY_M_S2])
 
 
@@ -183,6 +184,9 @@ class World:
         self._decide_coupling()
         if self._gusts is not None:
             self._gusts.step()
+        if not (np.abs(data.qacc) < _DIVERGED).all():
+            time_s = self._clock.seconds(tick)
+            raise DockairError("world", expected="a physics step that converges", got=f"diverged at {time_s:.3f} s")
         mujoco.mj_step1(self.model, data)
         self._observe(tick)
 

@@ -5,8 +5,9 @@ A ring of unit radius at p, spanned by two perpendicular unit vectors a, b (its 
     X_s = p + a cos 45 s + b sin 45 s,   u = c_u - f X_y/X_x,   v = c_v - f X_z/X_x         (1)
 
 Six unknowns, like the affine octagon's, but exact: four LEDs leave two equations to check, eight leave ten. It is
-fitted by Levenberg-Marquardt from both tilts that parallel projection cannot tell apart; the better fit counts.
-Candidates off the fit by more than the tolerance are dropped, the worst first, and candidates on it are taken up.
+fitted by Levenberg-Marquardt, and again from that fit mirrored along the line of sight, which parallel projection
+cannot tell from it; the better one counts. Candidates off the fit by more than the tolerance are dropped, the worst
+first, and candidates on it are taken up.
 
 The pose serves identification alone (range in radii, attitude up to noise); `nav/pose` estimates the real one.
 Not modelled: LEDs out of plane, distortion (give undistorted pixels).
@@ -33,7 +34,7 @@ _FIRST_LOOK = 3.0  # tolerances within which the first fit takes candidates up: 
 class RingFit:
     """Eq. (1) fitted to some candidates."""
 
-    candidate: NDArray[np.int64]  #: (8,) candidate in each slot, -1 for none
+    candidate: NDArray[np.int64]  #: (8,) in each slot, -1 for none
     slots_px: Array  #: (8, 2) image of every slot, seen or not
     centre_px: Array  #: (2,) image of the ring's centre
     radius_px: float  #: f over the centre's depth: the radius of the ring's image if it were frontal
@@ -61,10 +62,10 @@ def fit_ring(
     Args:
         points: (n, 2) candidates, undistorted [px].
         candidate: (8,) which of them is in each slot, -1 for none; at least three.
-        focal_length_px: of the camera.
-        principal_point_px: of the camera.
-        tolerance_px: largest residual at radius 0,
-        tolerance_per_radius: and what the LEDs' own position errors add, root of the sum of squares [px/px].
+        focal_length_px: of the camera, as the next.
+        principal_point_px: (u, v).
+        tolerance_px: largest residual; to it comes, root of the sum of squares,
+        tolerance_per_radius: for the LEDs' own position errors [px/px].
     """
     cu, cv = principal_point_px
     relative = np.ascontiguousarray(points - np.array([cu, cv])) / focal_length_px
@@ -99,10 +100,8 @@ def _project(pose):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _solve(N, b):  # type: ignore[no-untyped-def]
-    """Solution (n, m) of N x = b, N (n, n) symmetric positive definite, by elimination in place.
-
-    Loops, here and below, because slices of arrays this small cost more than the sums they hold.
-    """
+    """Solution (n, m) of N x = b, N (n, n) symmetric positive definite, by elimination in place."""
+    # loops, here and below, because slices of arrays this small cost more than the sums they hold
     n, m = b.shape
     for k in range(n):
         pivot = max(N[k, k], 1e-300)
@@ -140,18 +139,14 @@ def _affine(points, candidate):  # type: ignore[no-untyped-def]
 @njit(cache=True)
 def _orthonormalise(pose):  # type: ignore[no-untyped-def]
     """Make rows a and b unit vectors, b perpendicular to a, in place."""
-    a_length = np.sqrt(pose[1, 0] ** 2 + pose[1, 1] ** 2 + pose[1, 2] ** 2)
-    along = 0.0
-    for k in range(3):
-        pose[1, k] /= a_length
-        along += pose[1, k] * pose[2, k]
-    pose[2] -= along * pose[1]
+    pose[1] /= np.sqrt(pose[1, 0] ** 2 + pose[1, 1] ** 2 + pose[1, 2] ** 2)
+    pose[2] -= (pose[1, 0] * pose[2, 0] + pose[1, 1] * pose[2, 1] + pose[1, 2] * pose[2, 2]) * pose[1]
     pose[2] /= np.sqrt(pose[2, 0] ** 2 + pose[2, 1] ** 2 + pose[2, 2] ** 2)
 
 
 @njit(cache=True)
-def _start_pose(affine, side):  # type: ignore[no-untyped-def]
-    """One of the two poses whose parallel projection is the affine octagon; side is +1 or -1."""
+def _start_pose(affine):  # type: ignore[no-untyped-def]
+    """One of the two poses whose projection along the camera's axis is the affine octagon."""
     aa, bb, ab = (affine[1] ** 2).sum(), (affine[2] ** 2).sum(), (affine[1] * affine[2]).sum()
     scale2 = 0.5 * (aa + bb + np.sqrt((aa - bb) ** 2 + 4.0 * ab * ab))
     scale = np.sqrt(scale2)
@@ -161,7 +156,7 @@ def _start_pose(affine, side):  # type: ignore[no-untyped-def]
     pose = np.empty((3, 3))
     pose[0, 0] = 1.0 / scale
     pose[0, 1:] = -affine[0] / scale
-    pose[1, 0], pose[2, 0] = side * depth_a, side * depth_b
+    pose[1, 0], pose[2, 0] = depth_a, depth_b
     pose[1, 1:] = -affine[1] / scale
     pose[2, 1:] = -affine[2] / scale
     _orthonormalise(pose)
@@ -246,10 +241,19 @@ def _refine(points, candidate, pose):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
+def _mirrored(pose):  # type: ignore[no-untyped-def]
+    """The other pose with nearly the same image: a and b with their parts along the line of sight turned round."""
+    other = pose.copy()
+    ray = pose[0] / np.sqrt(pose[0, 0] ** 2 + pose[0, 1] ** 2 + pose[0, 2] ** 2)
+    for k in (1, 2):
+        other[k] -= 2.0 * (pose[k, 0] * ray[0] + pose[k, 1] * ray[1] + pose[k, 2] * ray[2]) * ray
+    return other
+
+
+@njit(cache=True)
 def _best_pose(points, candidate):  # type: ignore[no-untyped-def]
-    affine = _affine(points, candidate)
-    pose, squares = _refine(points, candidate, _start_pose(affine, 1.0))
-    other, other_squares = _refine(points, candidate, _start_pose(affine, -1.0))
+    pose, squares = _refine(points, candidate, _start_pose(_affine(points, candidate)))
+    other, other_squares = _refine(points, candidate, _mirrored(pose))
     if other_squares < squares:
         return other, other_squares
     return pose, squares

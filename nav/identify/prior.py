@@ -6,12 +6,15 @@ Roll phi is the angle of LED 0 in the image seen from the centre, from left (-u)
 """
 
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dockair.errors import DockairError
 from dockair.rotations import Array
+
+Expectation = TypeVar("Expectation", Array, float)
 
 _ANYWHERE_PX = 1e6  # radius of a gate that lets everything pass
 
@@ -78,6 +81,10 @@ def ring_from_leds(led_px: Array) -> tuple[Array, float, float]:
     return centre, float(np.linalg.norm(A, 2)), roll
 
 
+def _finite(expectation: Expectation | None) -> Expectation | None:
+    return expectation if expectation is not None and np.isfinite(expectation).all() else None
+
+
 def make_prior(
     radius_range_px: tuple[float, float],
     centre_tolerance_radii: float,
@@ -88,7 +95,7 @@ def make_prior(
     led_px: Array | None,
     sigma_px: float | None,
 ) -> RingPrior:
-    """Gates from whatever is expected.
+    """Gates from whatever is expected; an expectation that is not finite is none (a prediction behind the camera).
 
     Args:
         radius_range_px: when no radius is expected.
@@ -103,6 +110,8 @@ def make_prior(
     Raises:
         DockairError: wrong shapes.
     """
+    centre_px, led_px = _finite(centre_px), _finite(led_px)
+    radius_px, roll_rad, sigma_px = _finite(radius_px), _finite(roll_rad), _finite(sigma_px)
     if led_px is not None:
         led_px = np.asarray(led_px, dtype=float)
         if led_px.shape != (8, 2):

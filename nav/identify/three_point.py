@@ -7,9 +7,9 @@
 The source prints D and E as double sums; i is fixed. Of the circles through LEDs of one ring all are nearly the same,
 so the ring's have the largest T, and the candidates within 10 % of its radius are the LEDs.
 
-As printed, T is largest at the geometric median of *all* circles: true while the ring's are the majority of them. Among
-n candidates 8 LEDs make 56 circles of n(n-1)(n-2)/6, and ten noise blobs are enough to end that majority. `cap` bounds
-each distance, which turns the median into the densest place; the identification uses it so.
+As printed, T is largest at the geometric median of *all* circles, which is the ring's while its circles are the
+majority. Eight LEDs make 56 of the n(n-1)(n-2)/6 circles through n candidates: two noise blobs end that majority. `cap`
+bounds each distance, which turns the median into the densest place; the identification uses it so.
 
 Cost grows as n^3 for the circles and n^6 for the trust: `identify` bounds n, and takes the trust of those circles only
 whose octagon has been found (`octagon`).

@@ -123,7 +123,8 @@ def _levels(image: Image, settings: DetectSettings) -> tuple[int, float, float]:
     if image.size == 0:
         return settings.threshold_dn or 0, 0.0, sensor_noise
     statistics = frame_statistics(image)
-    noise = max(statistics.noise_dn, sensor_noise)
+    # the interpolated histogram spreads every level over its width, which adds a rounding error's variance once more
+    noise = float(np.sqrt(max(statistics.noise_dn**2 - _QUANTISATION_VARIANCE, sensor_noise**2)))
     if settings.threshold_dn is not None:
         return settings.threshold_dn, statistics.background_dn, noise
     threshold = adaptive_threshold(

@@ -19,6 +19,7 @@ from dockair.calibration import Camera
 from dockair.errors import DockairError
 from dockair.nav.pose import model
 from dockair.nav.pose.descent import Descent, PosePrior
+from dockair.nav.pose.difference import pose_difference
 from dockair.nav.pose.glsdc import glsdc
 from dockair.nav.pose.levenberg_marquardt import levenberg_marquardt
 from dockair.nav.pose.measurement import LinesOfSight, lines_of_sight_from_pixels
@@ -176,9 +177,7 @@ def _paired(first: PoseEstimate, second: PoseEstimate) -> PoseEstimate:
     """Return the first with the second as its alternative, if that is a minimum and another one."""
     if first.status is not PoseStatus.CONVERGED or second.status is not PoseStatus.CONVERGED:
         return first
-    turn = second.R_CD @ first.R_CD.T
-    turn = 0.5 * np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
-    step = np.concatenate([turn, second.p_CD - first.p_CD])
+    step = pose_difference(second.R_CD, second.p_CD, first.R_CD, first.p_CD)
     if step @ np.linalg.solve(first.covariance, step) < _SAME_MINIMUM_CHI2:
         return first
     return replace(first, alternative=second)

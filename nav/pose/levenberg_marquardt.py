@@ -19,7 +19,7 @@ LEVENBERG_MARQUARDT = DescentSettings(
     damping=DIAGONAL,
     first_damping=1e-4,  # small: a start is either near, or the schedule soon corrects it
     tolerance_sigma=1e-6,  # far below anything that noise lets one see
-    max_iterations=60,  # the worst of random starts up to 60 degrees and 50 % of the range off needs about half
+    max_iterations=60,  # from starts 60 degrees and half the range off the median is 6, 99 % end within 25
 )
 
 

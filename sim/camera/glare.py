@@ -148,7 +148,7 @@ def _is_lit_and_seen(
 ) -> bool:
     ray = p_WC - p
     distance = float(np.linalg.norm(ray))
-    if n @ s_W < math.cos(light.glint_grazing_rad) or n @ ray <= 0.0:
+    if n @ s_W < math.cos(light.glint_grazing_rad):  # as n halves the angle, the camera stands on the lit side too
         return False
     start = p + _SKIN_M * n
     return is_clear(model, data, start, ray / distance, distance) and is_clear(model, data, start, s_W, np.inf)

@@ -17,7 +17,8 @@ to be (1 - s/l) theta. Under a tension T a torsion spring against the axis does 
 
 capped where it is as stiff as the tube. So the drogue moves smoothly while joint after joint passes the exit.
 
-Not modelled: the drum's changing diameter, friction of the hose in the tube, slack on the drum.
+Not modelled: the drum's changing diameter, friction of the hose in the tube, slack on the drum. The reel acts along the
+pod's axis, so that it balances T cos(theta) of the hose's tension: 2 per cent at the usual 12 degrees.
 Sources: RflySim/RflySimAAR (gain); limits in assets/parameters/reel.toml; Eq. (3) derived from the link's balance.
 """
 

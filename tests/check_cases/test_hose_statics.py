@@ -79,6 +79,22 @@ def test_rest_shape_agrees_with_two_other_solutions(row):
     np.testing.assert_allclose(ours[2:], cable[2:], rtol=0.005)
 
 
+@pytest.mark.parametrize("row", ROWS)
+def test_rest_shape_balances_every_hinge_of_the_model_exactly(make_world, row):
+    """Gravity and air loads, as the world applies them, leave no moment about any hinge of a hose without stiffness."""
+    speed, altitude, length, diameter, mass, *_ = row
+    world = make_world(
+        airspeed_m_s=speed,
+        altitude_m=altitude,
+        hose={"length_m": length, "bending_stiffness_n_m2": 0.0},
+        drogue={"drag_diameter_m": diameter, "mass_kg": mass},
+        p_PD_B=(80.0, 0.0, 0.0),
+    )
+    world.step(ReceiverCommand())
+    first, last = world.model.joint("hose_0_y").dofadr[0], world.model.joint("drogue_z").dofadr[0]
+    np.testing.assert_allclose(world.data.qfrc_smooth[first : last + 1], 0.0, atol=1e-6)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("row", [ROWS[0], ROWS[4], ROWS[5]])
 def test_world_let_go_in_another_shape_comes_to_rest_there(make_world, row):

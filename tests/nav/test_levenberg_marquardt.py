@@ -14,6 +14,7 @@ from dockair.nav.pose.measurement import LinesOfSight, lines_of_sight_from_pixel
 from dockair.rotations import Array, exp, log, matrix_from_yaw_pitch_roll
 
 RING, CAMERA = LedRing().positions_D, Camera()
+PATIENT = replace(LEVENBERG_MARQUARDT, max_iterations=300)
 
 
 def random_pose(rng: np.random.Generator, low_m: float = 2.0, high_m: float = 30.0) -> tuple[Array, Array]:
@@ -39,18 +40,19 @@ def test_agrees_with_scipys_least_squares_on_the_same_cost():
         sight = seen(R, p, 0.1 * rng.normal(size=(8, 2)))
         A = whitened(sight)
 
-        def residuals(x, R=R, p=p, sight=sight, A=A):
+        def residuals(x, R, p, sight=sight, A=A):
             s = RING @ (exp(x[:3]) @ R).T + p + x[3:]
             h = s / np.linalg.norm(s, axis=1, keepdims=True)
             return np.einsum("nij,nj->ni", A, sight.rays - h).ravel()
 
-        theirs = least_squares(residuals, np.zeros(6), x_scale="jac", xtol=1e-15, ftol=1e-15, gtol=1e-15)
+        options = {"x_scale": "jac", "xtol": 1e-15, "ftol": 1e-15, "gtol": 1e-15}
+        theirs = least_squares(residuals, np.zeros(6), args=(R, p), **options)
         ours = levenberg_marquardt(sight, R, p)
         np.testing.assert_allclose(log(ours.R_CD @ R.T), theirs.x[:3], atol=1e-8)
         np.testing.assert_allclose(ours.p_CD - p, theirs.x[3:], atol=1e-8)
         assert ours.cost == pytest.approx(2.0 * theirs.cost, rel=1e-8)
-        expected = np.linalg.inv(theirs.jac.T @ theirs.jac)
-        np.testing.assert_allclose(ours.covariance, expected, rtol=1e-4, atol=1e-4 * np.abs(expected).max())
+        J = least_squares(residuals, np.zeros(6), args=(ours.R_CD, ours.p_CD), **options).jac
+        np.testing.assert_allclose(ours.covariance @ (J.T @ J), np.eye(6), atol=1e-3)
 
 
 def test_gradient_vanishes_at_the_minimum():
@@ -89,9 +91,6 @@ def test_poor_starts_lead_to_the_minimum_or_its_mirror_image():
         tilt = [np.arccos(np.clip(attitude[:, 0] @ sight_C, -1.0, 1.0)) for attitude in (R, end.R_CD)]
         mirror = (end.R_CD[:, 0] + R[:, 0]) / np.linalg.norm(end.R_CD[:, 0] + R[:, 0]) @ sight_C > np.cos(0.05)
         assert right or (mirror and abs(tilt[0] - tilt[1]) < 0.1)
-
-
-PATIENT = replace(LEVENBERG_MARQUARDT, max_iterations=300)
 
 
 def test_start_behind_the_camera_is_a_status():

@@ -17,6 +17,8 @@ from dockair.scenarios.referee import Outcome
 
 #: The world without camera: what is tested here does not depend on who navigates.
 QUICK = "truth_navigation"
+#: The checker recommends actions in [-1, 1]; ours are in units (gymnasium.wrappers.RescaleAction changes that).
+allow_units = pytest.mark.filterwarnings("ignore:.*symmetric and normalized space")
 
 
 @pytest.fixture
@@ -43,6 +45,7 @@ def _same(a, b) -> bool:
 
 
 @pytest.mark.slow
+@allow_units
 def test_the_contract_of_gymnasium_is_kept(env):
     check_env(env, skip_render_check=True)
 
@@ -50,6 +53,7 @@ def test_the_contract_of_gymnasium_is_kept(env):
 @pytest.mark.slow
 @pytest.mark.gl
 @pytest.mark.timeout(900)
+@allow_units
 def test_the_registered_environment_passes_the_checker_with_the_camera_in_the_loop():
     assert "dockair/Dock-v0" in dockair.ENVIRONMENTS
     made = gymnasium.make("dockair/Dock-v0", render_mode="rgb_array")
@@ -59,12 +63,14 @@ def test_the_registered_environment_passes_the_checker_with_the_camera_in_the_lo
         made.close()
 
 
+@pytest.mark.slow
 def test_the_same_seed_is_the_same_flight_and_another_is_another(env):
     first, again, other = _fly(env, 11, 12), _fly(env, 11, 12), _fly(env, 12, 12)
     assert all(_same(a, b) for a, b in zip(first, again, strict=True))
     assert not np.array_equal(first[-1][0], other[-1][0])
 
 
+@pytest.mark.slow
 def test_without_a_seed_the_environment_draws_the_next_flight_from_its_own_generator(env):
     env.reset(seed=3)
     second = env.reset()[0]

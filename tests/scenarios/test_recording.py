@@ -1,4 +1,4 @@
-"""`episode.rrd` is a file that the viewer accepts, holds the very pixels that were delivered, and what §7 of it says."""
+"""`episode.rrd` is a file that the viewer accepts, with the very pixels that were delivered and all it promises."""
 
 import subprocess
 import sys
@@ -12,7 +12,14 @@ from dockair.messages import Window
 from dockair.scenarios.flight_log import FlightLog
 from dockair.scenarios.message_log import MessageLog, NavigatorRecipe, read_messages
 from dockair.scenarios.picture import picture_of_flight
-from dockair.scenarios.recording import believed_ring_px, drawn_ticks, padded_shape, write_episode
+from dockair.scenarios.recording import (
+    FRAME_BYTES,
+    believed_ring_px,
+    drawn_ticks,
+    padded_shape,
+    shown_frames,
+    write_episode,
+)
 from dockair.scenarios.recording_plots import plot_series
 from dockair.sim.shapes import Shape
 
@@ -112,6 +119,12 @@ def test_the_believed_ring_passes_through_the_leds_when_the_belief_is_true(make_
     solution = replace(solution, R_BD=truth.R_WB.T @ truth.R_WD)
     ring = believed_ring_px(solution, flight.sheets, count=48)
     np.testing.assert_allclose(ring[:-1:6], flight.leds_px(truth), atol=1e-9)
+
+
+def test_frames_are_thinned_evenly_until_they_fit():
+    assert shown_frames([1000] * 50) == range(50)
+    thinned = shown_frames([FRAME_BYTES // 100] * 350)  # three and a half times too much
+    assert thinned == range(0, 350, 4)
 
 
 def test_windows_are_padded_to_the_next_multiple():

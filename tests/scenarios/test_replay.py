@@ -11,10 +11,10 @@ import pyarrow.parquet as pq
 import pytest
 
 from dockair.errors import DockairError
-from dockair.scenarios.message_log import ESTIMATES, MESSAGES, MessageLog, NavigatorRecipe
+from dockair.scenarios.message_log import ESTIMATES, MESSAGES, NAVIGATOR, MessageLog, NavigatorRecipe
 from dockair.scenarios.replay import FORBIDDEN, replay, same_bits
 
-NAVIGATOR = '''
+SUMS = '''
 import numpy as np
 from dockair.messages import NavSolution, ReceiverCommand
 {imports}
@@ -32,8 +32,8 @@ class Sums:
             self.total = self.total + np.sqrt(frame.pixels.astype(float)).mean() / (1.0 + frame.window.row_start)
         return NavSolution(
             time_stamp_s=imu[-1].time_stamp_s, valid=True, phase="approach", status="summed", p_PD_B=self.total,
-            v_PD_B=imu[-1].angular_rate_rad_s / 3.0, R_BD=np.eye(3), covariance=np.full((9, 9), np.nan), command=ReceiverCommand(),
-            window=None if frame is None else frame.window, frame_time_stamp_s=float("nan"),
+            v_PD_B=imu[-1].angular_rate_rad_s / 3.0, R_BD=np.eye(3),
+            covariance=np.full((9, 9), np.nan), command=ReceiverCommand(), window=None if frame is None else frame.window, frame_time_stamp_s=float("nan"),
             candidates_px=np.empty((0, 2)), led_pixels_px=np.full((8, 2), np.nan),
         )
 '''
@@ -45,7 +45,7 @@ def record(hand_made, tmp_path, monkeypatch):
 
     def recorded(imports: str = "", ticks: int = 40):
         module = f"users_navigator_{abs(hash(imports))}"
-        (tmp_path / f"{module}.py").write_text(textwrap.dedent(NAVIGATOR.replace("{imports}", imports)))
+        (tmp_path / f"{module}.py").write_text(textwrap.dedent(SUMS.replace("{imports}", imports)))
         monkeypatch.syspath_prepend(str(tmp_path))
         recipe = NavigatorRecipe(class_name=f"{module}:Sums", sheets=hand_made.sheets)
         navigator = recipe.build()
@@ -89,6 +89,15 @@ def test_an_estimate_changed_in_its_last_bit_is_found(record):
     report = replay(out)
     assert report.first_difference is not None
     assert (report.first_difference.tick, report.first_difference.field) == (7, "v_PD_B")
+
+
+def test_a_difference_says_whether_the_code_is_still_the_flights(record):
+    out = record()
+    _edit(out / ESTIMATES, "valid", 0, lambda v: [0.0])
+    assert "have changed since the flight" not in str(replay(out))
+    recipe = json.loads((out / NAVIGATOR).read_text())
+    (out / NAVIGATOR).write_text(json.dumps(recipe | {"code": "another"}))
+    assert "have changed since the flight" in str(replay(out))
 
 
 def test_a_recording_that_was_cut_off_is_refused(record):

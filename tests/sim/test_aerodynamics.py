@@ -43,7 +43,7 @@ def force_and_moment(
 def test_published_trim_of_the_f16_is_reproduced(
     centre_of_gravity: float, alpha_rad: float, elevator_deg: float
 ) -> None:
-    """Level flight at 502 ft/s, sea level [Stevens & Lewis, table 3.6-3], in the table's own rounded air and gravity."""
+    """Level flight at 502 ft/s, sea level [Stevens & Lewis, table 3.6-3]; the elevator agrees to its last digit."""
     airframe = load_parameters("airframe", AirframeParameters, {"centre_of_gravity": centre_of_gravity})
     trim = level_trim(airframe, 502.0 * 0.3048, standard_atmosphere(0.0))
     assert trim.alpha_rad == pytest.approx(alpha_rad, abs=5e-5)

@@ -98,8 +98,8 @@ def test_a_windows_background_is_the_full_frames(window: Window) -> None:
 
 
 def test_far_from_the_origin_the_picture_is_the_same() -> None:
-    """7 km away single precision steps by 0.5 mm; at 2 m that is 0.2 px here."""
-    far = np.array([7000.0, -3000.0, 500.0])
+    """70 km away single precision steps by 8 mm; at 2 m that is 2 px here."""
+    far = np.array([70000.1237, -30000.7771, 5000.3139])
     near_scene = _scene(((2.0, 0.1, 0.05), 0.11, 1.0))
     far_scene = _scene((tuple(far + [2.0, 0.1, 0.05]), 0.11, 1.0))
     near, there = _draw(*near_scene), _draw(*far_scene, pose=(np.eye(3), far))

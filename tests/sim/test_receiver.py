@@ -211,6 +211,16 @@ def test_drift_has_the_strength_and_the_correlation_of_the_sheet() -> None:
     assert correlation == pytest.approx(np.exp(-1.0), abs=4.4 * np.sqrt((1.0 + np.exp(-2.0)) / 1200))
 
 
+def test_drift_is_the_same_function_of_time_whatever_the_step() -> None:
+    coarse, fine = (InertialVelocity(0.2, 1000.0, step_s, np.random.default_rng(5)) for step_s in (1e-3, 5e-4))
+    for _ in range(3500):
+        at_coarse = coarse.step(np.zeros(3))
+        fine.step(np.zeros(3))
+        at_fine = fine.step(np.zeros(3))
+    np.testing.assert_allclose(at_fine, at_coarse, rtol=0.0, atol=1e-12)
+    assert np.abs(at_fine - InertialVelocity(0.2, 1000.0, 1e-3, np.random.default_rng(5)).drift_m_s).max() > 1e-4
+
+
 def test_pull_of_the_hose_is_held() -> None:
     """1.7 kN aft and 0.3 kN down, at once: below 0.2 m/s lost, all back after 8 s, less than a metre gone."""
 

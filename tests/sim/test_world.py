@@ -76,18 +76,18 @@ def test_receiver_starts_where_it_was_asked_to_from_the_mean_drogue(make_world):
 
 
 def test_every_velocity_of_the_truth_is_the_rate_of_its_place(make_world):
-    """Central differences over 2 ms, error of order (jerk dt^2); rates of turn from the attitude's."""
+    """A difference over two ticks is the mean of the rates at the ends of its halves, to order (jerk dt^2)."""
     world = make_world(gusts=_gusts(3))
-    _swing(world, 0.5)
-    history = [world.step(FORWARD) for _ in range(60)]
-    a, b, c = history[30], history[31], history[32]
+    _swing(world, 0.1)
+    history = [world.step(FORWARD) for _ in range(400)]
+    a, b, c = history[-3:]
     for place, rate in (("p_WB", "v_WB"), ("p_WP", "v_WP"), ("p_WD", "v_WD")):
         difference = (getattr(c, place) - getattr(a, place)) * 500.0
-        np.testing.assert_allclose(getattr(b, rate), difference, atol=5e-3, err_msg=rate)
+        np.testing.assert_allclose(0.5 * (getattr(b, rate) + getattr(c, rate)), difference, atol=5e-4, err_msg=rate)
     turn = b.R_WD.T @ (c.R_WD - a.R_WD) * 500.0
-    np.testing.assert_allclose(b.w_WD_D, [turn[2, 1], turn[0, 2], turn[1, 0]], atol=5e-3)
+    np.testing.assert_allclose(0.5 * (b.w_WD_D + c.w_WD_D), [turn[2, 1], turn[0, 2], turn[1, 0]], atol=5e-4)
     np.testing.assert_allclose(b.a_WB, (b.v_WB - a.v_WB) * 1000.0, atol=1e-6)
-    assert b.reel_rate_m_s == pytest.approx((c.reel_position_m - a.reel_position_m) * 500.0, abs=1e-3)
+    assert c.reel_rate_m_s == pytest.approx((c.reel_position_m - b.reel_position_m) * 1000.0, abs=1e-6)
 
 
 def test_truth_is_complete_finite_and_a_copy(make_world):
@@ -147,8 +147,17 @@ def test_uniform_gust_along_the_wind_is_another_airspeed(make_world):
 
 
 def test_hanging_hose_in_still_air_only_loses_energy(make_world):
-    """Without wind the tow hangs and swings; kinetic, potential and bending energy less the reel's work must fall."""
-    world = make_world(airspeed_m_s=1e-9, p_PD_B=FAR, reel={"set_point_fraction": 0.8, "tension_gain": 0.0})
+    """Without wind the tow hangs and swings; kinetic, potential and bending energy less the reel's work must fall.
+
+    The reel is clamped by a damped spring: it pulls along the pod, which a hose that hangs down does not.
+    """
+
+    class Clamp:
+        def step(self, tension_n, position_m, rate_m_s):
+            return -1e5 * position_m - 1e3 * rate_m_s
+
+    world = make_world(airspeed_m_s=1e-9, p_PD_B=FAR)
+    world._tow.reel = Clamp()
     _swing(world, 0.15)
     model, data = world.model, world.data
     reel, work, energies, potential = model.joint("reel"), 0.0, [], []
@@ -162,7 +171,7 @@ def test_hanging_hose_in_still_air_only_loses_energy(make_world):
     energies = np.array(energies)
     swing = np.ptp(potential[:1500])
     assert swing > 5.0
-    assert energies[-1] < energies[0] - 0.1 * swing
+    assert energies[-1] < energies[0] - 0.02 * swing
     # the steps are first order: allow what a thousandth of the swing would be
     assert np.diff(energies[::10]).max() < 1e-3 * swing
 
@@ -235,6 +244,15 @@ def test_receiver_that_runs_into_the_drogue_with_its_nose_is_noticed_by_name(mak
             break
     assert truth.receiver_touches.startswith(("basket_", "coupling_", "hose_"))
     assert not truth.latched
+
+
+def test_step_that_diverges_is_an_error_and_not_a_silent_reset(make_world):
+    world = make_world(p_PD_B=FAR)
+    world.data.qvel[world.model.joint("hose_3_y").dofadr[0]] = 1e9
+    mujoco.mj_step1(world.model, world.data)
+    with pytest.raises(DockairError, match="diverged"):
+        for _ in range(20):
+            world.step(ReceiverCommand())
 
 
 def test_negative_settling_time_is_refused(make_world):

@@ -1,0 +1,132 @@
+import numpy as np
+import pytest
+
+from dockair.errors import DockairError
+from dockair.messages import Window
+from dockair.nav.image.detect import DetectSettings, detect
+
+
+def ring_spots(centre, radius, electrons):
+    angle = np.arange(8) * np.pi / 4
+    return [(centre[0] + radius * np.cos(a), centre[1] + radius * np.sin(a), electrons) for a in angle]
+
+
+def match(blobs, spots):
+    """Largest distance from a spot to its nearest blob [px]."""
+    true = np.array([s[:2] for s in spots])
+    return max(np.hypot(*(blobs.centroids_px - p).T).min() for p in true)
+
+
+@pytest.mark.parametrize(("radius", "electrons"), [(24, 1.2e4), (60, 3e4), (200, 2e5), (330, 1e6)])
+def test_a_ring_is_eight_blobs_at_every_range(render, radius, electrons):
+    spots = ring_spots((400.3, 360.7), radius, electrons)
+    blobs = detect(render((720, 800), spots, np.random.default_rng(radius)))
+    assert len(blobs) == 8
+    assert match(blobs, spots) < 0.15
+
+
+def test_a_far_led_of_four_pixels_survives():
+    image = np.full((60, 60), 2, np.uint8)
+    image[30:32, 30:32] = 70
+    blobs = detect(image)
+    np.testing.assert_allclose(blobs.centroids_px, [[30.5, 30.5]])
+    assert blobs.area_px.tolist() == [4]
+
+
+def test_hot_pixels_streaks_and_the_sun_are_no_leds(render):
+    rng = np.random.default_rng(9)
+    spots = ring_spots((150, 150), 60, 3e4)
+    image = render((400, 400), spots, rng)
+    image[20, 20] = image[300, 30] = 255  # hot pixels
+    image[350, 100:300] = 120  # streak
+    rows, columns = np.indices(image.shape)
+    image[(rows - 320) ** 2 + (columns - 320) ** 2 < 13.5**2] = 255  # 27 px disc
+    blobs = detect(image)
+    assert len(blobs) == 8
+    assert match(blobs, spots) < 0.05
+
+
+def test_a_frame_of_noise_has_no_blobs(render):
+    for seed, background in enumerate((0.0, 100.0, 2000.0)):
+        assert len(detect(render((1088, 2048), [], np.random.default_rng(seed), background_e=background))) == 0
+
+
+def test_a_window_gives_the_full_frame_s_centroids(render):
+    spots = ring_spots((500, 400), 80, 3e4)
+    full = render((700, 900), spots, np.random.default_rng(10))
+    window = Window(row_start=290, row_stop=510, column_start=395, column_stop=605)
+    part = detect(full[290:510, 395:605], None, window)
+    whole = detect(full)
+    assert len(part) == len(whole) == 8
+    # the threshold comes from each one's own statistics, hence the pixels that belong to a blob may differ
+    np.testing.assert_allclose(part.centroids_px, whole.centroids_px, atol=0.01)
+
+
+def test_ten_bit_frames_in_sixteen_bit_words_give_the_same_centres(render):
+    image = render((200, 200), ring_spots((100, 100), 50, 3e4), np.random.default_rng(11))
+    wide = image.astype(np.uint16) * 4
+    settings = DetectSettings(
+        min_contrast_dn=32.0,
+        max_contrast_dn=160.0,
+        gain_dn_per_electron=4 * 255 / 13500,
+        noise_dn=1.0,
+        saturation_dn=1020,
+    )
+    a, b = detect(image), detect(wide, settings)
+    np.testing.assert_allclose(b.centroids_px, a.centroids_px, atol=0.02)
+    np.testing.assert_array_equal(b.clipped, a.clipped)
+
+
+def test_a_fixed_threshold_is_taken_as_it_is(render):
+    image = render((100, 100), [(50.0, 50.0, 2e4)], np.random.default_rng(12))
+    assert detect(image, DetectSettings(threshold_dn=60)).threshold_dn == 60
+    assert len(detect(image, DetectSettings(threshold_dn=250))) == 0
+
+
+def test_the_frame_s_gain_sets_the_shot_noise(render):
+    image = render((100, 100), [(50.0, 50.0, 2e4)], np.random.default_rng(13))
+    settings = DetectSettings(sigma_floor_px=0.0)
+    quiet, loud = (detect(image, settings, gain_dn_per_electron=g).sigma_px[0] for g in (0.0, 1.0))
+    assert loud > 3.0 * quiet
+
+
+def test_a_reversed_view_of_a_frame_is_detected_like_its_copy(render):
+    image = render((150, 150), ring_spots((70, 80), 40, 3e4), np.random.default_rng(14))[::-1, ::-1]
+    np.testing.assert_array_equal(detect(image).centroids_px, detect(image.copy()).centroids_px)
+
+
+@pytest.mark.parametrize(
+    "image",
+    [
+        np.zeros((0, 0), np.uint8),
+        np.zeros((5, 0), np.uint8),
+        np.zeros((1, 1), np.uint8),
+        np.full((50, 70), 255, np.uint8),
+        np.full((3, 2000), 65535, np.uint16),
+    ],
+)
+def test_frames_without_contrast_have_no_blobs(image):
+    assert len(detect(image)) == 0
+    assert detect(image).centroids_px.shape == (0, 2)
+
+
+def test_random_frames_give_finite_blobs_of_allowed_area():
+    rng = np.random.default_rng(15)
+    for _ in range(300):
+        shape = rng.integers(1, 40, 2)
+        image = (rng.random(shape) ** rng.uniform(0.2, 8.0) * 255).astype(np.uint8)
+        blobs = detect(image)
+        assert np.isfinite(blobs.centroids_px).all() and np.isfinite(blobs.sigma_px).all()
+        assert ((blobs.area_px >= 3) & (blobs.area_px <= 400)).all()
+        assert (blobs.sigma_px > 0).all()
+
+
+def test_wrong_images_and_settings_are_refused():
+    with pytest.raises(DockairError, match="dtype"):
+        detect(np.zeros((4, 4)))
+    with pytest.raises(DockairError, match="rows, columns"):
+        detect(np.zeros((4, 4, 3), np.uint8))
+    with pytest.raises(DockairError, match="window"):
+        detect(np.zeros((4, 4), np.uint8), None, Window(0, 5, 0, 4))
+    with pytest.raises(DockairError, match="min_area_px"):
+        DetectSettings(min_area_px=500)

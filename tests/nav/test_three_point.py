@@ -1,0 +1,85 @@
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from dockair.nav.identify.three_point import all_triples, circles_through, most_trusted_circle, trust
+
+
+def ring(centre, radius, phase=0.1):
+    angle = phase + np.arange(8) * np.pi / 4
+    return np.asarray(centre) + radius * np.column_stack([np.cos(angle), np.sin(angle)])
+
+
+@given(
+    u=st.floats(-1e4, 1e4),
+    v=st.floats(-1e4, 1e4),
+    r=st.floats(1, 1e4),
+    phases=st.tuples(*[st.floats(0, 2 * np.pi)] * 3),
+)
+@settings(max_examples=200, deadline=None)
+def test_three_points_on_a_circle_give_it_back(u, v, r, phases):
+    gaps = np.abs(np.subtract.outer(phases, phases)[np.triu_indices(3, 1)])
+    assume(np.minimum(gaps, 2 * np.pi - gaps).min() > 0.05)
+    points = np.array([u, v]) + r * np.column_stack([np.cos(phases), np.sin(phases)])
+    centres, radii = circles_through(points, np.array([[0, 1, 2]]))
+    np.testing.assert_allclose(centres[0], [u, v], atol=1e-6 * r + 1e-9 * np.hypot(u, v))
+    assert radii[0] == pytest.approx(r, rel=1e-6)
+
+
+def test_the_circle_is_that_of_equations_4_to_8():
+    points = np.random.default_rng(19).uniform(-50, 50, (6, 2))
+    triples = all_triples(6)
+    centres, radii = circles_through(points, triples)
+    for triple, centre, radius in zip(triples, centres, radii, strict=True):
+        p = points[triple]
+        A, B, C = np.linalg.solve(np.column_stack([p, np.ones(3)]), -(p**2).sum(axis=1))
+        np.testing.assert_allclose(centre, [-A / 2, -B / 2], rtol=1e-9)
+        assert radius == pytest.approx(np.sqrt(A * A + B * B - 4 * C) / 2, rel=1e-9)
+
+
+def test_points_on_a_line_have_no_circle():
+    _, radii = circles_through(np.array([[0.0, 0.0], [1.0, 2.0], [3.0, 6.0]]), np.array([[0, 1, 2]]))
+    assert radii[0] == np.inf
+
+
+@pytest.mark.parametrize("cap", [np.inf, 5.0])
+def test_trust_is_the_sum_over_all_other_circles(cap):
+    rng = np.random.default_rng(20)
+    X, r = rng.uniform(0, 30, (12, 2)), rng.uniform(5, 20, 12)
+    D = np.minimum(np.linalg.norm(X[:, None] - X, axis=2), cap).sum(axis=1)
+    E = np.minimum(np.abs(r[:, None] - r), cap).sum(axis=1)
+    np.testing.assert_allclose(trust(X, r, alpha=2.0, beta=0.5, cap_px=cap), 1.0 / (2.0 * D + 0.5 * E), rtol=1e-12)
+
+
+def test_triples_are_all_there_are():
+    assert len(all_triples(10)) == 120
+    assert len({tuple(t) for t in all_triples(10)}) == 120
+    assert all_triples(2).shape == (0, 3)
+
+
+@pytest.mark.parametrize("clutter", [0, 1])
+def test_the_source_s_method_finds_the_ring_while_its_circles_are_the_majority(clutter):
+    rng = np.random.default_rng(21)
+    for _ in range(20):
+        points = np.vstack([ring((500, 400), 100), rng.uniform([0, 0], [1000, 800], (clutter, 2))])
+        circle = most_trusted_circle(points)
+        np.testing.assert_allclose(circle.centre_px, [500, 400], atol=1e-6)
+        assert set(range(8)) <= set(circle.members.tolist())
+
+
+def test_bounded_distances_find_the_ring_where_the_printed_ones_find_the_median():
+    """With 12 blobs of noise the ring has 56 of 1140 circles: no majority, so no geometric median."""
+    rng = np.random.default_rng(22)
+    printed = bounded = 0
+    for _ in range(20):
+        points = np.vstack([ring((300, 600), 80), rng.uniform([0, 0], [2000, 1000], (12, 2))])
+        kwargs = {"radius_range_px": (20.0, 400.0)}
+        printed += np.allclose(most_trusted_circle(points, **kwargs).centre_px, [300, 600], atol=2.0)
+        bounded += np.allclose(most_trusted_circle(points, cap_px=10.0, **kwargs).centre_px, [300, 600], atol=2.0)
+    assert bounded == 20
+    assert printed < bounded
+
+
+def test_two_candidates_make_no_circle():
+    assert most_trusted_circle(np.zeros((2, 2))) is None

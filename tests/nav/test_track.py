@@ -1,0 +1,236 @@
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.linalg import solve_discrete_are
+from scipy.stats import chi2
+
+from dockair.calibration import Camera, LedRing
+from dockair.errors import DockairError
+from dockair.messages import Window
+from dockair.nav.identify.ring import Identification, IdentificationStatus, identify
+from dockair.nav.image.detect import detect
+from dockair.nav.track import RingTracker, TrackSettings
+from dockair.rotations import matrix_from_yaw_pitch_roll
+
+DT = 0.02
+SOURCE = TrackSettings(acceleration_radii_s2=0.0)  # [Yoon 2018, III.3]: Q = 0.01 I, R = 4 I, 50 Hz
+CAMERA = Camera()
+
+
+def seen(centre, radius=100.0, status=IdentificationStatus.FOUND):
+    angle = np.arange(8) * np.pi / 4
+    ring = np.asarray(centre, float) - radius * np.column_stack([np.cos(angle), np.sin(angle)])
+    return Identification(
+        status=status, members=np.arange(8), led_numbers=np.arange(8), centre_px=np.asarray(centre, float),
+        radius_px=radius, roll_rad=0.0, led_pixels_px=ring, ellipse=None, rms_px=0.1,
+    )  # fmt: skip
+
+
+MISSING = replace(seen((0, 0)), status=IdentificationStatus.NOT_FOUND)
+
+
+def test_the_steady_state_is_the_riccati_equation_s():
+    """sigma of position 0.509 px for the source's set-up."""
+    tracker = RingTracker(CAMERA, DT, SOURCE)
+    for _ in range(1500):
+        tracker.predict()
+        tracker.update(seen((500, 400)))
+    F = np.block([[np.eye(2), DT * np.eye(2)], [np.zeros((2, 2)), np.eye(2)]])
+    H = np.hstack([np.eye(2), np.zeros((2, 2))])
+    prior = solve_discrete_are(F.T, H.T, 0.01 * np.eye(4), 4.0 * np.eye(2))
+    gain = prior @ H.T @ np.linalg.inv(H @ prior @ H.T + 4.0 * np.eye(2))
+    np.testing.assert_allclose(tracker.covariance, (np.eye(4) - gain @ H) @ prior, rtol=1e-6, atol=1e-12)
+    assert np.sqrt(tracker.covariance[0, 0]) == pytest.approx(0.509, abs=5e-4)
+
+
+@pytest.mark.parametrize("end", [(0.0, 0.0), (60.0, 60.0)])
+def test_errors_stay_inside_three_sigma_in_the_source_s_two_simulations(end):
+    """60 s at rest, and moving from (0, 0) to (60, 60) px; at least 99 % inside after settling [Yoon 2018, Figs 18-19].
+
+    The truth has no process noise, so the filter is conservative.
+    """
+    rng, n = np.random.default_rng(31), 3000
+    tracker = RingTracker(CAMERA, DT, SOURCE)
+    inside = []
+    for k in range(n):
+        true = np.array(end) * k / n
+        tracker.predict()
+        tracker.update(seen(true + 2.0 * rng.standard_normal(2), 100.0 + 2.0 * rng.standard_normal()))
+        error = np.abs(tracker.centre_px - true)
+        inside.append(error <= 3.0 * np.sqrt(np.diag(tracker.covariance)[:2]))
+    assert np.mean(inside[200:]) >= 0.99
+
+
+def test_innovations_are_honest_when_the_truth_has_the_filter_s_process_noise():
+    """Mean NIS of n measurements is chi2(3n)/n; the bounds fail by luck once in 10^4.
+
+    The gate at probability 0.9999 cuts the mean by 0.2 % of 3.
+    """
+    rng, n = np.random.default_rng(32), 3000
+    tracker = RingTracker(CAMERA, DT, SOURCE)
+    F = np.block([[np.eye(3), DT * np.eye(3)], [np.zeros((3, 3)), np.eye(3)]])
+    x = np.array([1000.0, 500.0, 300.0, 0.0, 0.0, 0.0])
+    nis = []
+    for _ in range(n):
+        x = F @ x + 0.1 * rng.standard_normal(6)
+        tracker.predict()
+        if tracker.update(seen(x[:2] + 2.0 * rng.standard_normal(2), x[2] + 2.0 * rng.standard_normal())):
+            nis.append(tracker.normalised_innovation_squared)
+    nis = np.array(nis[50:])  # the start's covariance is not that of this truth
+    low, high = chi2.ppf([5e-5, 1.0 - 5e-5], 3 * len(nis)) / len(nis)
+    assert len(nis) > 0.99 * n - 50
+    assert low < nis.mean() < high
+
+
+def test_white_acceleration_adds_what_equation_1_says():
+    """One prediction from a known covariance: difference of the two filters' P is (a r)^2 [[dt^4/4, dt^3/2], ...]."""
+    covariances = []
+    for settings in (SOURCE, replace(SOURCE, acceleration_radii_s2=8.0)):
+        tracker = RingTracker(CAMERA, DT, settings)
+        tracker.update(seen((500, 400), 100.0))
+        tracker.predict()
+        covariances.append(tracker.covariance)
+    walk = np.array([[DT**4 / 4, DT**3 / 2], [DT**3 / 2, DT**2]])
+    np.testing.assert_allclose(covariances[1] - covariances[0], 800.0**2 * np.kron(walk, np.eye(2)), atol=1e-9)
+
+
+def test_the_camera_s_rotation_is_taken_out_of_the_drogue_s_motion():
+    """A ring at rest seen from a camera that turns by 3 px a frame: predicted without velocity."""
+    shift = np.array([3.0, -2.0])
+    tracker = RingTracker(CAMERA, DT, SOURCE)
+    centre = np.array([500.0, 400.0])
+    tracker.update(seen(centre))
+    for _ in range(100):
+        centre = centre + shift
+        tracker.predict(shift)
+        assert tracker.update(seen(centre))
+        np.testing.assert_allclose(tracker.centre_px, centre, atol=1e-9)
+    np.testing.assert_allclose(tracker.velocity_px_s, 0.0, atol=1e-9)
+
+
+def test_a_measurement_far_outside_its_covariance_is_a_miss_and_changes_nothing():
+    tracker = RingTracker(CAMERA, DT)
+    for _ in range(50):
+        tracker.predict()
+        tracker.update(seen((500, 400)))
+    tracker.predict()
+    before = tracker.centre_px
+    assert not tracker.update(seen((560, 400)))
+    assert not tracker.update(seen((500, 400), radius=160.0))
+    np.testing.assert_array_equal(tracker.centre_px, before)
+    assert tracker.misses == 2
+    assert tracker.update(seen((500, 400)))
+    assert tracker.misses == 0
+
+
+def test_an_ambiguous_ring_neither_begins_nor_feeds_a_track():
+    tracker = RingTracker(CAMERA, DT)
+    assert not tracker.update(seen((500, 400), status=IdentificationStatus.AMBIGUOUS))
+    assert not tracker.tracking
+    assert tracker.update(seen((500, 400)))
+    assert not tracker.update(seen((500, 400), status=IdentificationStatus.AMBIGUOUS))
+    assert tracker.misses == 1
+
+
+def test_the_window_holds_the_ring_grows_with_misses_and_opens_when_the_ring_is_lost():
+    tracker = RingTracker(CAMERA, DT)
+    assert tracker.window() is None
+    for _ in range(20):
+        tracker.predict()
+        tracker.update(seen((900, 500)))
+    sizes = []
+    for _ in range(TrackSettings().misses_until_lost):
+        window = tracker.window()
+        assert window is not None
+        assert window.column_start <= 800 and window.column_stop > 1000
+        assert window.row_start <= 400 and window.row_stop > 600
+        sizes.append(window.shape[0] * window.shape[1])
+        tracker.predict()
+        tracker.update(MISSING)
+    assert (np.diff(sizes) > 0).all()
+    assert sizes[0] < 0.1 * 2048 * 1088
+    assert tracker.window() is None
+    assert not tracker.tracking and np.isnan(tracker.centre_px).all() and np.isnan(tracker.covariance).all()
+    assert tracker.expected_led_px is None
+
+
+def test_the_window_moves_with_the_rotation_to_come_and_stays_on_the_sensor():
+    tracker = RingTracker(CAMERA, DT)
+    tracker.update(seen((900, 500)))
+    still, moved = tracker.window(), tracker.window(np.array([50.0, -20.0]))
+    assert moved == Window(still.row_start - 20, still.row_stop - 20, still.column_start + 50, still.column_stop + 50)
+    edge = RingTracker(CAMERA, DT)
+    edge.update(seen((10, 1080)))
+    window = edge.window()
+    assert window.column_start == 0 and window.row_stop == CAMERA.height_px
+    gone = RingTracker(CAMERA, DT)
+    gone.update(seen((-500, 400)))
+    assert gone.window() is None
+
+
+def test_hidden_leds_do_not_rename_the_others():
+    """A ring that rolls 1 deg a frame through a whole turn, LEDs hidden at random: the numbers go with it."""
+    rng = np.random.default_rng(33)
+    tracker = RingTracker(CAMERA, DT)
+    for k in range(360):
+        angle = np.deg2rad(k) + np.arange(8) * np.pi / 4
+        centre = np.array([900.0, 500.0]) + 0.3 * k
+        ring = centre - 90.0 * np.column_stack([np.cos(angle), np.sin(angle)])
+        visible = rng.permutation(8)[: rng.integers(5, 9)]
+        tracker.predict()
+        expected = {}
+        if tracker.tracking:
+            expected = {
+                "expected_led_px": tracker.expected_led_px,
+                "expected_sigma_px": tracker.expected_sigma_px,
+            }
+        result = identify(ring[visible] + 0.1 * rng.standard_normal((len(visible), 2)), **expected)
+        assert tracker.update(result)
+        np.testing.assert_array_equal(result.led_numbers, visible[result.members])
+
+
+def test_a_rendered_approach_is_followed_with_every_name_right(render):
+    """Pixels to names, 12 m to 3 m in 60 frames, windows as the tracker asks: full frame once, glints about, a roll."""
+    rng = np.random.default_rng(34)
+    tracker = RingTracker(CAMERA, DT)
+    window, sizes, named = CAMERA.full_window, [], 0
+    for k in range(60):
+        range_m = 12.0 - 0.15 * k
+        R_CD = matrix_from_yaw_pitch_roll(0.15, -0.1 + 0.002 * k, 0.01 * k)
+        p_CD = np.array([range_m, 0.4 * np.cos(0.05 * k), 0.2 + 0.1 * np.sin(0.05 * k)])
+        leds = CAMERA.pixels_from_points(p_CD + LedRing().positions_D @ R_CD.T)
+        visible = rng.permutation(8)[: rng.integers(6, 9)]
+        glints = rng.uniform([0, 0], [2047, 1087], (4, 2))
+        spots = [(u, v, 6e4 * (10.0 / range_m) ** 2) for u, v in leds[visible]] + [(u, v, 3e4) for u, v in glints]
+        origin = np.array([window.column_start, window.row_start])
+        inside = [(u - origin[0], v - origin[1], e) for u, v, e in spots]
+        inside = [s for s in inside if -5 < s[0] < window.shape[1] + 5 and -5 < s[1] < window.shape[0] + 5]
+        blobs = detect(render(window.shape, inside, rng), None, window)
+        tracker.predict()
+        result = identify(
+            blobs.centroids_px,
+            expected_led_px=tracker.expected_led_px,
+            expected_sigma_px=tracker.expected_sigma_px if tracker.tracking else None,
+            expected_roll_rad=None if tracker.tracking else 0.0,
+        )
+        assert tracker.update(result), f"frame {k}: {result.status}"
+        errors = np.hypot(*(blobs.centroids_px[result.members] - leds[result.led_numbers]).T)
+        assert errors.max() < 0.3, f"frame {k}"
+        named += len(errors) - len(visible)
+        sizes.append(window.shape[0] * window.shape[1])
+        window = tracker.window() or CAMERA.full_window
+    assert abs(named) <= 2
+    assert max(sizes[1:]) < 0.3 * sizes[0]
+
+
+def test_a_frame_interval_that_is_not_positive_is_refused():
+    with pytest.raises(DockairError, match="frame_interval_s"):
+        RingTracker(CAMERA, 0.0)
+
+
+def test_importing_the_tracker_does_not_import_filterpy():
+    code = "import sys, dockair.nav.track; sys.exit('filterpy' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -1,0 +1,81 @@
+"""What a scenario is made of: geometry of the default hardware, and nothing drawn in what the navigation gets."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from dockair.calibration import Camera, LedRing
+from dockair.parameters import load_parameters
+from dockair.scenarios.build import MountingParameters, build, guidance_settings
+from dockair.scenarios.message_log import numbers
+from dockair.scenarios.schema import load_scenario
+from dockair.sim.hose.coupling import CouplingParameters
+
+SPARE_BEYOND_M, SPARE_M = 3.0, 0.5
+
+
+@cache
+def truth_parts(seed):
+    return build(load_scenario("truth_navigation"), seed)
+
+
+def ring_in_camera(ahead_m, off_m=(0.0, 0.0)):
+    """(8, 3) LEDs in camera axes with the ring's centre so far ahead of the tip, off the probe's line to left and up."""
+    mounting = load_parameters("mounting", MountingParameters).mounting()
+    p_BD = mounting.p_BP + np.array([ahead_m, *off_m])
+    return (LedRing().positions_D + p_BD - mounting.p_BC) @ mounting.R_BC
+
+
+def in_frame(p_C):
+    camera = Camera()
+    u, v = camera.pixels_from_points(p_C).T
+    return np.all((u >= 0) & (u <= camera.width_px - 1) & (v >= 0) & (v <= camera.height_px - 1))
+
+
+def test_the_whole_ring_is_in_the_frame_from_contact_to_30_m():
+    """`ahead` counts from the probe's tip; at contact the tip is a coupling's depth beyond the ring."""
+    depth = load_parameters("coupling", CouplingParameters).depth_m
+    for ahead_m in np.linspace(-depth, 30.0, 400):
+        assert in_frame(ring_in_camera(ahead_m)), ahead_m
+
+
+@pytest.mark.parametrize("direction", np.linspace(0.0, 2.0 * np.pi, 16, endpoint=False))
+def test_beyond_3_m_the_ring_may_be_half_a_metre_off_the_probes_line(direction):
+    off_m = SPARE_M * np.array([np.cos(direction), np.sin(direction)])
+    for ahead_m in np.linspace(SPARE_BEYOND_M, 30.0, 200):
+        assert in_frame(ring_in_camera(ahead_m, off_m)), ahead_m
+
+
+def test_the_camera_stands_where_the_design_says():
+    mounting = load_parameters("mounting", MountingParameters).mounting()
+    behind, beside, above = np.abs(mounting.p_BP - mounting.p_BC)
+    assert 2.0 <= behind <= 3.0 and beside <= 0.6 and above <= 0.25
+    assert np.arccos(mounting.R_BC[0, 0]) <= np.radians(4.0)
+
+
+def test_nothing_that_is_drawn_for_a_flight_reaches_the_navigation():
+    """Sheets of two seeds are equal to the bit, while the worlds differ."""
+    one, other = truth_parts(1), truth_parts(2)
+    assert np.array_equal(numbers(one.sheets), numbers(other.sheets))
+    assert not np.array_equal(one.world.truth.p_WB, other.world.truth.p_WB)
+
+
+def test_the_flight_starts_where_the_scenario_says_within_its_sigma():
+    scenario = load_scenario("still_air", {"navigation.navigator": "truth", "start.sigma_m": [0.0, 0.0, 0.0]})
+    truth = build(scenario, 0).world.truth
+    np.testing.assert_allclose(truth.p_PD_B, scenario.start.p_PD_B, atol=0.01)
+
+
+def test_guidance_takes_the_scenarios_figures():
+    settings = guidance_settings(load_scenario("default", {"guidance.closure_speed_m_s": 1.0, "guidance.hold_s": 7.0}))
+    assert settings.closure_speed_m_s == 1.0
+    assert settings.limits.hold_s == 7.0
+    assert settings.stand_off_m == 4.0
+
+
+def test_the_drogues_nominal_attitude_points_along_the_hose():
+    """Forward and up in W, that is nearly along the trimmed receiver's own nose."""
+    sheets = truth_parts(1).sheets
+    assert sheets.start.R_BD[0, 0] > np.cos(np.radians(5.0))
+    np.testing.assert_allclose(sheets.start.R_BD @ sheets.start.R_BD.T, np.eye(3), atol=1e-12)

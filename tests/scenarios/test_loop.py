@@ -1,0 +1,80 @@
+"""The closed loop: the first flight, its repeatability, and the step of the physics."""
+
+import hashlib
+
+import numpy as np
+import pytest
+
+from dockair.messages import ReceiverCommand
+from dockair.scenarios.loop import Flight, fly
+from dockair.scenarios.schema import load_scenario
+
+pytestmark = pytest.mark.slow
+
+
+def truth_flight(**overrides):
+    return load_scenario("still_air", {"navigation.navigator": "truth"} | overrides)
+
+
+def vision_flight(seconds):
+    return load_scenario("default", {"flight.duration_s": seconds})
+
+
+def trace(scenario, seed):
+    """Hash of every truth, frame and estimate of a flight."""
+    digest = hashlib.sha256()
+    flight = Flight(scenario, seed)
+    try:
+        while True:
+            tick = flight.step()
+            digest.update(tick.truth.p_WB.tobytes() + tick.truth.p_WD.tobytes() + tick.solution.p_PD_B.tobytes())
+            if tick.frame is not None:
+                digest.update(tick.frame.pixels.tobytes())
+            if tick.outcome is not None:
+                return digest.hexdigest()
+    finally:
+        flight.close()
+
+
+@pytest.mark.gl
+def test_the_default_scenario_docks_by_vision_inside_its_limits():
+    result = fly(load_scenario("default"))
+    assert result.outcome == "contact" and not result.truth_navigation
+    assert result.contact.radial_offset_m <= 0.15
+    assert 1.0 <= result.contact.closure_speed_m_s <= 1.5
+    assert result.contact.angle_deg <= 10.0
+    assert result.attempts == 1
+    assert result.hold.duration_s >= 5.0
+    assert result.nav.range_rmse_m < 0.05 and result.nav.lateral_rmse_m < 0.02
+
+
+@pytest.mark.gl
+def test_the_same_seed_gives_the_same_bits_and_another_seed_others():
+    scenario = vision_flight(1.0)
+    first = trace(scenario, 3)
+    assert trace(scenario, 3) == first
+    assert trace(scenario, 4) != first
+
+
+def test_halving_the_physics_step_moves_the_contact_by_less_than_a_centimetre():
+    places = []
+    for rate_hz in (1000, 2000):
+        flight = Flight(truth_flight(**{"rates.physics_hz": rate_hz}), 0)
+        while not (truth := flight.step().truth).latched:
+            assert truth.time_s < 30.0
+        places.append(np.concatenate([truth.p_WP, [flight.referee.contact.radial_offset_m]]))
+    assert np.abs(places[0] - places[1]).max() < 0.01
+
+
+def test_a_command_given_from_outside_is_flown_instead_of_the_navigators():
+    flight = Flight(truth_flight(**{"parameters.flight_control.inertial_velocity_sigma_m_s": 0.0}), 0)
+    back = ReceiverCommand(velocity_m_s=np.array([-1.0, 0.0, 0.0]))
+    for _ in range(600):
+        truth = flight.step(back).truth
+    assert truth.v_WB[0] == pytest.approx(-1.0, abs=0.1)
+
+
+def test_a_flight_without_contact_ends_at_its_duration():
+    result = fly(truth_flight(**{"flight.duration_s": 2.0}))
+    assert result.outcome == "timeout" and result.contact is None
+    assert result.duration_s == pytest.approx(2.0)

@@ -1,0 +1,92 @@
+"""A camera on a small world of its own, so that the sensors' tests do not depend on the whole scene."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+
+from dockair.calibration import Camera, LedRing, Mounting
+from dockair.parameters import load_parameters
+from dockair.rotations import exp, quaternion_from_matrix
+from dockair.sim.as_built import AsBuilt
+from dockair.sim.camera.camera import CameraParameters, LedParameters, LightParameters, NearInfraredCamera
+
+AS_BUILT = AsBuilt(
+    camera=Camera(principal_point_px=(1020.7, 545.1), focal_length_m=0.01601),
+    ring_positions_D=LedRing().positions_D + 1e-3 * np.sin(np.arange(24.0)).reshape(8, 3),
+    led_intensity_w_sr=0.02 * (1.0 + 0.3 * np.cos(np.arange(8.0))),
+    mounting=Mounting(
+        R_BC=exp(np.array([0.002, -0.001, -0.05])), p_BC=np.array([3.3, -0.45, 0.75]), p_BP=np.array([6.0, -0.9, 0.6])
+    ),
+)
+ASIDE_M = 50.0
+
+
+class SmallWorld:
+    """Drogue ahead of the camera along its axis; everything floats and can be put anywhere."""
+
+    def __init__(self) -> None:
+        spec = mujoco.MjSpec()
+        spec.visual.headlight.active = 0
+        spec.stat.extent = 40.0
+        spec.visual.map.znear = 0.0025
+        sky = spec.add_texture(name="sky", type=mujoco.mjtTexture.mjTEXTURE_SKYBOX, width=8, height=8)
+        sky.builtin, sky.rgb1, sky.rgb2 = mujoco.mjtBuiltin.mjBUILTIN_FLAT, [0.2] * 3, [0.2] * 3
+        spec.worldbody.add_light(
+            type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL, dir=[0, 0, -1], ambient=[0.25] * 3, diffuse=[0.75] * 3
+        )
+        self._body(spec, "receiver", "probe_boom", mujoco.mjtGeom.mjGEOM_CAPSULE, [0.04, 0.8, 0.0], [5.2, -0.9, 0.6])
+        self._body(spec, "drogue", "basket_hub", mujoco.mjtGeom.mjGEOM_SPHERE, [0.1, 0.0, 0.0], [0.5, 0.0, 0.0])
+        self._body(spec, "tanker", "tanker_wing", mujoco.mjtGeom.mjGEOM_BOX, [1.0, 15.0, 0.2], [0.0, 0.0, 0.0])
+        self._body(spec, "box", "box", mujoco.mjtGeom.mjGEOM_BOX, [0.02, 0.05, 0.05], [0.0, 0.0, 0.0])
+        self.model = spec.compile()
+        self.data = mujoco.MjData(self.model)
+        self.as_built = AS_BUILT
+        self.put("receiver", np.array([1.0, 2.0, 3.0]), exp(np.array([0.1, -0.05, 0.2])))
+        self.put("tanker", np.array([40.0, 2.0, 12.0]), np.eye(3))
+        self.put_aside("box")
+
+    @staticmethod
+    def _body(spec: Any, name: str, geom: str, kind: mujoco.mjtGeom, size: list[float], at: list[float]) -> None:
+        body = spec.worldbody.add_body(name=name)
+        body.add_freejoint(name=name)
+        turned = quaternion_from_matrix(exp(np.array([0.0, np.pi / 2, 0.0]))) if name == "receiver" else [1, 0, 0, 0]
+        body.add_geom(name=geom, type=kind, size=size, pos=at, quat=turned, rgba=[0.4, 0.4, 0.4, 1.0])
+
+    def put(self, name: str, p_W: np.ndarray, R_W: np.ndarray) -> None:
+        address = self.model.joint(name).qposadr[0]
+        self.data.qpos[address : address + 3] = p_W
+        self.data.qpos[address + 3 : address + 7] = quaternion_from_matrix(R_W)
+        mujoco.mj_forward(self.model, self.data)
+
+    def put_drogue(self, camera: NearInfraredCamera, p_CD: np.ndarray, R_CD: np.ndarray | None = None) -> None:
+        R_WC, p_WC = camera.pose(self.data)
+        self.put("drogue", p_WC + R_WC @ p_CD, R_WC @ (np.eye(3) if R_CD is None else R_CD))
+
+    def put_aside(self, name: str) -> None:
+        """Out of everybody's way."""
+        self.put(name, np.array([-30.0, ASIDE_M, 0.0]), np.eye(3))
+
+
+@pytest.fixture
+def make_camera() -> Iterator[Callable[..., tuple[SmallWorld, NearInfraredCamera]]]:
+    """make_camera(sun_W=None, key=77, **camera's parameters) -> world, camera; drogue 8 m ahead of the lens."""
+    leds, light = load_parameters("leds", LedParameters), load_parameters("light", LightParameters)
+    opened = []
+
+    def build(
+        sun_W: np.ndarray | None = None, key: int = 77, **parameters: float
+    ) -> tuple[SmallWorld, NearInfraredCamera]:
+        world = SmallWorld()
+        sheet = replace(load_parameters("camera", CameraParameters), **parameters)
+        camera = NearInfraredCamera(sheet, leds, light, world.as_built, key, world.model, sun_W)
+        world.put_drogue(camera, np.array([8.0, 0.2, -0.1]))
+        opened.append(camera)
+        return world, camera
+
+    yield build
+    for camera in opened:
+        camera.close()

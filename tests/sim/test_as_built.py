@@ -1,0 +1,100 @@
+"""What is drawn scatters around the nominal sheets by the sheet's standard deviations.
+
+Bounds are 4.5 standard errors over 3000 draws (a false alarm in 1.5e5 each); the seed is fixed.
+"""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import dockair.assets
+from dockair.calibration import Camera, LedRing, Mounting
+from dockair.parameters import load_parameters
+from dockair.rotations import exp, log
+from dockair.sim.as_built import AsBuilt, AsBuiltParameters, draw_as_built
+from dockair.sim.camera.radiometry import LedParameters
+
+SHEET = load_parameters("as_built", AsBuiltParameters)
+LEDS = load_parameters("leds", LedParameters)
+MOUNTING = Mounting(
+    R_BC=exp(np.array([0.0, 0.0, -0.05])), p_BC=np.array([3.3, -0.4, 0.7]), p_BP=np.array([6.0, -0.9, 0.6])
+)
+N = 3000
+
+
+@pytest.fixture(scope="module")
+def drawn() -> list[AsBuilt]:
+    rng = np.random.default_rng(0)
+    return [draw_as_built(Camera(), LedRing(), MOUNTING, SHEET, LEDS, rng) for _ in range(N)]
+
+
+def _assert_normal(values: np.ndarray, sigma: float) -> None:
+    n = values.size
+    assert abs(values.mean()) < 4.5 * sigma / np.sqrt(n)
+    assert values.var() == pytest.approx(sigma**2, rel=4.5 * np.sqrt(2.0 / n))
+
+
+def test_mounting_errors_have_their_standard_deviations_about_each_axis(drawn: list[AsBuilt]) -> None:
+    camera = np.array([log(d.mounting.R_BC @ MOUNTING.R_BC.T) for d in drawn])
+    gyro = np.array([log(d.mounting.R_BI) for d in drawn])
+    for axis in range(3):
+        _assert_normal(camera[:, axis], SHEET.mounting_angle_sigma_rad)
+        _assert_normal(gyro[:, axis], SHEET.mounting_angle_sigma_rad)
+    _assert_normal(np.array([d.mounting.p_BC - MOUNTING.p_BC for d in drawn]), SHEET.mounting_position_sigma_m)
+    assert abs(np.corrcoef(camera[:, 0], gyro[:, 0])[0, 1]) < 4.5 / np.sqrt(N)
+
+
+def test_the_probes_tip_is_where_the_world_has_it(drawn: list[AsBuilt]) -> None:
+    assert all(np.array_equal(d.mounting.p_BP, MOUNTING.p_BP) for d in drawn)
+
+
+def test_intrinsics_have_their_standard_deviations(drawn: list[AsBuilt]) -> None:
+    _assert_normal(np.array([d.camera.focal_length_m / 0.016 - 1.0 for d in drawn]), SHEET.focal_length_sigma)
+    centre = np.array([d.camera.principal_point_px for d in drawn]) - [1023.5, 543.5]
+    _assert_normal(centre, SHEET.principal_point_sigma_px)
+
+
+def test_leds_scatter_each_by_itself_and_all_with_the_diameter(drawn: list[AsBuilt]) -> None:
+    """Along x only the LED's own error; radially that and half the diameter's, which all LEDs of a ring share."""
+    error = np.array([d.ring_positions_D - LedRing().positions_D for d in drawn])
+    _assert_normal(error[:, :, 0], SHEET.led_position_sigma_m)
+    radial = np.einsum("nij,ij->ni", error, LedRing().positions_D / 0.25)
+    shared = 0.25 * SHEET.ring_diameter_sigma_m**2
+    variance = SHEET.led_position_sigma_m**2 + shared
+    assert radial[:, 0].var() == pytest.approx(variance, rel=4.5 * np.sqrt(2.0 / N))
+    assert np.mean(radial[:, 0] * radial[:, 4]) == pytest.approx(shared, abs=4.5 * variance / np.sqrt(N))
+
+
+def test_brightness_lies_evenly_in_one_bin_of_two_to_one_around_the_sheets_value(drawn: list[AsBuilt]) -> None:
+    brightness = np.array([d.led_intensity_w_sr for d in drawn]) / LEDS.intensity_w_sr
+    assert brightness.min() >= 2.0 / 3.0 and brightness.max() <= 4.0 / 3.0
+    assert brightness.max() / brightness.min() == pytest.approx(2.0, rel=2e-3)
+    assert brightness.mean() == pytest.approx(1.0, abs=4.5 * (2.0 / 3.0) / np.sqrt(12.0 * 8 * N))
+
+
+def test_without_errors_the_hardware_is_the_sheets() -> None:
+    exact = AsBuiltParameters(**{name: 0.0 for name in AsBuiltParameters.__slots__})
+    built = draw_as_built(Camera(), LedRing(), MOUNTING, exact, replace(LEDS, bin_ratio=1.0), np.random.default_rng(0))
+    assert built.camera == Camera()
+    assert np.allclose(built.ring_positions_D, LedRing().positions_D)
+    assert np.allclose(built.led_intensity_w_sr, LEDS.intensity_w_sr)
+    assert np.allclose(built.mounting.R_BC, MOUNTING.R_BC) and np.allclose(built.mounting.R_BI, np.eye(3))
+    assert np.allclose(built.mounting.p_BC, MOUNTING.p_BC)
+
+
+def test_one_error_switched_off_leaves_the_others_as_they_were() -> None:
+    a = draw_as_built(Camera(), LedRing(), MOUNTING, SHEET, LEDS, np.random.default_rng(4))
+    no_lens = replace(SHEET, focal_length_sigma=0.0, mounting_angle_sigma_rad=0.0)
+    b = draw_as_built(Camera(), LedRing(), MOUNTING, no_lens, LEDS, np.random.default_rng(4))
+    assert np.array_equal(a.ring_positions_D, b.ring_positions_D)
+    assert np.array_equal(a.led_intensity_w_sr, b.led_intensity_w_sr)
+    assert np.array_equal(a.mounting.p_BC, b.mounting.p_BC)
+    assert a.camera.focal_length_m != b.camera.focal_length_m
+
+
+def test_the_nominal_sheets_in_the_assets_are_the_defaults_of_their_classes() -> None:
+    folder = Path(next(iter(dockair.assets.__path__))) / "calibration"
+    assert Camera.from_toml(folder / "camera.toml") == Camera()
+    assert LedRing.from_toml(folder / "ring.toml") == LedRing()

@@ -1,0 +1,220 @@
+"""The whole camera on a small world: receiver, drogue, tanker, and a box that can be moved into the way."""
+
+import hashlib
+from collections.abc import Callable
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+
+from dockair.errors import DockairError
+from dockair.messages import Window
+from dockair.parameters import load_parameters
+from dockair.rotations import exp
+from dockair.sim.as_built import AsBuilt
+from dockair.sim.camera.camera import CameraParameters, LedParameters, LightParameters, NearInfraredCamera
+from dockair.sim.camera.radiometry import led_electrons, responses
+
+PARAMETERS = load_parameters("camera", CameraParameters)
+LEDS = load_parameters("leds", LedParameters)
+LIGHT = load_parameters("light", LightParameters)
+BEHIND = np.array([-0.8, 0.0, 0.6])
+FULL = Window(0, 1088, 0, 2048)
+Made = tuple[Any, NearInfraredCamera]
+
+pytestmark = pytest.mark.gl
+
+
+def _around(pixel: np.ndarray, half: int) -> Window:
+    u, v = np.round(pixel).astype(int)
+    return Window(int(v) - half, int(v) + half + 1, int(u) - half, int(u) + half + 1)
+
+
+def _led_pixels(built: AsBuilt, p_CD: np.ndarray, R_CD: np.ndarray) -> np.ndarray:
+    return built.camera.pixels_from_points(p_CD + built.ring_positions_D @ R_CD.T)
+
+
+@pytest.mark.parametrize("range_m", [3.0, 8.0, 30.0])
+def test_a_noise_free_blobs_centroid_is_the_as_built_pinhole_projection(
+    make_camera: Callable[..., Made], range_m: float
+) -> None:
+    """Within 0.01 px, whatever the sub-pixel phase; the background is taken off, not thresholded."""
+    world, camera = make_camera()
+    p_CD, R_CD = np.array([range_m, 0.31, -0.17]), exp(np.array([0.3, 0.1, -0.15]))
+    world.put_aside("drogue")
+    dark = camera.expected_electrons(world.data, FULL).astype(float)
+    world.put_drogue(camera, p_CD, R_CD)
+    world.model.geom("basket_hub").rgba[3] = 0.0  # LEDs alone against the sky
+    image = camera.expected_electrons(world.data, FULL).astype(float) - dark
+    for pixel in _led_pixels(world.as_built, p_CD, R_CD):
+        w = _around(pixel, 6 if range_m < 20.0 else 3)
+        blob = np.clip(image[w.row_start : w.row_stop, w.column_start : w.column_stop], 0.0, None)
+        # what neighbours' wings add is nearly even: the border's level is taken off
+        blob = np.clip(blob - np.concatenate([blob[0], blob[-1], blob[:, 0], blob[:, -1]]).max(), 0.0, None)
+        rows, columns = np.indices(blob.shape)
+        u = (blob * columns).sum() / blob.sum() + w.column_start
+        v = (blob * rows).sum() / blob.sum() + w.row_start
+        assert (u, v) == pytest.approx(tuple(pixel), abs=0.01)
+
+
+@pytest.mark.parametrize("range_m", [3.0, 10.0, 30.0])
+def test_the_electrons_in_the_picture_are_the_radiometric_sum(make_camera: Callable[..., Made], range_m: float) -> None:
+    """Before clipping, all eight blobs with their wings: within 0.5 %."""
+    world, camera = make_camera()
+    world.model.geom("basket_hub").rgba[3] = 0.0
+    p_CD, R_CD = np.array([range_m, 0.0, 0.0]), exp(np.array([0.0, 0.1, 0.2]))
+    world.put_aside("drogue")
+    dark = camera.expected_electrons(world.data, FULL).astype(float)
+    world.put_drogue(camera, p_CD, R_CD)
+    total = (camera.expected_electrons(world.data, FULL).astype(float) - dark).sum()
+    response = responses(PARAMETERS, LEDS, LIGHT, world.as_built.camera)
+    expected = led_electrons(
+        response, LEDS, world.as_built.led_intensity_w_sr, p_CD + world.as_built.ring_positions_D @ R_CD.T, -R_CD[:, 0]
+    ).sum()
+    assert total == pytest.approx(expected, rel=5e-3)
+
+
+def test_led_peaks_are_well_exposed_from_12_to_6_metres_and_clip_near_4(make_camera: Callable[..., Made]) -> None:
+    """Mean LED of the sheet on a pixel's centre; 20 us, f/8, 0.02 W/sr. The brightest bin is 4/3 of it."""
+    world, camera = make_camera()
+    world.model.geom("basket_hub").rgba[3] = 0.0
+
+    def peak_fraction(range_m: float) -> float:
+        world.put_drogue(camera, np.array([range_m, 0.0, 0.0]))
+        image = camera.expected_electrons(world.data, FULL)
+        return float(image.max()) / PARAMETERS.full_well_e
+
+    assert 0.15 < peak_fraction(12.0) < 0.35
+    assert 0.5 < peak_fraction(6.2) < 1.0
+    assert peak_fraction(4.0) > 1.0
+
+
+def test_a_window_reads_what_the_full_frame_reads(make_camera: Callable[..., Made]) -> None:
+    """LEDs, Sun, glare and noise bit for bit; of the background at most 2 % of pixels differ, by one grey level."""
+    world, camera = make_camera(sun_W=BEHIND)
+    full = camera.expose(world.data, 1.0, 9, None)
+    window = Window(301, 700, 760, 1203)
+    part = camera.expose(world.data, 1.0, 9, window)
+    cut = full.pixels[301:700, 760:1203]
+    assert part.window == window and part.pixels.shape == (399, 443)
+    difference = np.abs(part.pixels.astype(int) - cut.astype(int))
+    assert difference.max() <= 1
+    assert (difference > 0).mean() <= 0.02
+
+
+def test_a_box_in_front_of_an_led_hides_it_and_moved_away_shows_it_again(make_camera: Callable[..., Made]) -> None:
+    world, camera = make_camera()
+    R_WC, p_WC = camera.pose(world.data)
+    p_CD = np.array([8.0, 0.2, -0.1])
+    pixel = _led_pixels(world.as_built, p_CD, np.eye(3))[2]
+    window = _around(pixel, 3)
+
+    def peak() -> float:
+        return float(camera.expected_electrons(world.data, window).max())
+
+    assert camera.visible_leds(world.data).all() and peak() > 1000.0
+    world.put("box", p_WC + R_WC @ (0.6 * (p_CD + world.as_built.ring_positions_D[2])), R_WC)
+    assert list(np.flatnonzero(~camera.visible_leds(world.data))) == [2]
+    assert peak() < 500.0
+    world.put_aside("box")
+    assert camera.visible_leds(world.data).all() and peak() > 1000.0
+
+
+def test_the_probe_hides_the_leds_behind_it(make_camera: Callable[..., Made]) -> None:
+    world, camera = make_camera()
+    R_WC, p_WC = camera.pose(world.data)
+    boom = world.data.geom("probe_boom").xpos
+    behind_boom = 1.5 * R_WC.T @ (boom - p_WC)
+    world.put_drogue(camera, behind_boom - world.as_built.ring_positions_D[0])
+    assert not camera.visible_leds(world.data)[0]
+    world.put_drogue(camera, behind_boom - world.as_built.ring_positions_D[0] + np.array([0.0, 1.0, 0.5]))
+    assert camera.visible_leds(world.data).all()
+
+
+def test_what_lies_behind_an_led_or_within_its_seat_does_not_hide_it(make_camera: Callable[..., Made]) -> None:
+    world, camera = make_camera()
+    R_WC, p_WC = camera.pose(world.data)
+    led_W = p_WC + R_WC @ (np.array([8.0, 0.2, -0.1]) + world.as_built.ring_positions_D[5])
+    half = world.model.geom("box").size[0]
+    for x in (half + 0.002, half - 0.8 * LEDS.occlusion_clearance_m):
+        world.put("box", led_W + x * R_WC[:, 0], R_WC)
+        assert camera.visible_leds(world.data).all()
+
+
+def test_invisible_geoms_hide_nothing(make_camera: Callable[..., Made]) -> None:
+    world, camera = make_camera()
+    R_WC, p_WC = camera.pose(world.data)
+    world.put("box", p_WC + R_WC @ (0.6 * (np.array([8.0, 0.2, -0.1]) + world.as_built.ring_positions_D[2])), R_WC)
+    world.model.geom("box").group = 3
+    assert camera.visible_leds(world.data).all()
+
+
+def test_an_led_behind_the_camera_or_turned_away_leaves_the_picture_alone(make_camera: Callable[..., Made]) -> None:
+    world, camera = make_camera()
+    world.model.geom("basket_hub").rgba[3] = 0.0
+    world.put_drogue(camera, np.array([-8.0, 0.0, 0.0]))
+    behind = camera.expected_electrons(world.data, FULL)
+    world.put_drogue(camera, np.array([8.0, 0.0, 0.0]), exp(np.array([0.0, 0.0, np.pi])))
+    assert np.array_equal(behind, camera.expected_electrons(world.data, FULL))
+
+
+def _hash(world: Any, camera: NearInfraredCamera, frame: int = 0) -> str:
+    return hashlib.sha256(camera.expose(world.data, 0.0, frame, None).pixels.tobytes()).hexdigest()
+
+
+def test_the_same_key_makes_the_same_frame_and_another_key_or_frame_number_another(
+    make_camera: Callable[..., Made],
+) -> None:
+    first, again, other = make_camera(BEHIND), make_camera(BEHIND), make_camera(BEHIND, key=78)
+    assert _hash(*first) == _hash(*again)
+    assert _hash(*first) != _hash(*other)
+    assert _hash(*first) != _hash(*first, 1)
+    assert _hash(*first) == _hash(*first)
+
+
+def test_the_message_says_when_how_long_and_how_much(make_camera: Callable[..., Made]) -> None:
+    world, camera = make_camera()
+    frame = camera.expose(world.data, 12.25, 0, None)
+    assert frame.time_stamp_s == 12.25
+    assert frame.exposure_s == PARAMETERS.exposure_s
+    assert frame.gain == pytest.approx(0.075 / 4.0)
+    assert frame.pixels.dtype == np.uint8 and frame.pixels.shape == (1088, 2048)
+    assert not frame.pixels.flags.writeable
+    assert camera.latency_s(frame) == pytest.approx(10e-3, abs=1e-4)
+
+
+def test_the_gain_turns_grey_levels_back_into_electrons(make_camera: Callable[..., Made]) -> None:
+    """The sky, 0.2 of white: mean level above the black level over the gain.
+
+    The exposure is long, so that the noise spreads over several grey levels and their rounding averages out.
+    """
+    world, camera = make_camera(exposure_s=500e-6)
+    world.put_aside("drogue")
+    window = Window(400, 800, 600, 1400)
+    frame = camera.expose(world.data, 0.0, 3, window)
+    expected = camera.expected_electrons(world.data, window).mean()
+    black = (PARAMETERS.black_level_dn - 1.5) / 4.0  # the converter's lower two bits are cut off
+    assert expected > 1500.0
+    assert (frame.pixels.mean() - black) / frame.gain == pytest.approx(expected, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    "window", [Window(-1, 10, 0, 10), Window(0, 1089, 0, 10), Window(5, 5, 0, 10), Window(0, 10, 2000, 2049)]
+)
+def test_a_window_outside_the_sensor_is_refused_with_the_sensors_limits(
+    make_camera: Callable[..., Made], window: Window
+) -> None:
+    world, camera = make_camera()
+    with pytest.raises(DockairError, match=r"camera.window.*row_stop=1088"):
+        camera.expose(world.data, 0.0, 0, window)
+
+
+def test_exposing_changes_nothing_in_the_world(make_camera: Callable[..., Made]) -> None:
+    world, camera = make_camera(BEHIND)
+    size = mujoco.mj_stateSize(world.model, mujoco.mjtState.mjSTATE_INTEGRATION)
+    before, after = np.empty(size), np.empty(size)
+    mujoco.mj_getState(world.model, world.data, before, mujoco.mjtState.mjSTATE_INTEGRATION)
+    camera.expose(world.data, 0.0, 0, None)
+    mujoco.mj_getState(world.model, world.data, after, mujoco.mjtState.mjSTATE_INTEGRATION)
+    assert np.array_equal(before, after)
