@@ -62,7 +62,7 @@ class Navigator:
 
     def _take(self, frame: CameraFrame) -> None:
         """Pixels to pose to belief; every way out leaves its reason in the status."""
-        blobs = detect(frame.pixels, self._settings.detect, frame.window)
+        blobs = detect(frame.pixels, self._settings.detect, frame.window, gain_dn_per_electron=frame.gain)
         self._candidates_px = blobs.centroids_px
         self._led_pixels_px = np.full((len(self._points_D), 2), np.nan)
         self._tracker.predict(self._shift_px(frame.time_stamp_s, self._frame_time_s))

@@ -6,8 +6,9 @@
     n_k ~ N(0, N^2/dt) white,   b_0 ~ N(0, s_0^2) once at switch-on                                              (3)
     b_{k+1} = exp(-dt/tau) b_k + s_b sqrt(1 - exp(-2 dt/tau)) N(0, 1)      first-order Gauss-Markov               (4)
 
-N is the noise density in rad/s/sqrt(Hz), w_c = 2 pi bandwidth for a damping z of 0.707 (elsewhere the -3 dB point
-moves). The noise is added after the filter: a data sheet's density holds inside the band.
+Between samples the rate is joined by straight lines, which by itself passes sinc^2(f dt): near half the sample rate the
+hold, not the filter, sets the gain. N is the noise density in rad/s/sqrt(Hz); w_c = 2 pi bandwidth for a damping z of
+0.707 (elsewhere the -3 dB point moves). The noise is added after the filter: a data sheet's density holds in the band.
 
 Not modelled: scale factor, misalignment between the axes, g-sensitivity, rate random walk, time-stamp jitter.
 Sources: IEEE Std 952-1997, annex C (noise terms); Franklin, Powell & Workman, Digital Control, section 6.3 (hold).

@@ -9,9 +9,10 @@ Diffraction by a round aperture is taken as three Gaussians, with scale q = wave
 d is the spread of charge in the silicon; each blur but diffraction's enters through its variance alone.
 A pixel takes the difference of two error functions in each direction and for each k.
 
-The mixture's encircled energy is within 2.0 % of the Airy pattern's at every radius (fit out to 8 q); its far wings
-are Gaussian beyond 15 q where the true ones fall as r^-3. Where an LED is more than 100 times over full well, its
-blob is therefore too small by a fraction of a pixel. Not modelled: aberrations, spikes of the iris, motion smear.
+The mixture's encircled energy is within 2.0 % of the Airy pattern's at every radius (fit out to 8 q); the brightest
+pixel of a blob is within 2 % (f/8, in focus). Its far wings are Gaussian beyond 15 q where the true ones fall as r^-3:
+where an LED is more than 100 times over full well, its blob is too small by a fraction of a pixel.
+Not modelled: aberrations, spikes of the iris, motion smear.
 Source: Born & Wolf, Principles of Optics, section 8.5.2 (Airy pattern); variance of a uniform disc b^2/16 an axis.
 """
 

@@ -33,7 +33,8 @@ class Sums:
         return NavSolution(
             time_stamp_s=imu[-1].time_stamp_s, valid=True, phase="approach", status="summed", p_PD_B=self.total,
             v_PD_B=imu[-1].angular_rate_rad_s / 3.0, R_BD=np.eye(3),
-            covariance=np.full((9, 9), np.nan), command=ReceiverCommand(), window=None if frame is None else frame.window, frame_time_stamp_s=float("nan"),
+            covariance=np.full((9, 9), np.nan), command=ReceiverCommand(), frame_time_stamp_s=float("nan"),
+            window=None if frame is None else frame.window,
             candidates_px=np.empty((0, 2)), led_pixels_px=np.full((8, 2), np.nan),
         )
 '''

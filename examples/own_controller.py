@@ -1,0 +1,72 @@
+"""Dock with a controller of one's own, in the gymnasium environment, camera in the loop.
+
+    python examples/own_controller.py [SCENARIO] [SEED]
+
+The controller steers the ring, as the navigation sees it in body axes, onto the probe's line, and closes when it is
+there. Its command is an increment of velocity; because the receiver's own velocity drifts, the command is integrated
+from the error in velocity instead of being set from it.
+"""
+
+import sys
+
+import gymnasium
+import numpy as np
+
+import dockair  # noqa: F401 - makes the environments known
+from dockair.scenarios.envs import OBSERVATION
+
+INDEX = {entry.name: k for k, entry in enumerate(OBSERVATION)}
+STAND_OFF_M, CLOSING_M_S = 4.0, 1.2
+POSITION_GAIN, RATE_GAIN = 0.6, 1.4  # 1/s^2, 1/s: the poles of a damped approach
+LINED_UP_M, LINED_UP_M_S, LINED_UP_S = 0.15, 0.2, 2.0
+
+
+class Controller:
+    """Pre-contact, then close; one step a control tick."""
+
+    def __init__(self, step_s: float) -> None:
+        """Start with no command.
+
+        Args:
+            step_s: length of a step of the environment.
+        """
+        self._step_s, self._velocity, self._lined_up_s, self._closing = step_s, np.zeros(3), 0.0, False
+
+    def step(self, observation: np.ndarray) -> np.ndarray:
+        """Return the action for an observation."""
+        p, v = (observation[INDEX[name] : INDEX[name] + 3] for name in ("p_PD_B_x", "v_PD_B_x"))
+        rate = v - np.cross(observation[INDEX["gyro_x"] : INDEX["gyro_x"] + 3], p)  # in turning axes
+        if not observation[INDEX["valid"]]:
+            return self._action(np.zeros(3))
+        steady = np.hypot(p[1], p[2]) < LINED_UP_M and np.linalg.norm(rate) < LINED_UP_M_S
+        self._lined_up_s = self._lined_up_s + self._step_s if steady else 0.0
+        self._closing = self._closing or self._lined_up_s > LINED_UP_S
+        wanted = POSITION_GAIN * p + RATE_GAIN * rate
+        if self._closing:
+            wanted[0] = RATE_GAIN * (rate[0] + CLOSING_M_S)
+        else:
+            wanted[0] = POSITION_GAIN * (p[0] - STAND_OFF_M) + RATE_GAIN * rate[0]
+        return self._action(np.clip(wanted, -1.0, 1.0))
+
+    def _action(self, acceleration: np.ndarray) -> np.ndarray:
+        self._velocity = np.clip(self._velocity + acceleration * self._step_s, -2.5, 2.5)
+        return np.concatenate([self._velocity, acceleration]).astype(np.float32)
+
+
+def main(scenario: str = "default", seed: str = "0") -> None:
+    """Fly one episode and say how it ended."""
+    env = gymnasium.make("dockair/Dock-v0", scenario=scenario)
+    controller = Controller(step_s=0.01)
+    observation, info = env.reset(seed=int(seed))
+    total, over = 0.0, False
+    while not over:
+        observation, reward, terminated, truncated, info = env.step(controller.step(observation))
+        total, over = total + float(reward), terminated or truncated
+    truth = info["truth"]
+    print(f"{info['outcome']} at {truth['time_s']:.1f} s, closing at {truth['closing_speed_m_s']:.2f} m/s")
+    print(f"sum of rewards {total:.2f}")
+    env.close()
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
