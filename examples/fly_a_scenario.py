@@ -2,7 +2,8 @@
 
     python examples/fly_a_scenario.py [SCENARIO] [SEED]
 
-Writes out/example: result.json, episode.rrd (rerun --bind 127.0.0.1 out/example/episode.rrd), flight.parquet, flight.png.
+Writes into out/example: result.json, flight.png, flight.parquet, the messages for a replay, and episode.rrd
+(`rerun --bind 127.0.0.1 out/example/episode.rrd` shows it).
 """
 
 import sys

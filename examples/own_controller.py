@@ -63,8 +63,10 @@ def main(scenario: str = "default", seed: str = "0") -> None:
         observation, reward, terminated, truncated, info = env.step(controller.step(observation))
         total, over = total + float(reward), terminated or truncated
     truth = info["truth"]
-    print(f"{info['outcome']} at {truth['time_s']:.1f} s, closing at {truth['closing_speed_m_s']:.2f} m/s")
-    print(f"sum of rewards {total:.2f}")
+    print(f"{info['outcome']} after {truth['time_s']:.1f} s, sum of rewards {total:.2f}")
+    if info["is_success"]:
+        offset_m, speed_m_s = truth["contact_radial_offset_m"], truth["contact_closure_speed_m_s"]
+        print(f"  {offset_m:.3f} m off centre at {speed_m_s:.2f} m/s")
     env.close()
 
 

@@ -19,7 +19,7 @@ from dockair.errors import DockairError
 from dockair.messages import NavSolution, ReceiverCommand
 from dockair.rotations import log
 from dockair.scenarios.loop import Flight, Tick
-from dockair.scenarios.referee import Outcome
+from dockair.scenarios.referee import Contact, Outcome
 from dockair.scenarios.schema import Scenario, load_scenario
 from dockair.sim.truth import Truth
 from dockair.sim.view import ThirdPersonView
@@ -227,7 +227,7 @@ class DockEnv(gymnasium.Env[NDArray[np.float64], NDArray[np.float32]]):
             "is_success": outcome is Outcome.CONTACT,
             "outcome": outcome.value if outcome is not None else "",
             "phase": tick.solution.phase,
-            "truth": _truth_info(tick.truth, self._distance_m(tick.truth)),
+            "truth": _truth_info(tick.truth, self._distance_m(tick.truth), self._flight.referee.contact),
         }
 
 
@@ -256,7 +256,7 @@ def observation_from(solution: NavSolution, tick: Tick) -> NDArray[np.float64]:
     return np.nan_to_num(np.concatenate(parts).astype(np.float64), nan=0.0, posinf=np.inf, neginf=-np.inf)
 
 
-def _truth_info(truth: Truth, distance_m: float) -> dict[str, float]:
+def _truth_info(truth: Truth, distance_m: float, contact: Contact | None) -> dict[str, float]:
     """For evaluation only: a policy that reads it flies on perfect navigation."""
     x, y, z = (float(value) for value in truth.p_PD_B)
     closing = -truth.R_WD[:, 0] @ (truth.v_WD - truth.v_WP)
@@ -269,4 +269,6 @@ def _truth_info(truth: Truth, distance_m: float) -> dict[str, float]:
         "closing_speed_m_s": float(closing),
         "reel_position_m": float(truth.reel_position_m),
         "latched": float(truth.latched),
+        "contact_radial_offset_m": contact.radial_offset_m if contact is not None else float("inf"),
+        "contact_closure_speed_m_s": contact.closure_speed_m_s if contact is not None else 0.0,
     }

@@ -78,6 +78,7 @@ def _set_options(spec: Any, step_s: float) -> None:
     sensor = Camera()
     spec.visual.global_.offwidth, spec.visual.global_.offheight = sensor.width_px, sensor.height_px
     spec.visual.quality.offsamples = 0  # multisampling costs tenfold off-screen and is the camera model's business
+    spec.visual.quality.numslices, spec.visual.quality.numstacks = 16, 8  # a third less drawing than 28 and 16
     spec.visual.quality.shadowsize = 0
     spec.stat.extent, spec.stat.center = 40.0, [-15.0, 0.0, -2.0]
     spec.visual.map.znear, spec.visual.map.zfar = 0.0025, 50.0  # times the extent: 0.1 m to 2 km

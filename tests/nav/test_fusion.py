@@ -173,6 +173,16 @@ def test_turning_of_the_receiver_alone_leaves_the_drogue_where_it_is():
     np.testing.assert_allclose(state.rate_PD_B, -np.cross(w, s), atol=1e-12)
 
 
+def test_rate_between_gyro_samples_is_linear():
+    """Rate growing as 2 t about one axis: the angle after 1 s is 1 rad, whatever the sampling."""
+    filter_ = RelativeFilter(sheets(8.0), SETTINGS)
+    start, axis = filter_.state(0.0), np.array([0.6, 0.0, 0.8])
+    w_I = MOUNTING.R_BI.T @ axis
+    filter_.propagate([ImuSample(time_stamp_s=t, angular_rate_rad_s=2.0 * t * w_I) for t in np.arange(11) / 10.0])
+    np.testing.assert_allclose(exp(axis) @ filter_.state(1.0).R_BD, start.R_BD, atol=1e-12)
+    np.testing.assert_allclose(exp(0.55**2 * axis) @ filter_.state(0.55).R_BD, start.R_BD, atol=1e-12)
+
+
 def test_rate_is_the_derivative_of_the_position_in_body_axes():
     filter_, w = RelativeFilter(sheets(8.0), SETTINGS), np.array([0.2, -0.1, 0.3])
     samples = [ImuSample(time_stamp_s=t, angular_rate_rad_s=MOUNTING.R_BI.T @ w) for t in np.arange(26) / 250.0]

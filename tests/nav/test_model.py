@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from dockair.calibration import Camera, LedRing
 from dockair.nav.pose import model
@@ -109,6 +110,30 @@ def test_prior_alone_is_found_with_its_own_covariance():
     np.testing.assert_allclose(log(end.R_CD @ prior.R_CD.T), 0.0, atol=1e-7)
     np.testing.assert_allclose(end.p_CD, prior.p_CD, atol=1e-7)
     np.testing.assert_allclose(end.covariance, prior.covariance, rtol=1e-6, atol=1e-10)
+
+
+def test_minimum_with_a_prior_that_disagrees_is_one():
+    """Prior 30 degrees away and as strong as the frame: the cost, written anew with scipy's MRP, is stationary."""
+    R, p_CD = exp(np.array([0.1, 0.3, -0.2])), np.array([3.0, 0.2, 0.1])
+    pixels = CAMERA.pixels_from_points(RING @ R.T + p_CD)
+    sight = lines_of_sight_from_pixels(pixels, RING, CAMERA, np.full(8, 10.0))
+    prior = PosePrior(
+        R_CD=exp(np.array([0.5, -0.2, 0.3])) @ R, p_CD=p_CD + [0.02, -0.01, 0.01], covariance=1e-3 * np.eye(6)
+    )
+    end = descend(sight, R, p_CD, LEVENBERG_MARQUARDT, prior)
+    assert end.converged
+
+    def cost(x: Array) -> float:
+        Q, t = exp(x[:3]) @ end.R_CD, end.p_CD + x[3:]
+        e = sight.rays - predicted(Q, t)
+        d = np.concatenate([4.0 * Rotation.from_matrix(prior.R_CD @ Q.T).as_mrp(), prior.p_CD - t])
+        return float(np.einsum("ni,nij,nj", e, sight.weights, e) + d @ np.linalg.solve(prior.covariance, d))
+
+    assert end.cost == pytest.approx(cost(np.zeros(6)))
+    assert end.cost > 20.0  # they do disagree
+    for k, sigma in enumerate(np.sqrt(np.diag(end.covariance))):
+        step = 1e-2 * sigma * np.eye(6)[k]
+        assert abs(cost(step) - cost(-step)) < 1e-6 * end.cost
 
 
 def test_prior_and_frame_add_their_information():
