@@ -18,7 +18,7 @@ from dockair.scenarios.envs import OBSERVATION
 INDEX = {entry.name: k for k, entry in enumerate(OBSERVATION)}
 STAND_OFF_M, CLOSING_M_S = 4.0, 1.2
 POSITION_GAIN, RATE_GAIN = 0.6, 1.4  # 1/s^2, 1/s: the poles of a damped approach
-LINED_UP_M, LINED_UP_M_S, LINED_UP_S = 0.15, 0.2, 2.0
+LINED_UP_M, LINED_UP_M_S, LINED_UP_S = 0.25, 0.3, 2.0
 
 
 class Controller:

@@ -160,6 +160,17 @@ class RelativeFilter:
             covariance=covariance,
         )
 
+    def rate_B(self, time_s: float) -> Array:
+        """(3,) gyro rate w_WB_B [rad/s], linear between samples, that of the nearest one outside."""
+        index = bisect_right(self._gyro_times, time_s)
+        if index == 0:
+            return self._gyro_rates[0] if self._gyro_rates else np.zeros(3)
+        if index == len(self._gyro_times):
+            return self._gyro_rates[-1]
+        t0, t1 = self._gyro_times[index - 1 : index + 1]
+        k = (time_s - t0) / (t1 - t0)
+        return np.asarray((1.0 - k) * self._gyro_rates[index - 1] + k * self._gyro_rates[index])
+
     def predicted_pose(self, time_s: float) -> tuple[Array, Array, Array]:
         """R_CD (3, 3), p_CD (3,) [m] and their covariance (6, 6) of (phi, delta) in camera axes, at a time."""
         prior = pose_prior(mixture(self._beliefs(time_s)), self._mounting)
@@ -186,7 +197,7 @@ class RelativeFilter:
 
     def rate_B(self, time_s: float) -> Array:
         """(3,) angular velocity w_WB_B that the gyro says at a time, body axes [rad/s]."""
-        return self._rate(time_s)
+        return self.rate_B(time_s)
 
     def _calibration_covariance(self, p_CD_B: Array) -> Array:
         """(6, 6) of (phi, p_PD_B), Eq. (2), for the ring centre p_CD_B (3,) from the camera [m]."""
@@ -223,23 +234,12 @@ class RelativeFilter:
         index = bisect_right(self._nodes, time_s, key=_time)
         return self._moved(self._nodes[index - 1], time_s) if index else self._nodes[0].beliefs
 
-    def _rate(self, time_s: float) -> Array:
-        """(3,) gyro rate in body axes, linear between samples, the nearest one outside."""
-        index = bisect_right(self._gyro_times, time_s)
-        if index == 0:
-            return self._gyro_rates[0] if self._gyro_rates else np.zeros(3)
-        if index == len(self._gyro_times):
-            return self._gyro_rates[-1]
-        t0, t1 = self._gyro_times[index - 1 : index + 1]
-        k = (time_s - t0) / (t1 - t0)
-        return np.asarray((1.0 - k) * self._gyro_rates[index - 1] + k * self._gyro_rates[index])
-
     def _averaged_rate(self, time_s: float) -> Array:
         last = bisect_right(self._gyro_times, time_s)
         first = bisect_right(self._gyro_times, time_s - self._settings.rate_average_s)
-        return np.mean(self._gyro_rates[first:last], axis=0) if last > first else self._rate(time_s)
+        return np.mean(self._gyro_rates[first:last], axis=0) if last > first else self.rate_B(time_s)
 
     def _moved(self, node: _Node, time_s: float) -> list[Belief]:
         """Return a node's beliefs at a time with no gyro sample in between."""
-        w_B = 0.5 * (self._rate(node.time_s) + self._rate(time_s))
+        w_B = 0.5 * (self.rate_B(node.time_s) + self.rate_B(time_s))
         return [moved(belief, w_B, time_s - node.time_s, self._noise) for belief in node.beliefs]

@@ -116,11 +116,12 @@ def summary_of(result: Result) -> str:
         ]
     if result.hold is not None:
         rows += [("held for", f"{result.hold.duration_s:.1f} s"), ("taken in", f"{result.hold.take_in_max_m:.2f} m")]
-    rows += [
-        ("range error (RMS)", f"{1e3 * result.nav.range_rmse_m:.1f} mm"),
-        ("lateral error (RMS)", f"{1e3 * result.nav.lateral_rmse_m:.1f} mm"),
-        ("mean NEES (of 9)", f"{result.nav.nees_mean:.1f}"),
-        ("frames used", f"{result.nav.frames_used} of {result.frames}"),
-    ]
+    if result.nav.frames_used:
+        rows += [
+            ("range error (RMS)", f"{1e3 * result.nav.range_rmse_m:.1f} mm"),
+            ("lateral error (RMS)", f"{1e3 * result.nav.lateral_rmse_m:.1f} mm"),
+            ("mean NEES (of 9)", f"{result.nav.nees_mean:.1f}"),
+            ("frames used", f"{result.nav.frames_used} of {result.frames}"),
+        ]
     lines = [f"# {result.outcome.replace('_', ' ')}", "", f"{result.scenario}", "", "| | |", "|---|---|"]
     return "\n".join(lines + [f"| {label} | {value} |" for label, value in rows])

@@ -180,7 +180,7 @@ def test_rate_between_gyro_samples_is_linear():
     w_I = MOUNTING.R_BI.T @ axis
     filter_.propagate([ImuSample(time_stamp_s=t, angular_rate_rad_s=2.0 * t * w_I) for t in np.arange(11) / 10.0])
     np.testing.assert_allclose(exp(axis) @ filter_.state(1.0).R_BD, start.R_BD, atol=1e-12)
-    np.testing.assert_allclose(exp(0.55**2 * axis) @ filter_.state(0.55).R_BD, start.R_BD, atol=1e-12)
+    np.testing.assert_allclose(exp(0.85**2 * axis) @ filter_.state(0.85).R_BD, start.R_BD, atol=1e-12)
 
 
 def test_rate_is_the_derivative_of_the_position_in_body_axes():

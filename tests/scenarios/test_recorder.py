@@ -1,0 +1,93 @@
+"""What a flight leaves behind: the files, and the same files again from the same seed."""
+
+import json
+from dataclasses import replace
+
+import pytest
+
+from dockair.errors import DockairError
+from dockair.scenarios.loop import fly
+from dockair.scenarios.message_log import ESTIMATES, MESSAGES, NAVIGATOR
+from dockair.scenarios.recorder import summary_of
+from dockair.scenarios.replay import replay
+from dockair.scenarios.schema import load_scenario
+
+ALWAYS = {"result.json", "flight.parquet", "episode.rrd", "flight.png"}
+REPLAY = {MESSAGES, ESTIMATES, NAVIGATOR}
+TIMES_OF_DAY = ("wall_time_s", "real_time_factor", "out_dir")
+
+
+def _short(name: str, seconds: float):
+    return load_scenario(name, {"flight.duration_s": seconds})
+
+
+@pytest.fixture(scope="module")
+def seen(tmp_path_factory):
+    """Two flights by vision with the same seed."""
+    folders = [tmp_path_factory.mktemp(name) for name in ("first", "second")]
+    return folders, [fly(_short("default", 1.5), 5, folder) for folder in folders]
+
+
+def test_a_flight_on_the_truth_leaves_no_messages_and_says_so(tmp_path):
+    result = fly(_short("truth_navigation", 0.5), 0, tmp_path)
+    assert {path.name for path in tmp_path.iterdir()} == ALWAYS
+    written = json.loads((tmp_path / "result.json").read_text())
+    assert written == result.to_dict()
+    assert written["truth_navigation"] is True
+    assert "perfect" in summary_of(result)
+
+
+def test_without_a_folder_nothing_is_written(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert fly(_short("truth_navigation", 0.1), 0).out_dir is None
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_unknown_way_to_record_is_refused_with_the_known_ones(tmp_path):
+    with pytest.raises(DockairError, match="got 'some'; exists: full, window, none"):
+        fly(_short("truth_navigation", 0.1), 0, tmp_path, record="some")
+
+
+def test_the_summary_says_what_was_not_measured_instead_of_nan():
+    result = fly(_short("truth_navigation", 0.1), 0)
+    assert "nan" not in summary_of(replace(result, truth_navigation=False))
+
+
+@pytest.mark.slow
+@pytest.mark.gl
+def test_the_same_seed_leaves_the_same_messages_estimates_and_result(seen):
+    folders, results = seen
+    for name in REPLAY:
+        assert (folders[0] / name).read_bytes() == (folders[1] / name).read_bytes(), name
+    first, second = (result.to_dict() for result in results)
+    for key in TIMES_OF_DAY:
+        first.pop(key), second.pop(key)
+    assert first == second
+    assert {path.name for path in folders[0].iterdir()} == ALWAYS | REPLAY
+
+
+@pytest.mark.slow
+@pytest.mark.gl
+def test_a_flight_by_vision_replays_bit_for_bit_without_simulator_and_truth(seen):
+    """The files that hold truth are gone before the replay."""
+    folders, _ = seen
+    for name in ALWAYS:
+        (folders[1] / name).unlink()
+    report = replay(folders[1])
+    assert report.identical and report.same_code
+    assert report.ticks == 150
+    assert report.frames > 60
+
+
+@pytest.mark.slow
+@pytest.mark.gl
+def test_record_none_keeps_no_frames_and_record_full_whole_ones(tmp_path):
+    from dockair.scenarios.message_log import read_messages
+
+    none, full = tmp_path / "none", tmp_path / "full"
+    fly(_short("default", 0.3), 5, none, record="none")
+    assert {path.name for path in none.iterdir()} == ALWAYS
+    fly(_short("default", 0.3), 5, full, record="full")
+    shapes = {tick.frame.pixels.shape for tick in read_messages(full) if tick.frame is not None}
+    assert shapes == {(1088, 2048)}
+    assert replay(full).identical
