@@ -195,10 +195,6 @@ class RelativeFilter:
             sigma[i] = np.sqrt(np.linalg.eigvalsh(H @ covariance @ H.T)[-1])
         return pixels, sigma
 
-    def rate_B(self, time_s: float) -> Array:
-        """(3,) angular velocity w_WB_B that the gyro says at a time, body axes [rad/s]."""
-        return self.rate_B(time_s)
-
     def _calibration_covariance(self, p_CD_B: Array) -> Array:
         """(6, 6) of (phi, p_PD_B), Eq. (2), for the ring centre p_CD_B (3,) from the camera [m]."""
         settings, covariance = self._settings, np.zeros((6, 6))

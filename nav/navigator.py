@@ -30,8 +30,7 @@ class NavigatorSettings:
     track: TrackSettings = field(default_factory=TrackSettings)
     fusion: FusionSettings = field(default_factory=FusionSettings)
     guidance: GuidanceSettings = field(default_factory=GuidanceSettings)
-    #: Errors common to a frame's LEDs that no centroid shows: LED places (0.3 mm is 0.15 px at 6 m), lens, motion.
-    pixel_sigma_px: float = 0.1
+    led_position_sigma_m: float = 3e-4  # as-built tolerance of an LED's place on the ring; 0.3 px at 3 m
     usable_sigma_m: float = 0.10  # lateral 1 sigma above which the state may not be flown on
     usable_age_s: float = 0.5  # breakaway practice: a track lost for 0.5 s is lost
 
@@ -76,18 +75,19 @@ class Navigator:
             camera=self._sheets.camera,
             brightness=blobs.flux,
             expected_led_px=expected_px,
-            expected_sigma_px=float(np.max(sigma_px)),
+            expected_sigma_px=float(np.nanmax(sigma_px)) if np.isfinite(sigma_px).any() else None,
         )
         self._tracker.update(found)
         if found.status is not IdentificationStatus.FOUND:
             return f"ring {found.status.value}"
         self._led_pixels_px[found.led_numbers] = blobs.centroids_px[found.members]
         R_CD, p_CD, _ = self._filter.predicted_pose(time_s)
+        misplaced_px = self._sheets.camera.focal_length_px * self._settings.led_position_sigma_m / p_CD[0]
         pose = solve_pose(
             blobs.centroids_px[found.members],
             self._points_D[found.led_numbers],
             self._sheets.camera,
-            sigma_px=np.hypot(blobs.sigma_px[found.members], self._settings.pixel_sigma_px),
+            sigma_px=np.hypot(blobs.sigma_px[found.members], misplaced_px),
             initial=(R_CD, p_CD),
         )
         if pose.status is not PoseStatus.CONVERGED:

@@ -31,7 +31,7 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from dockair.calibration import NavigationSheets
-from dockair.errors import DockairError
+from dockair.errors import DockairError, MachineError
 from dockair.messages import CameraFrame, ImuSample, Navigates, NavSolution, Window
 from dockair.rotations import Array
 from dockair.scenarios.exact_json import decode, encode, import_by_name
@@ -136,7 +136,7 @@ class MessageLog:
     """Writes the three files while a flight goes on; use it in a `with` statement."""
 
     def __init__(self, out_dir: str | Path, recipe: NavigatorRecipe) -> None:
-        folder = Path(out_dir)
+        self._folder = folder = Path(out_dir)
         recipe.write(folder)
         self._messages = pq.ParquetWriter(
             folder / MESSAGES, _MESSAGE_SCHEMA, compression={"png": "NONE"} | dict.fromkeys(_compressed(), "ZSTD")
@@ -153,23 +153,31 @@ class MessageLog:
         """Take one control tick; blocks while the encoder is too far behind.
 
         Raises:
-            OSError: the disk refused an earlier tick.
+            MachineError: the disk refused an earlier tick.
         """
-        if self._failure is not None:
-            raise self._failure
+        self._raise_failure()
         self._queue.put((tuple(imu), frame, solution))
 
     def close(self) -> None:
         """Write what is still waiting and close the files.
 
         Raises:
-            OSError: the disk refused it.
+            MachineError: the disk refused it.
         """
         if self._thread.is_alive():
             self._queue.put(None)
             self._thread.join()
-        self._messages.close()
-        self._estimates.close()
+        try:
+            self._messages.close()
+            self._estimates.close()
+        except OSError as failure:
+            self._failure = self._failure or failure
+        self._raise_failure()
+
+    def _raise_failure(self) -> None:
+        if isinstance(self._failure, OSError):
+            remedy, expected = f"{self._failure}; free some space or record none", "a disk that takes the recording"
+            raise MachineError(str(self._folder), expected=expected, remedy=remedy) from self._failure
         if self._failure is not None:
             raise self._failure
 

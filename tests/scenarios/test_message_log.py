@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, fields
 import numpy as np
 import pytest
 
-from dockair.errors import DockairError
+from dockair.errors import DockairError, MachineError
 from dockair.messages import NavSolution
 from dockair.scenarios import message_log
 from dockair.scenarios.exact_json import decode, encode
@@ -133,7 +133,7 @@ def test_a_full_disk_reaches_the_flight(hand_made, tmp_path, monkeypatch):
     log = MessageLog(tmp_path, NavigatorRecipe(class_name="a:B", sheets=hand_made.sheets))
     _, imu, frame, solution = hand_made.tick(1)
     log.append(imu, frame, solution)
-    with pytest.raises(OSError, match="no space left"):
+    with pytest.raises(MachineError, match="a disk that takes the recording; no space left on device"):
         log.close()
 
 
