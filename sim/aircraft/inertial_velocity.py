@@ -30,8 +30,8 @@ class InertialVelocity:
         self._decay = float(np.exp(-KNOT_S / correlation_time_s))
         self._kick_m_s = sigma_m_s * float(np.sqrt(-np.expm1(-2.0 * KNOT_S / correlation_time_s)))
         self._step_s, self._time_s, self._knot = step_s, 0.0, 0
-        self._before = sigma_m_s * rng.standard_normal(3)
-        self._after = self._drawn(self._before)
+        self._before: Array = sigma_m_s * rng.standard_normal(3)
+        self._after: Array = self._drawn(self._before)
         self.drift_m_s: Array = self._before.copy()
 
     def step(self, velocity_m_s: Array) -> Array:
