@@ -8,7 +8,8 @@ so what guidance wants follows with the rate w = w_WB_B of the moment:
 
 A frame is taken at its capture time: the belief is rolled back to the stamp, corrected, and everything newer is run
 again, in whatever order frames arrive. Between gyro samples the rate is linear. The gate is the frame's likelihood
-ratio against the prediction, chi-square with 6 degrees of freedom (`pose.posterior`).
+ratio against the prediction, chi-square with 6 degrees of freedom (`pose.posterior`). Several refusals in a row are
+taken for a drogue that was struck or let go: the belief is widened before the next frame.
 
 Errors of calibration and mounting are constant in the camera: frames neither show them nor average them. They stand
 beside the filter and join the covariance where it goes out. A camera turned by dtheta, misplaced by dp, of scale 1 + k:
@@ -21,7 +22,7 @@ single LEDs out of place (0.3 mm is 0.3 px at 3 m: say so in the frame's sigma_p
 
 from bisect import bisect_right
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import chi2
@@ -44,6 +45,13 @@ class FusionSettings:
     start_velocity_sigma_m_s: float = 1.0  # assumed: joining up ends within this of the drogue's velocity
     bias_correlation_s: float = 1.0  # the gyro's bias counts as noise of this correlation time; of the filter's memory
     gate_probability: float = 0.9999  # a good frame is refused once in 10 000
+    #: A drogue that is struck or let go changes its velocity at once, which white acceleration does not foresee. After
+    #: so many frames refused in a row the belief is widened: by the closure speed, its way over the refused frames, and
+    #: some degrees of swing.
+    refusals_until_doubt: int = 3
+    doubt_velocity_sigma_m_s: float = 1.2
+    doubt_position_sigma_m: float = 0.08
+    doubt_attitude_sigma_rad: float = 0.1
     buffer_s: float = 0.25  # how late a frame may be
     #: Hardware beside its sheets, 1 sigma each: 0.05 degrees of mounting and 1 px of principal point; 2 mm of mounting;
     #: 0.05 % of focal length and 0.3 mm of the ring's diameter of 0.5 m (as-built hardware is drawn so).
@@ -72,6 +80,7 @@ class _Node:
     time_s: float
     pose: PoseEstimate | None
     beliefs: list[Belief]
+    doubted: bool = False  #: the belief was widened before the frame was taken
 
 
 def _time(node: _Node) -> float:
@@ -96,6 +105,7 @@ class RelativeFilter:
         s = np.array(start.p_PD_B + self._mounting.p_BP, dtype=float)
         self._start = [Belief(np.array(start.R_BD, dtype=float), s, np.zeros(3), np.diag(sigma**2))]
         self._nodes: list[_Node] = []
+        self._refusals = 0
         self._gyro_times: list[float] = []
         self._gyro_rates: list[Array] = []
         gyro, bias_s = sheets.gyro, self._settings.bias_correlation_s
@@ -125,7 +135,8 @@ class RelativeFilter:
             time_stamp_s: middle of the exposure; at most `buffer_s` before the newest message.
 
         Returns:
-            True if it was used; False when there is no pose, it is older than the buffer, or the gate refuses it.
+            True if it was used; False when there is no pose, it is older than the buffer, or the gate refuses it (which
+            counts toward doubt).
         """
         if pose.status is not PoseStatus.CONVERGED or not np.isfinite(time_stamp_s):
             return False
@@ -133,11 +144,16 @@ class RelativeFilter:
             self._nodes.append(_Node(time_stamp_s, None, self._start))
         if time_stamp_s < self._nodes[0].time_s:
             return False
-        beliefs = corrected(self._beliefs(time_stamp_s), pose, self._mounting, self._gate)
+        before, doubted = self._beliefs(time_stamp_s), False
+        beliefs = corrected(before, pose, self._mounting, self._gate)
+        if not beliefs and self._refusals + 1 >= self._settings.refusals_until_doubt:
+            beliefs, doubted = corrected(self._widened(before), pose, self._mounting, self._gate), True
         if not beliefs:
+            self._refusals += 1
             return False
+        self._refusals = 0
         index = bisect_right(self._nodes, time_stamp_s, key=_time)
-        self._nodes.insert(index, _Node(time_stamp_s, pose, beliefs))
+        self._nodes.insert(index, _Node(time_stamp_s, pose, beliefs, doubted))
         self._run_from(index + 1)
         return True
 
@@ -220,8 +236,16 @@ class RelativeFilter:
         for i in range(max(index, 1), len(self._nodes)):
             node = self._nodes[i]
             node.beliefs = self._moved(self._nodes[i - 1], node.time_s)
+            if node.doubted:
+                node.beliefs = self._widened(node.beliefs)
             if node.pose is not None:
                 node.beliefs = corrected(node.beliefs, node.pose, self._mounting, self._gate) or node.beliefs
+
+    def _widened(self, beliefs: list[Belief]) -> list[Belief]:
+        """Return the beliefs with less certainty of motion and place: the drogue has been struck or let go."""
+        s = self._settings
+        sigmas = (s.doubt_attitude_sigma_rad, s.doubt_position_sigma_m, s.doubt_velocity_sigma_m_s)
+        return [replace(belief, P=belief.P + np.diag(np.repeat(np.square(sigmas), 3))) for belief in beliefs]
 
     def _beliefs(self, time_s: float) -> list[Belief]:
         """Return the belief at a time; the oldest kept if it is older."""

@@ -397,3 +397,27 @@ def test_rate_is_told_in_body_axes_linear_between_samples_and_held_outside():
     filter_.propagate([ImuSample(time_stamp_s=t, angular_rate_rad_s=k * w_I) for t, k in ((1.0, 1.0), (1.1, 3.0))])
     for time_s, factor in ((0.5, 1.0), (1.0, 1.0), (1.025, 1.5), (1.1, 3.0), (2.0, 3.0)):
         np.testing.assert_allclose(filter_.rate_B(time_s), factor * w, atol=1e-12)
+
+
+def struck(seed, settings):
+    """Half a second of flight, then 1.2 m/s gained at once, as when the coupling catches the probe; 0.3 s more."""
+    world = World(sheets(2.0), settings, np.random.default_rng((41, seed)))
+    filter_ = RelativeFilter(world.sheets, settings)
+    assert all(fly(world, filter_, 0.5))
+    world.v_N = world.v_N + np.array([-1.2, 0.0, 0.0])
+    return world, filter_, list(fly(world, filter_, 0.8))
+
+
+def test_a_drogue_that_is_struck_is_followed_again_after_a_few_refused_frames():
+    values = []
+    for seed in range(20):
+        world, filter_, taken = struck(seed, SETTINGS)
+        assert taken.count(False) < SETTINGS.refusals_until_doubt
+        assert all(taken[SETTINGS.refusals_until_doubt :])
+        values.append(nees(*world.error(filter_)))
+    assert_mean_nees(values, 9)  # what comes after is honest again
+
+
+def test_without_doubt_it_would_not_come_back():
+    settings = replace(SETTINGS, refusals_until_doubt=1000)
+    assert all(struck(seed, settings)[2].count(False) > SETTINGS.refusals_until_doubt for seed in range(5))
