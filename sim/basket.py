@@ -47,6 +47,7 @@ def add_drogue(body: Any, drogue: DrogueParameters, coupling: CouplingParameters
         "conaffinity": touched_by,
         "friction": sliding(drogue.friction),
         "solref": [drogue.contact_time_constant_s, 1.0],
+        "priority": 1,  # else MuJoCo takes the mean of both geoms' time constants, the other's being its default
         "rgba": grey(drogue.reflectance),
     }
     _add_basket(body, drogue, coupling, solid)

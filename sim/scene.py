@@ -8,9 +8,9 @@ tanker stands still and the air blows. Bodies "tanker", "hose_0" ... "hose_{n-1}
 Who touches whom: the probe touches basket, coupling and hose; every other part of the receiver touches hose, drogue and
 tanker. Hose and drogue touch nothing of the tanker. Grey values are reflectances near 850 nm.
 
-Joints: "reel" slides link 0 along the pod's axis, 0 at full trail, positive wound in (the outer
-stop's buffer gives a little beyond 0); each link, and the drogue on the
-last one, has two hinges "<body>_y", "<body>_z" at its front end, and no twist.
+Joints: "reel" slides link 0 along the pod's axis, 0 at full trail, positive wound in (the outer stop's buffer gives a
+little beyond 0); each link, and the drogue on the last one, has two hinges "<body>_y", "<body>_z" at its front end, and
+no twist.
 """
 
 from dataclasses import dataclass

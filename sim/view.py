@@ -4,16 +4,14 @@ The eye follows a point from behind and to the left. Greys are near-infrared ref
 light, with the shadow side filled in; LEDs are drawn as small bright spheres, though near infrared is invisible.
 """
 
-import os
-import sys
 from typing import Any
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from dockair.errors import MachineError
 from dockair.rotations import Array
+from dockair.sim.off_screen import open_renderer
 
 _DISTANCE_M = 9.0
 _AZIMUTH_DEG = -30.0  # MuJoCo's: of the direction of view, from x toward y
@@ -23,16 +21,6 @@ _LED_RGBA = np.array([1.0, 0.35, 0.45, 1.0], dtype=np.float32)
 _FILL_LIGHT = 0.35  # ambient light added: the shadow side must be seen too
 _OVERSAMPLING = 2  # the picture is drawn finer and averaged, which smooths edges without multisampling
 _SPARE_GEOMS = 100
-
-
-def gl_context(width_px: int, height_px: int) -> Any:
-    """Make an off-screen context; which kind does not depend on who imported mujoco first."""
-    chosen = os.environ.get("MUJOCO_GL", "egl" if sys.platform.startswith("linux") else "")
-    if chosen == "egl":
-        from mujoco.egl import GLContext
-
-        return GLContext(width_px, height_px)
-    return mujoco.GLContext(width_px, height_px)
 
 
 class ThirdPersonView:
@@ -50,18 +38,8 @@ class ThirdPersonView:
     def __init__(self, model: mujoco.MjModel, width_px: int, height_px: int) -> None:
         self._model, self._shape = model, (height_px, width_px)
         width, height = _OVERSAMPLING * width_px, _OVERSAMPLING * height_px
-        try:
-            self._context = gl_context(width, height)
-            self._context.make_current()
-            self._renderer = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100.value)
-        except Exception as error:  # whatever the driver's loader raises, the cause is the machine
-            raise MachineError(
-                "render",
-                expected=f"an off-screen OpenGL context ({error})",
-                remedy="install libegl1 libgl1-mesa-dri libopengl0 (Debian, Ubuntu: apt-get install)",
-            ) from error
-        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._renderer)
-        mujoco.mjr_resizeOffscreen(width, height, self._renderer)
+        font = mujoco.mjtFontScale.mjFONTSCALE_100.value
+        self._context, self._renderer = open_renderer(model, width, height, font, "render")
         self._scene = mujoco.MjvScene(model, model.ngeom + _SPARE_GEOMS)
         self._scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = 0
         self._option = mujoco.MjvOption()

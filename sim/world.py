@@ -37,9 +37,9 @@ from dockair.sim.parts import Airframe, GustField, WorldParameters, WorldStart
 from dockair.sim.scene import SceneParameters, build_scene
 from dockair.sim.truth import Truth
 
-_WAITING_PLACE_M = (-300.0, 0.0, -20.0)  # of the receiver while the hose settles: out of everybody's way
 __all__ = ["World", "WorldParameters", "WorldStart", "WorldState"]
 
+_WAITING_PLACE_M = (-300.0, 0.0, -20.0)  # of the receiver while the hose settles: out of everybody's way
 _STATE = mujoco.mjtState.mjSTATE_INTEGRATION
 _DIVERGED = 1e10  # acceleration at which MuJoCo calls a step unstable [m/s^2 or rad/s^2]
 _GRAVITY = np.array([0.0, 0.0, -STANDARD_GRAVITY_M_S2])

@@ -43,7 +43,7 @@ class IdentifySettings:
     max_tilt_rad: float = np.deg2rad(40.0)  # more, and four LEDs of a frontal ring pass for four of a tilted one
     max_candidates: int = 60  # 34 220 triples
     max_fits: int = 16
-    sigma_px: float = 0.10  # of a centroid when the caller does not say; DESIGN's budget
+    sigma_px: float = 0.10  # of a centroid when the caller does not say, without what the LEDs' places add
     ring_sigma: float = 0.0012  # LED position error over the ring's radius: 0.3 mm of 250 mm
     tolerance_sigmas: float = 4.0  # one true LED in 3000 falls outside in either coordinate
     centre_tolerance_radii: float = 1.0  # of an expected centre without sigma, in ring radii

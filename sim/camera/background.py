@@ -13,9 +13,6 @@ Not modelled: shadows, interreflections, gloss (that is `glare`), lens distortio
 """
 
 import math
-import os
-import sys
-from collections.abc import Callable
 from typing import Any
 
 import mujoco
@@ -24,24 +21,14 @@ from numba import njit
 from numpy.typing import NDArray
 
 from dockair.calibration import Camera
-from dockair.errors import MachineError
 from dockair.messages import Window
 from dockair.rotations import Array
+from dockair.sim.off_screen import open_renderer
 
 VISIBLE_GROUPS: NDArray[np.uint8] = np.array([1, 1, 1, 0, 0, 0], dtype=np.uint8)  #: MuJoCo's own default
 _FONT = 50  # smallest; no text is drawn
 _SPARE_GEOMS = 100
 _BLOCK_MARGIN = 1  # blocks around a window that the interpolation reaches into
-
-
-def _gl_context(width: int, height: int) -> Any:
-    """Make an off-screen context; which kind does not depend on who imported mujoco first."""
-    chosen = os.environ.get("MUJOCO_GL", "egl" if sys.platform.startswith("linux") else "")
-    if chosen == "egl":
-        from mujoco.egl import GLContext
-
-        return GLContext(width, height)
-    return mujoco.GLContext(width, height)
 
 
 class Background:
@@ -120,30 +107,10 @@ class Background:
             return
         k, margin = self._reduction, 2 * _BLOCK_MARGIN
         width, height = -(-self._camera.width_px // k) + margin, -(-self._camera.height_px // k) + margin
-        try:
-            self._context = _gl_context(width, height)
-            self._context.make_current()
-            self._renderer = self._without_multisampling(lambda: mujoco.MjrContext(self._model, _FONT))
-        except Exception as error:  # whatever the driver's loader raises, the cause is the machine
-            raise MachineError(
-                "camera",
-                expected=f"an off-screen OpenGL context ({error})",
-                remedy="install libegl1 libgl1-mesa-dri libopengl0 (Debian, Ubuntu: apt-get install)",
-            ) from error
-        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._renderer)
-        mujoco.mjr_resizeOffscreen(width, height, self._renderer)
+        self._context, self._renderer = open_renderer(self._model, width, height, _FONT, "camera")
         self._scene = mujoco.MjvScene(self._model, self._model.ngeom + _SPARE_GEOMS)
         self._scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = 0
         self._scene.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = 0
-
-    def _without_multisampling(self, make: Callable[[], Any]) -> Any:
-        """The renderer reads the number of samples from the model when it is made; multisampling costs tenfold."""
-        quality = self._model.vis.quality
-        samples, quality.offsamples = quality.offsamples, 0
-        try:
-            return make()
-        finally:
-            quality.offsamples = samples
 
     def _update(self, data: mujoco.MjData, pose: tuple[Array, Array]) -> None:
         """Fill the scene and move it so that the lens is its origin; make every surface matt."""

@@ -335,11 +335,14 @@ def test_pose_without_its_lines_of_sight_is_the_same_where_the_problem_is_linear
     assert (np.abs(difference) < 0.05 * np.sqrt(np.diag(a.covariance))).all()
 
 
-def test_predicted_pixels_are_the_leds_and_their_sigma_is_that_of_samples():
+@pytest.mark.parametrize("flown_s", [0.0, 0.1], ids=["before any frame", "attitude and place correlated by frames"])
+def test_predicted_pixels_are_the_leds_and_their_sigma_is_that_of_samples(flown_s):
     """2000 states drawn from the belief; a sample sigma is off by 6 % (4 of its own) once in 10 000."""
     filter_, rng = RelativeFilter(sheets(6.0, 0.02, 0.02), SETTINGS), np.random.default_rng(10)
-    pixels, sigma = filter_.predicted_led_pixels(0.0)
-    R, p, covariance = filter_.predicted_pose(0.0)
+    world = World(filter_._sheets, SETTINGS, rng)
+    assert all(fly(world, filter_, flown_s))
+    pixels, sigma = filter_.predicted_led_pixels(world.time_s)
+    R, p, covariance = filter_.predicted_pose(world.time_s)
     np.testing.assert_allclose(pixels, CAMERA.pixels_from_points(RING @ R.T + p))
     draws = rng.multivariate_normal(np.zeros(6), covariance, 2000)
     samples = np.array([CAMERA.pixels_from_points(RING @ (exp(d[:3]) @ R).T + p + d[3:]) for d in draws])

@@ -3,8 +3,6 @@ import pytest
 
 from dockair.calibration import Camera
 from dockair.errors import DockairError
-from dockair.nav.identify.perspective import fit_ring
-from dockair.nav.identify.prior import ring_from_leds
 from dockair.nav.identify.ring import METHODS, IdentificationStatus, IdentifySettings, identify
 
 FOUND, AMBIGUOUS, NOT_FOUND = (
@@ -58,34 +56,6 @@ def test_a_roll_prior_between_two_numberings_is_ambiguous_and_names_nothing():
     assert result.status is AMBIGUOUS
     assert (result.led_numbers == -1).all()
     assert np.isnan(result.led_pixels_px).all() and np.isnan(result.roll_rad)
-
-
-def test_radius_and_roll_of_a_tilted_ring_are_those_of_its_parallel_projection():
-    angle = 0.3 + np.arange(8) * np.pi / 4
-    ring = np.column_stack([0.8 * np.cos(angle), np.sin(angle)])
-    centre, radius, roll = ring_from_leds([40.0, 30.0] - 50.0 * ring)
-    np.testing.assert_allclose(centre, [40, 30], atol=1e-12)
-    assert radius == pytest.approx(50.0)
-    # diag(0.8, 1) R(0.3) = rotation part: atan2(1.8 sin, 1.8 cos)
-    assert roll == pytest.approx(0.3)
-
-
-def test_the_exact_image_of_a_tilted_ring_is_fitted_to_rounding(ring_scene):
-    """Range in radii, centre and every LED of an exact projection come back from four LEDs or more."""
-    rng, camera = np.random.default_rng(23), Camera()
-    for _ in range(100):
-        scene = ring_scene(rng, visible=8, sigma_px=0.0)
-        slots = np.full(8, -1)
-        seen = rng.permutation(8)[: rng.integers(5, 9)]
-        slots[seen] = [int(np.flatnonzero(scene.numbers == k)[0]) for k in seen]
-        fit = fit_ring(
-            scene.points, slots, camera.focal_length_px, camera.principal_point_px,
-            tolerance_px=0.5, tolerance_per_radius=0.005,
-        )  # fmt: skip
-        assert fit.count == 8  # the hidden ones are taken up again
-        np.testing.assert_allclose(fit.slots_px, scene.led_px, atol=5e-3)
-        np.testing.assert_allclose(fit.centre_px, scene.centre_px, atol=5e-3)
-        assert fit.radius_px == pytest.approx(scene.radius_px, rel=2e-4)
 
 
 @both_methods

@@ -70,3 +70,20 @@ def test_release_and_the_deepest_take_in_are_noted():
         referee.watch(dataclasses.replace(truth_at(float(k), (0.3, 0, 0), latched=latched), reel_position_m=reel))
     assert referee.take_in_max_m == 1.4
     assert referee.release_time_s == 3.0
+
+
+def test_offset_and_closure_are_seen_from_the_drogue_also_when_it_moves_and_turns():
+    """Closure is the rate of the tip's place in drogue axes: with the drogue's velocity, and w x p of its turning."""
+    R_WD, w, v_WD = exp(np.array([0.4, -0.3, 0.5])), np.array([0.2, 1.0, -1.5]), np.array([0.3, -0.2, 0.1])
+    lateral, closure = np.array([0.0, 0.07, -0.04]), 1.1
+    referee = Referee()
+    for k, x in enumerate((-1e-4, 1e-4)):
+        p_DP = lateral + [x, 0.0, 0.0]
+        v_WP = v_WD + R_WD @ (np.array([closure, 0.2, 0.3]) + np.cross(w, p_DP))
+        p_WD = np.array([-15.0, 1.0, -3.0])
+        truth = truth_at(float(k), p_WD + R_WD @ p_DP, v_WP)
+        referee.watch(dataclasses.replace(truth, R_WD=R_WD, p_WD=p_WD, v_WD=v_WD, w_WD_D=w))
+    referee.watch(truth_at(2.0, (0.3, 0.0, 0.0), latched=True))
+    assert referee.contact is not None
+    assert referee.contact.radial_offset_m == pytest.approx(np.hypot(0.07, 0.04))
+    assert referee.contact.closure_speed_m_s == pytest.approx(closure)

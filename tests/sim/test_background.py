@@ -1,6 +1,5 @@
 """The drawn scene against the pinhole model, and windows against the full frame."""
 
-import sys
 from dataclasses import replace
 
 import mujoco
@@ -8,9 +7,7 @@ import numpy as np
 import pytest
 
 from dockair.calibration import Camera
-from dockair.errors import MachineError
 from dockair.messages import Window
-from dockair.sim.camera import background
 from dockair.sim.camera.background import Background
 
 CAMERA = Camera(width_px=400, height_px=300, principal_point_px=(207.3, 141.8), focal_length_m=16e-3 / 5)
@@ -152,24 +149,6 @@ def test_a_picture_does_not_depend_on_those_drawn_before() -> None:
     drawn.close()
     assert np.array_equal(first, again)
     drawn.close()  # twice is once
-
-
-def test_a_machine_without_opengl_is_told_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
-    def no_context(width: int, height: int) -> None:
-        raise ImportError("libEGL.so.1: cannot open shared object file")
-
-    monkeypatch.setattr(background, "_gl_context", no_context)
-    with pytest.raises(MachineError, match="libegl1 libgl1-mesa-dri libopengl0") as caught:
-        _draw(*_scene())
-    assert caught.value.exit_code == 3
-
-
-@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="EGL is Linux's")
-def test_the_context_is_egl_even_when_mujoco_was_imported_for_a_window(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delenv("MUJOCO_GL", raising=False)
-    context = background._gl_context(8, 8)
-    context.free()
-    assert "egl" in type(context).__module__
 
 
 def test_the_as_built_principal_point_moves_the_picture() -> None:

@@ -8,7 +8,13 @@ import pytest
 from dockair.messages import ReceiverCommand
 from dockair.parameters import load_parameters
 from dockair.rotations import exp
-from dockair.sim.hose.coupling import CouplingParameters, CouplingState, ProbeInCoupling, next_coupling_state
+from dockair.sim.hose.coupling import (
+    CouplingParameters,
+    CouplingState,
+    ProbeInCoupling,
+    next_coupling_state,
+    probe_in_coupling,
+)
 
 COUPLING = load_parameters("coupling", CouplingParameters)
 SEATED = ProbeInCoupling(distance_m=0.0, angle_rad=0.05, closing_speed_m_s=1.2, pull_n=0.0)
@@ -136,3 +142,25 @@ def test_coupling_force_is_what_the_probe_feels(make_world, receiver_on_rails):
             assert felt @ before.R_WD[:, 0] == pytest.approx(truth.coupling_force_n, abs=1.0)
             checked += 1
     assert checked > 500
+
+
+def test_closing_speed_is_the_rate_at_which_the_tip_moves_along_the_turning_drogues_axis(make_world):
+    """Against a difference of the tip's place in drogue axes, for a tip off the axis and a drogue that turns."""
+    h = 1e-6
+    now = replace(
+        make_world().truth,
+        R_WD=exp(np.array([0.3, -0.2, 0.4])),
+        w_WD_D=np.array([0.3, -1.5, 2.0]),
+        p_WD=np.array([-15.0, 0.2, -3.0]),
+        v_WD=np.array([0.2, -0.4, 0.3]),
+        p_WP=np.array([-15.1, 0.35, -2.8]),
+        v_WP=np.array([1.2, 0.1, -0.2]),
+    )
+    later = replace(
+        now, R_WD=now.R_WD @ exp(h * now.w_WD_D), p_WD=now.p_WD + h * now.v_WD, p_WP=now.p_WP + h * now.v_WP
+    )
+    probe = probe_in_coupling(now, 0.0, COUPLING)
+    assert probe.closing_speed_m_s == pytest.approx((later.p_DP[0] - now.p_DP[0]) / h, abs=1e-5)
+    seat_W = now.p_WD + now.R_WD @ [COUPLING.depth_m, 0.0, 0.0]
+    assert probe.distance_m == pytest.approx(np.linalg.norm(now.p_WP - seat_W))
+    assert probe.angle_rad == pytest.approx(np.arccos(now.R_WD[0, 0]))  # the probe's axis is W's x

@@ -134,3 +134,11 @@ def test_latency_counts_rows_and_not_columns() -> None:
     narrow, wide, tall = Window(0, 300, 0, 10), Window(0, 300, 0, 2048), Window(0, 600, 0, 10)
     assert latency_s(narrow, CAMERA) == latency_s(wide, CAMERA) < latency_s(tall, CAMERA)
     assert latency_s(Window(0, 1088, 0, 2048), CAMERA) == pytest.approx(10e-3, abs=1e-4)
+
+
+def test_latency_counts_from_the_middle_of_the_exposure() -> None:
+    window = Window(0, 300, 0, 10)
+    longer = replace(CAMERA, exposure_s=CAMERA.exposure_s + 400e-6)
+    assert latency_s(window, longer) - latency_s(window, CAMERA) == pytest.approx(200e-6, rel=1e-9)
+    after_exposure = readout_time_s(300, CAMERA) + CAMERA.transfer_s
+    assert latency_s(window, CAMERA) - after_exposure == pytest.approx(0.5 * CAMERA.exposure_s, rel=1e-9)

@@ -131,3 +131,53 @@ def test_drogue_turns_into_the_wind_and_its_turning_is_damped(axis):
     w = np.zeros((2, 3))
     w[1, axis] = 1.0
     assert tow_loads(position, np.array([np.eye(3)] * 2), v, w, air, 0.0, K)[1, 3 + axis] < 0.0
+
+
+def test_link_that_turns_about_its_middle_is_damped_as_two_gauss_points_say():
+    """Still air: at +-L/(2 sqrt 3) half the link moves across the air with w L/(2 sqrt 3); exact would be L^4/32."""
+    w, length = 2.0, HOSE.link_length_m
+    arm = length / (2.0 * np.sqrt(3.0))
+    zero = np.zeros((2, 3))
+    wrench = tow_loads(zero, np.array([np.eye(3)] * 2), zero, np.array([[0.0, w, 0.0], [0.0] * 3]), zero, 0.0, K)[0]
+    per_metre = 0.5 * DENSITY * HOSE.normal_drag_coefficient * DIAMETER * (w * arm) ** 2
+    np.testing.assert_allclose(wrench[:3], 0.0, atol=1e-12)
+    np.testing.assert_allclose(wrench[3:], [0.0, -length * per_metre * arm, 0.0], rtol=1e-9, atol=1e-12)
+
+
+def test_drogues_weathercock_moment_and_damping_are_the_closed_forms():
+    """About the mass centre: D a sin(tilt) of the drag a behind it; (1/2 rho V)(S d^2 C_q + 2 S C_D a^2) a rate.
+
+    The second part of the damping is the change of the drag's direction: the canopy moves across with w a, and the
+    force across is D w a / V, of arm a.
+    """
+    speed, tilt, rate = 180.0, 1e-4, 1e-3
+    arm = DROGUE.centre_of_mass_x_m - DROGUE.drag_centre_x_m
+    area, d = 0.25 * np.pi * DROGUE.drag_diameter_m**2, DROGUE.drag_diameter_m
+    drag = 0.5 * DENSITY * area * DROGUE.drag_coefficient * speed**2
+    zero, air = np.zeros((2, 3)), np.array([[-speed, 0.0, 0.0]] * 2)
+    R = np.array([np.eye(3), exp(np.array([0.0, tilt, 0.0]))])
+    assert tow_loads(zero, R, zero, zero, air, 0.0, K)[1, 4] == pytest.approx(-drag * arm * tilt, rel=1e-6)
+    w = np.array([[0.0] * 3, [0.0, rate, 0.0]])
+    moment = tow_loads(zero, np.array([np.eye(3)] * 2), zero, w, air, 0.0, K)[1, 4]
+    of_rate = 0.5 * DENSITY * speed * area * d**2 * DROGUE.rate_damping_coefficient
+    assert moment == pytest.approx(-(of_rate + drag * arm**2 / speed) * rate, rel=1e-6)
+
+
+def test_drogues_swing_about_the_hoses_end_is_damped_by_the_ratio_that_its_sheet_says():
+    """Linear: I w' = -(D x_d + weight's part) tilt - (loads' and hinge's damping) w, about the hose's end at rest."""
+    speed, tilt, rate = 180.0, 1e-4, 1e-3
+    to_mass = DROGUE.hose_joint_x_m - DROGUE.centre_of_mass_x_m
+
+    def moment(tilt_rad, rate_rad_s):
+        """About the hose's end, which stands still, without weight."""
+        R = np.array([np.eye(3), exp(np.array([0.0, tilt_rad, 0.0]))])
+        arm = -to_mass * R[1, :, 0]
+        w = np.array([[0.0] * 3, [0.0, rate_rad_s, 0.0]])
+        v = np.array([np.zeros(3), np.cross(w[1], arm)])
+        load = tow_loads(np.zeros((2, 3)), R, v, w, np.array([[-speed, 0.0, 0.0]] * 2), 0.0, K)[1]
+        return load[4] + np.cross(arm, load[:3])[1] - DROGUE.hinge_damping_n_m_s * rate_rad_s
+
+    inertia = DROGUE.inertia_kg_m2[1] + DROGUE.mass_kg * to_mass**2
+    stiffness, damping = -moment(tilt, 0.0) / tilt, -moment(0.0, rate) / rate
+    ratio = damping / (2.0 * np.sqrt(stiffness * inertia))
+    assert ratio == pytest.approx(0.15, abs=0.04)

@@ -8,7 +8,8 @@ import pytest
 
 from dockair.messages import ReceiverCommand
 from dockair.parameters import load_parameters
-from dockair.sim.hose.reel import Reel, ReelParameters
+from dockair.sim.hose.chain import HoseParameters
+from dockair.sim.hose.reel import Reel, ReelParameters, guide_coefficients, guide_loads
 from dockair.sim.hose.rest import hinge_angles, rest_shape
 
 REEL = load_parameters("reel", ReelParameters)
@@ -139,3 +140,50 @@ def test_drogue_hangs_as_from_a_shorter_hose_while_joint_after_joint_passes_the_
             worst_tension = max(worst_tension, abs(truth.root_tension_n / shorter.root_tension_n - 1.0))
     assert truth.reel_position_m > 2.5
     assert worst < 0.020 and worst_tension < 0.005
+
+
+HOSE = load_parameters("hose", HoseParameters)
+GUIDE = guide_coefficients(HOSE, REEL, STATIC)
+
+
+def _guide_on_one_link(t, share):
+    """(6,) what the tube does to link 0, at rest, of direction t, drawn in by a share of its length."""
+    R = np.eye(3)[None].copy()
+    R[0, :, 0] = t
+    zero = np.zeros((1, 3))
+    return guide_loads(zero, R, zero, zero, share * HOSE.link_length_m, GUIDE)[0]
+
+
+@pytest.mark.parametrize("share", [0.1, 0.5, 0.8])
+@pytest.mark.parametrize("outward", [(0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, -0.6, -0.8)])
+def test_half_drawn_in_link_turns_by_its_outer_share_of_the_hoses_angle_whichever_way_that_is(outward, share):
+    """Pulled at its rear end with the static tension at a small angle to the axis; its weight is another test's."""
+    angle, e = 1e-4, np.array(outward)
+    t = np.array([1.0, 0.0, 0.0]) - (1.0 - share) * angle * e
+    pull = STATIC * (np.array([-1.0, 0.0, 0.0]) + angle * e)
+    turning = _guide_on_one_link(t, share)[3:] - _guide_on_one_link(np.array([1.0, 0.0, 0.0]), share)[3:]
+    np.testing.assert_allclose(turning + np.cross(-HOSE.link_length_m * t, pull), 0.0, atol=1e-3 * STATIC * angle)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.3, 0.7, 1.0])
+def test_tube_bears_the_weight_of_what_lies_in_it_where_it_lies(share):
+    """Weight and tube together are the weight of the part outside, at that part's middle."""
+    weight = HOSE.link_mass_kg * 9.80665
+    wrench = _guide_on_one_link(np.array([1.0, 0.0, 0.0]), share)
+    middle_of_outside = np.array([-0.5 * share * HOSE.link_length_m, 0.0, 0.0])
+    outside = np.array([0.0, 0.0, -(1.0 - share) * weight])
+    np.testing.assert_allclose(wrench[:3] + [0.0, 0.0, -weight], outside, atol=1e-12)
+    np.testing.assert_allclose(wrench[3:], np.cross(middle_of_outside, outside), atol=1e-12)
+
+
+def test_joint_in_the_pod_is_pressed_to_the_axis_and_its_motion_damped():
+    """Two links, the first wholly inside: the joint between them, off the axis and moving outward, is pushed back."""
+    length = HOSE.link_length_m
+    position, R = np.array([[-0.5, 0.02, -0.03], [-1.5, 0.02, -0.03]]) * [length, 1.0, 1.0], np.array([np.eye(3)] * 2)
+    v = np.array([[0.0, 0.4, -0.5], [0.0] * 3])
+    wrench = guide_loads(position, R, v, np.zeros((2, 3)), 1.5 * length, GUIDE)
+    damping = 2.0 * REEL.guide_damping_ratio * np.sqrt(REEL.guide_stiffness_n_m * HOSE.link_mass_kg)
+    force = -0.5 * (REEL.guide_stiffness_n_m * position[0] + damping * v[0]) * [0.0, 1.0, 1.0]  # half of link 1 is in
+    carried = [0.0, 0.0, HOSE.link_mass_kg * 9.80665]
+    np.testing.assert_allclose(wrench[0, :3], force + carried, rtol=1e-9)
+    np.testing.assert_allclose(wrench[0, 3:], np.cross([-0.5 * length, 0.0, 0.0], force), rtol=1e-9, atol=1e-9)

@@ -157,3 +157,16 @@ def test_every_colour_is_grey(world):
     np.testing.assert_array_equal(rgba[:, :1], rgba[:, 1:2])
     np.testing.assert_array_equal(rgba[:, :1], rgba[:, 2:3])
     assert rgba[:, 3].min() == 1.0
+
+
+def test_a_blow_on_the_drogue_has_the_softness_and_friction_of_its_sheet(make_world):
+    """Whoever strikes it, probe or nose: MuJoCo would mix in the other geom's default."""
+    drogue = make_world().parameters.drogue
+    struck = set()
+    for p_PD_B in ((-0.03, 0.25, 0.0), (-1.25, 0.9, -0.4)):
+        world = make_world(p_PD_B=p_PD_B)
+        for contact in world.data.contact[: world.data.ncon]:
+            struck |= {world.model.geom(geom).name.split("_")[0] for geom in contact.geom}
+            np.testing.assert_allclose(contact.solref, [drogue.contact_time_constant_s, 1.0])
+            np.testing.assert_allclose(contact.friction[:2], drogue.friction)
+    assert {"probe", "fuselage", "basket"} <= struck

@@ -10,7 +10,7 @@ from dockair.messages import Window
 from dockair.parameters import load_parameters
 from dockair.rotations import exp
 from dockair.sim.camera.camera import CameraParameters, LedParameters, LightParameters, NearInfraredCamera
-from dockair.sim.camera.radiometry import responses
+from dockair.sim.camera.radiometry import responses, sun_detection
 
 PARAMETERS = load_parameters("camera", CameraParameters)
 LEDS = load_parameters("leds", LedParameters)
@@ -75,3 +75,23 @@ def test_a_glint_has_the_place_of_the_mirror_point_and_the_light_of_the_spheres_
     r = np.linalg.norm(point)
     by_hand = LIGHT.glint_reflectance * sun_flux_e * 0.1**2 / 4.0 * (point[0] / r) / r**2
     assert glint.sum() == pytest.approx(by_hand, rel=0.01)
+
+
+@pytest.mark.parametrize("pixel", [(1020.0, 545.0), (60.0, 1000.0)])
+def test_the_suns_disc_has_its_radiance_through_the_aperture_and_the_fourth_power_of_the_cosine(
+    pixel: tuple[float, float], make_camera: Callable[..., Made]
+) -> None:
+    """Electrons in the disc's middle: S E/Omega (pi/4 N^2) p^2 t cos^4, the sky's and the veil's being 1e-4 of it."""
+    world, camera = make_camera()
+    as_built = world.as_built.camera
+    sun_C = as_built.rays_from_pixels(np.array([pixel]))[0]
+    world, camera = make_camera(sun_W=camera.pose(world.data)[0] @ sun_C)
+    u, v = (round(x) for x in pixel)
+    middle = camera.expected_electrons(world.data, Window(v - 1, v + 2, u - 1, u + 2)).mean()
+    irradiance = sun_detection(PARAMETERS, LIGHT)  # electrons a second and square metre
+    radiance = irradiance / (np.pi * LIGHT.sun_angular_radius_rad**2)
+    on_axis = radiance * np.pi / (4.0 * PARAMETERS.f_number**2) * as_built.pixel_pitch_m**2 * PARAMETERS.exposure_s
+    cos_t = 1.0 / np.sqrt(
+        1.0 + np.sum(((np.array(pixel) - as_built.principal_point_px) / as_built.focal_length_px) ** 2)
+    )
+    assert middle == pytest.approx(on_axis * cos_t**4, rel=2e-3)

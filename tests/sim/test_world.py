@@ -10,6 +10,7 @@ import pytest
 from dockair.errors import DockairError
 from dockair.messages import ReceiverCommand
 from dockair.parameters import load_parameters
+from dockair.rotations import exp
 from dockair.sim.air.turbulence import DrydenField, TurbulenceParameters
 from dockair.sim.truth import Truth
 from dockair.streams import random_stream
@@ -129,6 +130,42 @@ def test_receiver_is_told_the_air_with_its_gust_and_its_specific_force_at_trim(m
     np.testing.assert_allclose(receiver.air_velocity_W, [-178.0, -1.0, 0.5], atol=1e-12)
     np.testing.assert_allclose(receiver.specific_force_B, [0.0, 0.0, 9.80665], atol=1e-12)
     np.testing.assert_allclose(world.truth.gust_D_m_s, [2.0, -1.0, 0.5], atol=1e-12)
+
+
+def test_each_body_is_told_the_gust_of_its_own_place(make_world, receiver_on_rails):
+    class Shear:
+        def step(self):
+            pass
+
+        def velocity(self, x_W):
+            return np.column_stack([0.01 * x_W, np.zeros((len(x_W), 2))])
+
+    receiver = receiver_on_rails()
+    world = make_world(receiver=receiver, gusts=Shear())
+    before = world.truth
+    drogue_x = (before.p_WD + before.R_WD @ [world.parameters.drogue.centre_of_mass_x_m, 0.0, 0.0])[0]
+    np.testing.assert_allclose(before.gust_B_m_s, [0.01 * before.p_WB[0], 0.0, 0.0], atol=1e-12)
+    np.testing.assert_allclose(before.gust_D_m_s, [0.01 * drogue_x, 0.0, 0.0], atol=1e-12)
+    world.step(ReceiverCommand())
+    assert receiver.air_velocity_W[0] == pytest.approx(-180.0 + 0.01 * before.p_WB[0], abs=1e-9)
+
+
+def test_turning_receiver_moves_its_probe_and_feels_its_weight_in_its_own_axes(make_world, receiver_on_rails):
+    class Turning(receiver_on_rails):
+        """Held up in W, and turned."""
+
+        def step(self, **state):
+            self.R_WB, self.specific_force_B = state["R_WB"], state["specific_force_B"]
+            return self.mass_kg * np.array([0.0, 0.0, 9.80665]), np.array([2e4, -5e4, 8e4])
+
+    receiver = Turning(trim_R_WB=exp(np.array([0.4, -0.2, 0.3])))
+    world = make_world(receiver=receiver, p_PD_B=FAR)
+    a, b, c = [world.step(ReceiverCommand()) for _ in range(500)][-3:]
+    assert np.linalg.norm(b.v_WP) > 1.0
+    np.testing.assert_allclose(0.5 * (b.v_WP + c.v_WP), (c.p_WP - a.p_WP) * 500.0, atol=5e-3)
+    turn = b.R_WB.T @ (c.R_WB - a.R_WB) * 500.0
+    np.testing.assert_allclose(0.5 * (b.w_WB_B + c.w_WB_B), [turn[2, 1], turn[0, 2], turn[1, 0]], atol=2e-3)
+    np.testing.assert_allclose(receiver.specific_force_B, receiver.R_WB.T @ [0.0, 0.0, 9.80665], atol=0.01)
 
 
 def test_uniform_gust_along_the_wind_is_another_airspeed(make_world):

@@ -1,0 +1,56 @@
+"""The reference that the receiver flies: smooth, limited, consistent in its derivatives."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dockair.messages import ReceiverCommand
+from dockair.parameters import load_parameters
+from dockair.sim.aircraft.flight_control import FlightControlParameters
+from dockair.sim.aircraft.reference import Reference
+
+PARAMETERS = load_parameters("flight_control", FlightControlParameters)
+
+
+def fly_reference(command: Any, seconds: float, step_s: float = 1e-3) -> np.ndarray:
+    """(n, 4, 3) of the chain under a command that is a function of time."""
+    reference = Reference(PARAMETERS.reference_limits, step_s)
+    reference.start(np.zeros(3), np.eye(3), command(0.0))
+    return np.array([reference.step(np.eye(3), command(k * step_s)).copy() for k in range(round(seconds / step_s))])
+
+
+def test_reference_with_feed_forward_is_the_command_through_the_low_pass_alone() -> None:
+    w, size = 1.0, 0.5
+    chain = fly_reference(
+        lambda t: ReceiverCommand(
+            velocity_m_s=np.full(3, size * np.sin(w * t)), acceleration_m_s2=np.full(3, size * w * np.cos(w * t))
+        ),
+        20.0,
+    )
+    t = np.arange(1, len(chain) + 1) * 1e-3
+    tail = t > 12.0
+    b, zeta = PARAMETERS.smoothing_bandwidth_rad_s, PARAMETERS.smoothing_damping
+    F = b**2 / (b**2 - w**2 + 2j * zeta * b * w)
+    expected = size * np.imag(F * np.exp(1j * w * t[tail]))
+    np.testing.assert_allclose(chain[tail, 0], np.tile(expected[:, None], 3), atol=2e-3)  # a tick of delay
+
+
+def test_reference_keeps_its_limits_and_its_derivatives_belong_together() -> None:
+    rng, limits = np.random.default_rng(2), PARAMETERS.reference_limits
+    commands = rng.normal(size=(40, 2, 3)) * 6.0
+    chain = fly_reference(
+        lambda t: ReceiverCommand(velocity_m_s=commands[int(4 * t), 0], acceleration_m_s2=commands[int(4 * t), 1]), 10.0
+    )
+    assert np.all(np.abs(chain[:, 1]) <= limits.acceleration_m_s2 * 1.2)  # the low pass after the limit overshoots
+    assert np.all(np.abs(chain[:, 2]) <= limits.jerk_m_s3 * (1.0 + 1e-12))
+    assert np.any(np.abs(chain[:, 2]) == limits.jerk_m_s3)
+    for order in range(3):
+        np.testing.assert_allclose(np.diff(chain[:, order], axis=0), 1e-3 * chain[1:, order + 1], atol=1e-12)
+
+
+def test_reference_shortens_a_command_beyond_the_velocity_limit() -> None:
+    command = ReceiverCommand(velocity_m_s=np.array([0.0, 40.0, 0.0]))
+    chain = fly_reference(lambda t: command, 10.0)
+    assert chain[-1, 0, 1] == pytest.approx(PARAMETERS.velocity_limit_m_s, rel=1e-3)
+    assert chain[:, 0, 1].max() < 1.02 * PARAMETERS.velocity_limit_m_s
