@@ -70,7 +70,7 @@ def fly(
     """Fly a scenario and write result.json and episode.rrd."""
     from dockair.scenarios.doctor import require_rendering
     from dockair.scenarios.output import FlightProgress, show_result
-    from dockair.scenarios.output_folder import default_output_folder, prepare_output_folder
+    from dockair.scenarios.output_folder import check_output_folder, default_output_folder
     from dockair.scenarios.schema import load_scenario
 
     chosen = load_scenario(scenario, _overrides(settings))
@@ -78,7 +78,7 @@ def fly(
     if not chosen.navigation.is_truth:
         require_rendering()
     folder = out or default_output_folder(chosen.name, seed)
-    prepare_output_folder(folder)
+    check_output_folder(folder)
     from dockair.scenarios.loop import fly as fly_scenario
 
     with FlightProgress(chosen.flight.duration_s) as progress:

@@ -21,19 +21,28 @@ def default_output_folder(scenario_name: str, seed: int) -> Path:
     return Path("out") / f"{scenario_name}-{seed}"
 
 
-def prepare_output_folder(folder: Path) -> None:
-    """Make the folder, and remove an earlier flight's files from it; other files stay.
+def check_output_folder(folder: Path) -> None:
+    """Refuse a folder that no flight may be written to; change nothing.
 
     Raises:
-        DockairError: it is not a folder, holds files but no flight, or cannot be written.
+        DockairError: it is not a folder, or holds files but no flight.
     """
     expected = "a new or empty folder, or one with an earlier flight"
     if folder.exists() and not folder.is_dir():
         raise DockairError(f"--out {folder}", expected=expected, got="a file")
+    present = sorted(path.name for path in folder.iterdir()) if folder.is_dir() else []
+    if present and not set(present) & set(FLIGHT_FILES):
+        raise DockairError(f"--out {folder}", expected=expected, got=f"a folder with {present[0]}")
+
+
+def prepare_output_folder(folder: Path) -> None:
+    """Make the folder, and remove an earlier flight's files from it; other files stay.
+
+    Raises:
+        DockairError: as `check_output_folder`, or it cannot be written.
+    """
     try:
-        present = sorted(path.name for path in folder.iterdir()) if folder.is_dir() else []
-        if present and not set(present) & set(FLIGHT_FILES):
-            raise DockairError(f"--out {folder}", expected=expected, got=f"a folder with {present[0]}")
+        check_output_folder(folder)
         for name in FLIGHT_FILES:
             (folder / name).unlink(missing_ok=True)
         folder.mkdir(parents=True, exist_ok=True)

@@ -8,6 +8,7 @@ from dockair.errors import DockairError
 from dockair.scenarios.flight_log import FlightLog
 from dockair.scenarios.message_log import MessageLog, read_messages
 from dockair.scenarios.metrics import Result, summarise
+from dockair.scenarios.output_folder import prepare_output_folder
 from dockair.scenarios.referee import Outcome
 
 if TYPE_CHECKING:  # the loop imports this module
@@ -35,7 +36,7 @@ class Recorder:
         self._log = FlightLog()
         self._messages: MessageLog | None = None
         if self._folder is not None:
-            self._folder.mkdir(parents=True, exist_ok=True)
+            prepare_output_folder(self._folder)  # only now: an earlier flight outlives one that cannot be built
             if record != "none" and flight.recipe is not None:
                 self._messages = MessageLog(self._folder, flight.recipe)
 

@@ -17,8 +17,6 @@ from dockair.sim.hose.coupling import CouplingParameters
 
 _SOCKET_STAVES = 12  # capsules around the coupling's mouth
 _CANOPY_PANELS = 24
-_HOUSING_REFLECTANCE = 0.04  # black anodised; drawing only
-_HOUSING_GAP_M = 0.002  # the LED's emitting point stands this far aft of its housing's face
 
 
 def grey(reflectance: float) -> list[float]:
@@ -60,9 +58,9 @@ def add_drogue(body: Any, drogue: DrogueParameters, coupling: CouplingParameters
         body.add_geom(
             name=f"led_housing_{k}",
             type=mujoco.mjtGeom.mjGEOM_CYLINDER,
-            fromto=[_HOUSING_GAP_M, y, z, drogue.rim_x_m, y, z],  # behind the LED, which lies on the housing's face
+            fromto=[drogue.led_housing_gap_m, y, z, drogue.rim_x_m, y, z],
             size=[drogue.led_housing_radius_m, 0.0, 0.0],
-            rgba=grey(_HOUSING_REFLECTANCE),
+            rgba=grey(drogue.led_housing_reflectance),
             **drawn,
         )
     body.add_site(name="coupling", pos=[coupling.depth_m, 0.0, 0.0], size=[0.01] * 3)

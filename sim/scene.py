@@ -191,9 +191,14 @@ def _add_probe(body: Any, mounting: Mounting, coupling: CouplingParameters, fric
     """Tip sphere whose foremost point is P, a straight boom, and a mast from it to the nose's side."""
     x, y, z = (float(c) for c in mounting.p_BP)
     tip, boom = coupling.probe_tip_radius_m, coupling.probe_boom_radius_m
-    elbow, foot = [x - 1.7, y, z], [x - 3.2, 0.35 * y, 0.2 * z]
+    elbow, foot = [x - coupling.probe_boom_length_m, y, z], [x - 3.2, 0.35 * y, 0.2 * z]
     # MuJoCo takes the larger friction of two geoms: both must have the pair's
-    contact = {"contype": _PROBE, "conaffinity": 0, "rgba": grey(0.3), "friction": sliding(friction)}
+    contact = {
+        "contype": _PROBE,
+        "conaffinity": 0,
+        "rgba": grey(coupling.probe_reflectance),
+        "friction": sliding(friction),
+    }
     capsule = mujoco.mjtGeom.mjGEOM_CAPSULE
     sphere = mujoco.mjtGeom.mjGEOM_SPHERE
     body.add_geom(name="probe_tip", type=sphere, pos=[x - tip, y, z], size=[tip, 0.0, 0.0], **contact)

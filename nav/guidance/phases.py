@@ -40,8 +40,8 @@ class PhaseLimits:
     stabilise_s: float = 3.0  # assumed: a few periods of the drogue's motion
     steady_offset_m: float = 0.35  # assumed: about twice the drogue's excursion in light gusts
     steady_rate_m_s: float = 0.4  # assumed, likewise
-    steady_sigma_m: float = 0.05  # assumed: a third of the 0.15 m that a contact may be off, 1 sigma of the lateral state
-    coupling_reached_m: float = 0.05  # assumed: the coupling takes the tip within 0.03 m; the rest is error of the range
+    steady_sigma_m: float = 0.05  # assumed: a third of the 0.15 m that a contact may be off
+    coupling_reached_m: float = 0.05  # assumed: the coupling takes the tip within 0.03 m, the range errs by 0.02 m
     come_along_m: float = 0.2  # assumed: a drogue farther from the tip than this is not held by it
     take_in_m: float = 1.5  # inside the refuelling range 0.5-6 m (KDC-10 procedures)
     hold_s: float = 5.0  # assumed: long enough to see that the drogue stays on the probe

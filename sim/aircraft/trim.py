@@ -65,6 +65,7 @@ def level_trim(parameters: AirframeParameters, airspeed_m_s: float, air: Air) ->
         and table[0] < alpha < table[-1]
         and abs(elevator) < parameters.surface_limits_rad[0]
         and available.idle_n < thrust < available.military_n
+        and airspeed_m_s / air.speed_of_sound_m_s <= parameters.thrust_mach[-1]
     )
     if not inside:
         raise DockairError(

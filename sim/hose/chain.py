@@ -66,6 +66,8 @@ class DrogueParameters:
     canopy_diameter_m: float
     canopy_length_m: float
     led_housing_radius_m: float
+    led_housing_gap_m: float
+    led_housing_reflectance: float
     friction: float
     contact_time_constant_s: float
     reflectance: float

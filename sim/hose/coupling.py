@@ -44,6 +44,8 @@ class CouplingParameters:
     stop_gap_m: float
     probe_tip_radius_m: float
     probe_boom_radius_m: float
+    probe_boom_length_m: float
+    probe_reflectance: float
 
 
 class CouplingState(Enum):

@@ -21,7 +21,7 @@ def truth_parts(seed):
 
 
 def ring_in_camera(ahead_m, off_m=(0.0, 0.0)):
-    """(8, 3) LEDs in camera axes with the ring's centre so far ahead of the tip, off the probe's line to left and up."""
+    """(8, 3) LEDs in camera axes, the ring's centre so far ahead of the tip and off the probe's line to left and up."""
     mounting = load_parameters("mounting", MountingParameters).mounting()
     p_BD = mounting.p_BP + np.array([ahead_m, *off_m])
     return (LedRing().positions_D + p_BD - mounting.p_BC) @ mounting.R_BC

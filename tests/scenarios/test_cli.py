@@ -5,6 +5,7 @@ import json
 import os
 import subprocess
 import sys
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,6 +14,7 @@ import pytest
 from dockair.errors import DockairError, MachineError
 from dockair.scenarios import cli, doctor
 from dockair.scenarios.metrics import NavigationFigures, Result
+from dockair.scenarios.output_folder import prepare_output_folder
 from dockair.scenarios.referee import Contact
 
 NAVIGATION = NavigationFigures(
@@ -75,6 +77,7 @@ def flights(monkeypatch, tmp_path):
             progress(
                 SimpleNamespace(time_s=time_s, p_PD_B=np.array([3.0, 4.0, 0.0])), SimpleNamespace(phase="approach")
             )
+        prepare_output_folder(Path(out))  # as the recorder does, once the flight is built
         result = a_result(scenario, seed, out)
         result.write(out)
         return result
@@ -153,6 +156,7 @@ def test_json_is_one_object_on_stdout_and_nothing_else(command, flights):
 @pytest.mark.parametrize("outcome", ["miss", "rim_strike", "abort", "collision", "timeout"])
 def test_the_exit_status_is_zero_whatever_the_outcome(command, flights, monkeypatch, outcome):
     def fly(scenario, seed, out, *, record, progress):
+        prepare_output_folder(Path(out))
         return a_result(scenario, seed, out, outcome=outcome, contact=None)
 
     monkeypatch.setitem(sys.modules, "dockair.scenarios.loop", SimpleNamespace(fly=fly))

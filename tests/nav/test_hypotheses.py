@@ -1,0 +1,67 @@
+"""Rings that candidates may form, and how likely each is by accident."""
+
+from math import comb
+
+import numpy as np
+import pytest
+
+from dockair.calibration import Camera
+from dockair.nav.identify.hypotheses import METHODS, IdentifySettings, _contained, _triples_of, ring_fits
+from dockair.nav.identify.octagon import find_octagons
+from dockair.nav.identify.prior import make_prior
+
+SETTINGS = IdentifySettings()
+OPEN = make_prior(SETTINGS.radius_range_px, 1.0, 0.25, None, None, None, None, None)
+both_methods = pytest.mark.parametrize("method", METHODS)
+
+
+def fits_of(points, method="three_point"):
+    return ring_fits(points, method, OPEN, Camera(), 0.1, SETTINGS)
+
+
+@both_methods
+def test_both_methods_propose_every_triple_of_a_frontal_ring(method, ring_scene):
+    scene = ring_scene(np.random.default_rng(41), tilt_deg=1.0, clutter=10, range_m=(3.0, 8.0))
+    proposed = {tuple(sorted(triple)) for triple in _triples_of(scene.points, method, OPEN).tolist()}
+    leds = np.flatnonzero(scene.numbers >= 0).tolist()
+    assert all((a, b, c) in proposed for a in leds for b in leds for c in leds if a < b < c)
+    assert len(proposed) == len(_triples_of(scene.points, method, OPEN))  # none twice
+
+
+@both_methods
+def test_a_true_ring_comes_first_and_only_once(method, ring_scene):
+    rng = np.random.default_rng(42)
+    for _ in range(10):
+        scene = ring_scene(rng, clutter=8)
+        fits = fits_of(scene.points, method)
+        np.testing.assert_array_equal(np.sort(fits[0].fit.candidate), np.sort(np.flatnonzero(scene.numbers >= 0)))
+        assert sum(one.fit.count == 8 for one in fits) == 1
+        assert all(b.log10_false_rings >= a.log10_false_rings for a, b in zip(fits, fits[1:], strict=False))
+
+
+def test_the_expected_number_of_accidental_rings_is_the_formulas(ring_scene):
+    """Eq. (1) by hand, from the fit's own tolerance and the number of hypotheses that were looked up."""
+    scene = ring_scene(np.random.default_rng(43), visible=6, clutter=12, range_m=(5.0, 8.0))
+    best = fits_of(scene.points)[0]
+    assert best.fit.count == 6
+    tested = find_octagons(
+        scene.points, _triples_of(scene.points, "three_point", OPEN), radius_range_px=OPEN.radius_range_px,
+        centre_gate=OPEN.gate, roll_gate=OPEN.roll_gate, min_axis_ratio=np.cos(SETTINGS.max_tilt_rad),
+        tolerance_px=1.0, tolerance_per_radius=0.0, perspective_per_radius_squared=0.0, capacity=1,
+    ).tested  # fmt: skip
+    area = np.prod(np.ptp(scene.points, axis=0))
+    p = (18 - 3) * np.pi * best.fit.tolerance_px**2 / area
+    assert best.log10_false_rings == pytest.approx(np.log10(tested * comb(5, 3) * p**3), abs=1e-6)
+
+
+def test_a_hypothesis_lies_in_another_up_to_the_rings_symmetry():
+    whole = np.arange(8)
+    parts = np.array(
+        [
+            [2, 3, -1, -1, 6, -1, 0, 1],  # turned by two places, with gaps
+            [0, 1, 2, 3, 4, 5, 6, 7],
+            [1, 0, 2, 3, 4, 5, 6, 7],  # two exchanged
+            [7, 6, 5, 4, 3, 2, 1, 0],  # the other way round
+        ]
+    )
+    assert _contained(whole, parts).tolist() == [True, True, False, False]

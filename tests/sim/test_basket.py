@@ -1,0 +1,41 @@
+"""The drogue's geometry, and whether its sheets fit each other."""
+
+import numpy as np
+import pytest
+
+from dockair.parameters import load_parameters
+from dockair.sim.hose.chain import DrogueParameters
+from dockair.sim.hose.coupling import CouplingParameters
+
+DROGUE = load_parameters("drogue", DrogueParameters)
+COUPLING = load_parameters("coupling", CouplingParameters)
+
+
+def test_tip_anywhere_in_the_bore_at_the_coupling_point_is_near_enough_to_latch():
+    assert 0.0 < COUPLING.socket_radius_m - COUPLING.probe_tip_radius_m < COUPLING.capture_distance_m
+
+
+def test_coupling_point_lies_in_the_bore_behind_the_throat_and_before_the_hose():
+    assert DROGUE.rim_x_m < DROGUE.throat_x_m < COUPLING.depth_m
+    assert COUPLING.depth_m + COUPLING.stop_gap_m < DROGUE.hose_joint_x_m
+
+
+@pytest.mark.parametrize("name", ["rim", "rib", "stave"])
+def test_pieces_stand_evenly_round_the_axis(make_world, name):
+    world = make_world()
+    prefix = "coupling_stave" if name == "stave" else f"basket_{name}"
+    pieces = [i for i in range(world.model.ngeom) if world.model.geom(i).name.startswith(prefix)]
+    middle = world.model.geom_pos[pieces]
+    np.testing.assert_allclose(middle[:, 1:].mean(axis=0), 0.0, atol=1e-12)
+    np.testing.assert_allclose(np.ptp(np.hypot(middle[:, 1], middle[:, 2])), 0.0, atol=1e-12)
+    angle = np.sort(np.arctan2(middle[:, 2], middle[:, 1]))
+    np.testing.assert_allclose(np.diff(angle), 2.0 * np.pi / len(pieces), atol=1e-9)
+
+
+def test_staves_leave_the_bore_free_and_the_canopy_opens_aft_of_its_rim_outward(make_world):
+    model = make_world().model
+    stave = model.geom("coupling_stave_0")
+    assert np.hypot(*stave.pos[1:]) - stave.size[0] == pytest.approx(COUPLING.socket_radius_m)
+    panel = model.geom("canopy_0")
+    assert np.hypot(*panel.pos[1:]) == pytest.approx(0.25 * (DROGUE.ring_diameter_m + DROGUE.canopy_diameter_m))
+    assert panel.pos[0] > DROGUE.rim_x_m  # forward of the rim, so that no LED hides behind it

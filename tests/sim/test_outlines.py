@@ -1,0 +1,46 @@
+"""Outlines of tanker and receiver."""
+
+import numpy as np
+import pytest
+
+from dockair.calibration import Mounting
+from dockair.parameters import load_parameters
+from dockair.rotations import matrix_from_quaternion
+from dockair.sim.outlines import Piece, TankerParameters, receiver_pieces, tanker_pieces
+
+TANKER = load_parameters("tanker", TankerParameters)
+MOUNTING = Mounting(R_BC=np.eye(3), p_BC=np.array([3.3, -0.45, 0.75]), p_BP=np.array([6.0, -0.9, 0.6]))
+OUTLINES = {"tanker": tanker_pieces(TANKER), "receiver": receiver_pieces(MOUNTING)}
+
+
+def named(pieces: list[Piece], name: str) -> Piece:
+    return next(piece for piece in pieces if piece.name == name)
+
+
+@pytest.mark.parametrize("aircraft", OUTLINES)
+def test_right_side_mirrors_the_left(aircraft: str) -> None:
+    """A point of the left piece, mirrored in the plane of symmetry, is the point of the right one across its own y."""
+    pieces, mirror = OUTLINES[aircraft], np.diag([1.0, -1.0, 1.0])
+    pairs = [(p, named(pieces, p.name.replace("_left", "_right"))) for p in pieces if p.name.endswith("_left")]
+    assert len(pairs) >= 2
+    for left, right in pairs:
+        R_left, R_right = (matrix_from_quaternion(np.array(p.q_wxyz)) for p in (left, right))
+        np.testing.assert_allclose(mirror @ left.at, right.at, atol=1e-12)
+        np.testing.assert_allclose(mirror @ R_left @ mirror, R_right, atol=1e-12)
+        assert left.size == right.size
+
+
+@pytest.mark.parametrize("aircraft", OUTLINES)
+def test_wings_sweep_aft_and_the_tankers_rise(aircraft: str) -> None:
+    left = named(OUTLINES[aircraft], "wing_left")
+    outward = matrix_from_quaternion(np.array(left.q_wxyz))[:, 1]
+    assert outward[1] > 0.0 > outward[0]
+    assert outward[2] == 0.0 if aircraft == "receiver" else outward[2] > 0.0
+
+
+def test_pod_ends_where_the_hose_comes_out_and_the_nose_behind_the_probes_tip() -> None:
+    pod = named(OUTLINES["tanker"], "pod")
+    assert pod.to is not None
+    np.testing.assert_allclose(np.array(pod.to) - [pod.size[0], 0.0, 0.0], TANKER.exit_m, atol=1e-12)
+    foremost = max(p.at[0] + p.size[0] for p in OUTLINES["receiver"] if p.name.startswith("fuselage"))
+    assert foremost == pytest.approx(MOUNTING.p_BP[0] - 1.2)

@@ -1,0 +1,57 @@
+"""The tow: loads of air, pod and reel put together."""
+
+import numpy as np
+import pytest
+
+from dockair.parameters import load_parameters
+from dockair.sim.air.atmosphere import standard_atmosphere
+from dockair.sim.hose.chain import DrogueParameters, HoseParameters
+from dockair.sim.hose.reel import ReelParameters
+from dockair.sim.hose.tow import Tow
+
+HOSE = load_parameters("hose", HoseParameters)
+DROGUE = load_parameters("drogue", DrogueParameters)
+WIND_W = np.array([-180.0, 0.0, 0.0])
+
+
+def make(wind_W=WIND_W):
+    reel = load_parameters("reel", ReelParameters)
+    return Tow(HOSE, DROGUE, reel, standard_atmosphere(6000.0), np.asarray(wind_W), 1e-3)
+
+
+def at_rest(tow):
+    """Middles, axes and velocities (none) of the bodies in their rest shape."""
+    t = np.vstack([tow.rest.t_W, tow.rest.t_D_W])
+    R = np.zeros((len(t), 3, 3))
+    R[:, :, 0] = t
+    joints = tow.rest.p_WH
+    end = joints[-1] + (DROGUE.centre_of_mass_x_m - DROGUE.hose_joint_x_m) * t[-1]
+    return np.vstack([0.5 * (joints[:-1] + joints[1:]), end]), R, np.zeros((len(t), 6)), np.zeros(3)
+
+
+def test_at_rest_loads_and_weight_are_carried_by_the_root():
+    tow = make()
+    wrench = tow.wrenches(*at_rest(tow), np.zeros((HOSE.links + 1, 3)), 0.0)
+    weight = (HOSE.links * HOSE.link_mass_kg + DROGUE.mass_kg) * 9.80665
+    carried = wrench[:, :3].sum(axis=0) - [0.0, 0.0, weight]
+    np.testing.assert_allclose(carried, -tow.rest.root_tension_n * tow.rest.t_W[0], rtol=0.02, atol=10.0)
+    assert np.linalg.norm(carried) == pytest.approx(tow.rest.root_tension_n, rel=1e-6)
+
+
+def test_gust_counts_as_wind_on_every_body_and_only_there():
+    tow, gust = make(), np.array([3.0, -2.0, 1.0])
+    bodies, gusts = at_rest(tow), np.zeros((HOSE.links + 1, 3))
+    still = tow.wrenches(*bodies, gusts, 0.0)
+    whole = tow.wrenches(*bodies, gusts + gust, 0.0)
+    np.testing.assert_allclose(whole, make(WIND_W + gust).wrenches(*bodies, gusts, 0.0), rtol=1e-12, atol=1e-9)
+    gusts[4] = gust
+    one = tow.wrenches(*bodies, gusts, 0.0)
+    np.testing.assert_array_equal(one[4], whole[4])
+    np.testing.assert_array_equal(np.delete(one, 4, axis=0), np.delete(still, 4, axis=0))
+
+
+def test_link_at_the_exit_is_the_one_that_the_wound_in_length_reaches():
+    tow, length = make(), HOSE.link_length_m
+    cases = ((-0.1, 0), (0.0, 0), (0.99 * length, 0), (1.01 * length, 1), (3.5 * length, 3), (1e3, HOSE.links - 1))
+    for wound_in_m, link in cases:
+        assert tow.link_at_exit(wound_in_m) == link
