@@ -54,8 +54,6 @@ class Referee:
         self._touched = False
         self.contact: Contact | None = None
         self.collided_with = ""
-        self.release_time_s = float("nan")
-        self.take_in_max_m = 0.0
 
     def watch(self, truth: Truth) -> None:
         """Take note of one physics tick."""
@@ -66,12 +64,8 @@ class Referee:
         self._previous_x = float(p_DP[0])
         self._touched = self._touched or truth.probe_touches_drogue
         self.collided_with = self.collided_with or truth.receiver_touches
-        if truth.latched:
-            self.take_in_max_m = max(self.take_in_max_m, truth.reel_position_m)
-            if self.contact is None:
-                self.contact = self._contact(truth)
-        elif self.contact is not None and np.isnan(self.release_time_s):
-            self.release_time_s = truth.time_s
+        if truth.latched and self.contact is None:
+            self.contact = self._contact(truth)
 
     def _contact(self, truth: Truth) -> Contact:
         crossing = self._crossing or _Crossing(float("nan"), float("nan"))

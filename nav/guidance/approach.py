@@ -42,6 +42,7 @@ class GuidanceSettings:
     back_off_speed_m_s: float = 1.0  # breakaway practice 1-2 m/s
     response_time_s: float = 0.25  # tau: the flight control's lag to a command with its rate, 0.5 to 2 rad/s
     lateral_gain_1_s: float = 1.0  # k: poles of Eq. (1) at a quarter of 1 / tau
+    take_in_gain_1_s: float = 0.35  # speed into the refuelling range per metre to go; a third of k_d: no overshoot
     smoothing_1_s: float = 4.0  # how fast u goes to the u of Eq. (1) where it is not there: 1 / tau
     position_gain_1_s2: float = 0.6  # k_p: error of 1 m asks for 0.6 m/s^2
     rate_gain_1_s: float = 1.2  # k_d: rate of 1 m/s asks for 1.2 m/s^2
@@ -89,6 +90,8 @@ class Guidance:
         following = next_phase(self.phase, self._settings.limits, self._situation(state))
         if following is not self.phase:
             self.phase, self._in_phase_s = following, 0.0
+            if following is Phase.CONTACT:  # what is commanded already will still be flown
+                self._pushed_in_m = self._closure * self._settings.response_time_s
         if self.phase in (Phase.PRE_CONTACT, Phase.APPROACH, Phase.CLEAR):
             self._observe(state)
             u_dot = self._track(state)
@@ -167,9 +170,13 @@ class Guidance:
     def _hold_course(self) -> Array:
         """(3,) du/dt toward the drogue's mean velocity, plus the speed along that the phase asks for."""
         s = self._settings
-        along = {Phase.CONTACT: s.closure_speed_m_s, Phase.DISCONNECT: -s.back_off_speed_m_s}
-        along[Phase.BREAKAWAY] = -s.back_off_speed_m_s
-        return self._toward(np.array([self._mean_along + along.get(self.phase, 0.0), *self._motion.drift_m_s]))
+        along = 0.0
+        if self.phase is Phase.CONTACT:  # slows down so as to stop where it is to hold
+            to_go = max(s.limits.take_in_m - self._pushed_in_m, 0.0)
+            along = min(s.closure_speed_m_s, s.take_in_gain_1_s * to_go)
+        elif self.phase in (Phase.DISCONNECT, Phase.BREAKAWAY):
+            along = -s.back_off_speed_m_s
+        return self._toward(np.array([self._mean_along + along, *self._motion.drift_m_s]))
 
     def _toward(self, u: Array) -> Array:
         return np.asarray(self._settings.rate_gain_1_s * (u - self._u))

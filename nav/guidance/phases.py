@@ -5,7 +5,7 @@
 | PRE_CONTACT | APPROACH    | steady behind the drogue for `stabilise_s`, the relative state is usable      |
 | APPROACH    | CONTACT     | the probe's tip has come to the coupling                                      |
 | APPROACH    | BREAKAWAY   | lost, too fast, or too far off the drogue's axis close to it                  |
-| CONTACT     | HOLD        | the hose is pushed in by `take_in_m` and the drogue has come along            |
+| CONTACT     | HOLD        | nine tenths of `take_in_m` are pushed in and the drogue has come along        |
 | CONTACT     | BREAKAWAY   | the drogue has not come along: the probe is not held                          |
 | HOLD        | DISCONNECT  | `hold_s` are over                                                             |
 | HOLD        | BREAKAWAY   | the drogue has left the probe                                                 |
@@ -78,6 +78,8 @@ def _drogue_left(limits: PhaseLimits, s: Situation) -> bool:
     return abs(s.ahead_m) > limits.come_along_m or s.unusable_s > limits.lost_s
 
 
+_TAKEN_IN = 0.9  # of the way at which holding begins: the receiver comes to rest on the remaining tenth
+
 _Condition = Callable[[PhaseLimits, Situation], bool]
 
 #: The table of the module's first lines; the first condition that holds decides.
@@ -89,7 +91,7 @@ TRANSITIONS: dict[Phase, tuple[tuple[_Condition, Phase], ...]] = {
     ),
     Phase.CONTACT: (
         (_drogue_left, Phase.BREAKAWAY),
-        (lambda limits, s: s.pushed_in_m >= limits.take_in_m, Phase.HOLD),
+        (lambda limits, s: s.pushed_in_m >= _TAKEN_IN * limits.take_in_m, Phase.HOLD),
     ),
     Phase.HOLD: (
         (_drogue_left, Phase.BREAKAWAY),

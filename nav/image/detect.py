@@ -30,7 +30,7 @@ class DetectSettings:
     threshold_dn: int | None = None  # fixed threshold; None for the adaptive one
     noise_factor: float = 8.0  # k: in 2.2 million pixels of normal noise none passes
     min_contrast_dn: float = 8.0  # above sunlit cloud (5 DN at f/8, 20 us); a spot of peak 60 DN keeps 6 pixels
-    max_contrast_dn: float = 40.0  # two thirds of the faintest LED's expected peak (60 DN at 30 m)
+    max_contrast_dn: float = 40.0  # half of a mean LED's peak at 10 m (80 DN)
     connectivity: int = 8  # as the source recommends
     element_shape: str = "square"  # the source's structuring element
     element_size_px: int = 3  # 1 switches opening off

@@ -64,14 +64,6 @@ def test_a_flight_goes_on_until_something_ends_it():
     assert referee.judge(truth_at(20.0, (0.3, 0, 0), latched=True), "hold", 60.0) is None
 
 
-def test_release_and_the_deepest_take_in_are_noted():
-    referee = Referee()
-    for k, (reel, latched) in enumerate([(0.2, True), (1.4, True), (0.9, True), (0.5, False)]):
-        referee.watch(dataclasses.replace(truth_at(float(k), (0.3, 0, 0), latched=latched), reel_position_m=reel))
-    assert referee.take_in_max_m == 1.4
-    assert referee.release_time_s == 3.0
-
-
 def test_offset_and_closure_are_seen_from_the_drogue_also_when_it_moves_and_turns():
     """Closure is the rate of the tip's place in drogue axes: with the drogue's velocity, and w x p of its turning."""
     R_WD, w, v_WD = exp(np.array([0.4, -0.3, 0.5])), np.array([0.2, 1.0, -1.5]), np.array([0.3, -0.2, 0.1])

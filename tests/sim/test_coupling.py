@@ -88,18 +88,22 @@ def test_probe_that_comes_in_too_fast_does_not_latch_not_even_in_the_rebound(mak
     assert touched and not truth.latched
 
 
-def test_probe_at_an_angle_latches_only_once_the_drogue_has_turned_to_it(make_world, receiver_on_rails):
-    """Nose 12 degrees down to a drogue that points 3.5 up."""
-    _, truth, touched = _fly_in(make_world, receiver_on_rails, pitch_rad=np.deg2rad(12.0))
+@pytest.mark.parametrize(("down_deg", "latches"), [(12.0, True), (20.0, False)])
+def test_probe_at_an_angle_latches_only_once_the_drogue_has_turned_to_it(
+    make_world, receiver_on_rails, down_deg, latches
+):
+    """Nose down to a drogue that points 3.5 degrees up: 12 degrees it can turn after, 20 it cannot."""
+    _, truth, touched = _fly_in(make_world, receiver_on_rails, pitch_rad=np.deg2rad(down_deg))
     angle = np.arccos(truth.R_WB[:, 0] @ truth.R_WD[:, 0])
-    assert touched
-    assert not truth.latched or angle <= COUPLING.angle_limit_rad + 0.01
+    assert touched and truth.latched is latches
+    assert bool(angle <= COUPLING.angle_limit_rad + 0.01) is latches
 
 
 def test_tip_never_goes_through_the_basket(make_world, receiver_on_rails):
     """Struck at the limit of speed, off centre: 2.6 mm a tick, and the tip stays inside the cone of the ribs."""
     world = make_world(p_PD_B=(0.35, 0.18, 0.0))
     drogue, tip = world.parameters.drogue, COUPLING.probe_tip_radius_m
+    inside = 0
     for _ in range(250):
         p_DP = world.step(ReceiverCommand(velocity_m_s=np.array([2.6, 0.0, 0.0]))).p_DP
         along = (p_DP[0] - tip - drogue.rim_x_m) / (drogue.throat_x_m - drogue.rim_x_m)
@@ -107,6 +111,8 @@ def test_tip_never_goes_through_the_basket(make_world, receiver_on_rails):
             throat = COUPLING.socket_radius_m + drogue.rib_radius_m
             ribs = 0.5 * drogue.ring_diameter_m * (1.0 - along) + throat * along
             assert np.hypot(p_DP[1], p_DP[2]) < ribs
+            inside += 1
+    assert inside > 20
 
 
 def test_receiver_that_backs_off_is_let_go_at_the_outer_stop_once_and_not_taken_again(make_world, receiver_on_rails):

@@ -1,0 +1,72 @@
+"""Perfect navigation: what it hands to the guidance is the truth, in the guidance's terms."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from dockair.rotations import exp
+from dockair.scenarios.build import build
+from dockair.scenarios.schema import load_scenario
+from dockair.scenarios.truth_navigation import TruthNavigator
+
+
+@cache
+def parts():
+    return build(load_scenario("truth_navigation"), 0)
+
+
+def turning_truth():
+    return replace(
+        parts().world.truth,
+        R_WB=exp(np.array([0.1, -0.2, 0.3])),
+        w_WB_B=np.array([0.1, -0.3, 0.2]),
+        p_WP=np.array([-20.0, 1.0, -3.0]),
+        v_WP=np.array([1.0, 0.2, -0.1]),
+        R_WD=exp(np.array([0.0, -0.1, 0.05])),
+        p_WD=np.array([-15.0, 0.5, -2.5]),
+        v_WD=np.array([-0.2, 0.3, 0.4]),
+    )
+
+
+def handed_over(truth, monkeypatch):
+    navigator, seen = parts().navigator, []
+    assert isinstance(navigator, TruthNavigator)
+    guide = navigator._guidance.step
+    monkeypatch.setattr(navigator._guidance, "step", lambda state: seen.append(state) or guide(state))
+    navigator.truth = truth
+    return navigator.step((), None), seen[0]
+
+
+def test_the_rate_told_is_that_of_the_place_told_in_axes_that_turn(monkeypatch):
+    """Tip and drogue moved on by their velocities, the receiver turned by its rate: a difference over 1 us."""
+    h, now = 1e-6, turning_truth()
+    later = replace(
+        now, R_WB=now.R_WB @ exp(h * now.w_WB_B), p_WP=now.p_WP + h * now.v_WP, p_WD=now.p_WD + h * now.v_WD
+    )
+    _, state = handed_over(now, monkeypatch)
+    np.testing.assert_allclose(state.p_PD_B, now.R_WB.T @ (now.p_WD - now.p_WP), atol=1e-12)
+    np.testing.assert_allclose(state.rate_PD_B, (later.p_PD_B - now.p_PD_B) / h, atol=1e-6)
+
+
+def test_the_coupling_lies_its_depth_along_the_drogues_axis(monkeypatch):
+    truth = turning_truth()
+    _, state = handed_over(truth, monkeypatch)
+    coupling_W = truth.p_WD + truth.R_WD @ [parts().sheets.coupling_depth_m, 0.0, 0.0]
+    np.testing.assert_allclose(state.p_PK_B, truth.R_WB.T @ (coupling_W - truth.p_WP), atol=1e-12)
+
+
+def test_the_solution_is_marked_and_certain_and_has_seen_no_frame(monkeypatch):
+    truth = turning_truth()
+    solution, _ = handed_over(truth, monkeypatch)
+    assert solution.valid and solution.status == "truth" and solution.time_stamp_s == truth.time_s
+    assert not solution.covariance.any() and solution.window is None and np.isnan(solution.frame_time_stamp_s)
+    np.testing.assert_allclose(solution.v_PD_B, truth.R_WB.T @ (truth.v_WD - truth.v_WP), atol=1e-12)
+    np.testing.assert_allclose(solution.R_BD, truth.R_WB.T @ truth.R_WD, atol=1e-12)
+
+
+def test_without_a_truth_it_does_not_navigate():
+    navigator = build(load_scenario("truth_navigation"), 0).navigator
+    with pytest.raises(AssertionError, match="the loop sets the truth"):
+        navigator.step((), None)
