@@ -12,9 +12,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from dockair.calibration import NavigationSheets
+from dockair.errors import DockairError
 from dockair.messages import CameraFrame, ImuSample, NavSolution
 from dockair.nav.fusion import FusionSettings, RelativeFilter
 from dockair.nav.guidance.approach import Guidance, GuidanceSettings, RelativeState
+from dockair.nav.identify.octagon import SLOTS
 from dockair.nav.identify.ring import IdentificationStatus, identify
 from dockair.nav.image.detect import Blobs, DetectSettings, detect
 from dockair.nav.pose.estimate import PoseStatus, solve_pose
@@ -36,9 +38,17 @@ class NavigatorSettings:
 
 
 class Navigator:
-    """The navigation that Dockair flies; see `messages.Navigates` for what any other must offer."""
+    """The navigation that Dockair flies; see `messages.Navigates` for what any other must offer.
+
+    Raises:
+        DockairError: a ring of other than eight LEDs.
+    """
 
     def __init__(self, sheets: NavigationSheets, settings: NavigatorSettings | None = None) -> None:
+        if sheets.ring.count != SLOTS:
+            raise DockairError(
+                "ring.count", expected=f"{SLOTS} LEDs, the ring that can be identified", got=sheets.ring.count
+            )
         self._sheets, self._settings = sheets, settings or NavigatorSettings()
         self._filter = RelativeFilter(sheets, self._settings.fusion)
         self._tracker = RingTracker(sheets.camera, 1.0 / sheets.camera_rate_hz, self._settings.track)

@@ -7,6 +7,7 @@ import numpy as np
 
 from dockair.calibration import Camera, GyroSheet, LedRing, Mounting, NavigationSheets, StartGeometry
 from dockair.clock import Clock
+from dockair.errors import DockairError
 from dockair.messages import Navigates
 from dockair.nav.guidance.approach import GuidanceSettings
 from dockair.nav.guidance.phases import PhaseLimits
@@ -22,6 +23,7 @@ from dockair.sim.air.turbulence import DrydenField, TurbulenceParameters, gust_s
 from dockair.sim.aircraft.aerodynamics import AirframeParameters
 from dockair.sim.aircraft.flight_control import FlightControlParameters
 from dockair.sim.aircraft.receiver import Receiver
+from dockair.sim.aircraft.trim import level_trim
 from dockair.sim.as_built import AsBuilt, AsBuiltParameters, draw_as_built
 from dockair.sim.camera.camera import CameraParameters, LedParameters, LightParameters, NearInfraredCamera
 from dockair.sim.hose.chain import DrogueParameters, HoseParameters
@@ -102,7 +104,8 @@ def build(scenario: Scenario, seed: int) -> Parts:
     offset = scenario.start.sigma_p_m * random_stream(seed, "start").normal(size=3)
     start = WorldStart(p_PD_B=scenario.start.p_PD_B + offset, settle_s=SETTLE_S)
     world = World(parameters, receiver, _gusts(scenario, seed, clock), start, clock)
-    sheets = _navigation_sheets(scenario, parameters, receiver)
+    sheets = _navigation_sheets(scenario, parameters)
+    _check_ring(sheets.ring, parameters.drogue)
     leds, as_built = _as_built(scenario, seed, sheets)
     gyro = Gyro(
         _sheet(scenario, "gyro", GyroParameters),
@@ -117,6 +120,8 @@ def build(scenario: Scenario, seed: int) -> Parts:
         camera = _camera(scenario, seed, leds, as_built, world)
         recipe = _recipe(scenario, sheets)
         navigator = recipe.build()
+        if isinstance(navigator, TruthNavigator):  # its results would not be marked
+            raise DockairError("navigation.navigator", expected='"truth" for perfect navigation', got=recipe.class_name)
     periods = Periods(
         gyro=clock.ticks_per(scenario.rates.gyro_hz, "rates.gyro_hz"),
         control=clock.ticks_per(scenario.rates.control_hz, "rates.control_hz"),
@@ -173,15 +178,17 @@ def _gusts(scenario: Scenario, seed: int, clock: Clock) -> DrydenField | None:
     return DrydenField(parameters, scenario.flight.airspeed_m_s, clock.step_s, random_stream(seed, "gust"))
 
 
-def _navigation_sheets(scenario: Scenario, world: WorldParameters, receiver: Receiver) -> NavigationSheets:
-    """Nominal values only: nothing drawn for this flight goes in."""
+def _navigation_sheets(scenario: Scenario, world: WorldParameters) -> NavigationSheets:
+    """Nominal values only: nothing that is drawn, or changed in hose, drogue and airframe, for this flight goes in."""
     wind_W = np.array([-world.airspeed_m_s, 0.0, 0.0])
-    rest = rest_shape(world.hose, world.drogue, wind_W, world.air.density_kg_m3, world.air.kinematic_viscosity_m2_s)
+    hose, drogue = load_parameters("hose", HoseParameters), load_parameters("drogue", DrogueParameters)
+    rest = rest_shape(hose, drogue, wind_W, world.air.density_kg_m3, world.air.kinematic_viscosity_m2_s)
+    trim = level_trim(load_parameters("airframe", AirframeParameters), world.airspeed_m_s, world.air)
     camera, ring = scenario.hardware.camera, scenario.hardware.ring
     start = StartGeometry(
         p_PD_B=scenario.start.p_PD_B,
         sigma_p_m=scenario.start.sigma_p_m,
-        R_BD=receiver.trim_R_WB.T @ _attitude_along(rest.t_D_W),
+        R_BD=trim.R_WB.T @ _attitude_along(rest.t_D_W),
         sigma_R_rad=scenario.start.sigma_R_rad,
     )
     return NavigationSheets(
@@ -194,6 +201,13 @@ def _navigation_sheets(scenario: Scenario, world: WorldParameters, receiver: Rec
         control_rate_hz=scenario.rates.control_hz,
         coupling_depth_m=world.coupling.depth_m,
     )
+
+
+def _check_ring(ring: LedRing, drogue: DrogueParameters) -> None:
+    """The LEDs sit on the rim that the drogue's sheet describes."""
+    if ring.diameter_m != drogue.ring_diameter_m:
+        where, expected = "parameters.drogue.ring_diameter_m", f"the LED ring's own diameter, {ring.diameter_m} m"
+        raise DockairError(where, expected=f"{expected} (hardware.ring)", got=drogue.ring_diameter_m)
 
 
 def _attitude_along(x_W: Array) -> Array:

@@ -179,6 +179,7 @@ def _print_json(table: Any) -> None:
 
 def main() -> None:
     """Run a command; what a person did wrong ends in one line on stderr, not in a traceback."""
+    sys.path.append(str(Path.cwd()))  # where one's own navigator lies; last, so that it hides nothing
     try:
         status = app(standalone_mode=False)
         sys.stdout.flush()

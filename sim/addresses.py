@@ -61,13 +61,15 @@ class Addresses:
             geom_pairs: (n, 2) geoms in contact.
 
         Returns:
-            Whether the probe touches basket or coupling; the name of what the rest of the receiver touches, "" for
-            nothing.
+            Whether the probe touches basket or coupling; the name of what else of the receiver touches what, or the
+            probe anything but the drogue, "" for nothing.
         """
         probe_touches, receiver_touches = False, ""
         for a, b in geom_pairs:
             for own, other in ((a, b), (b, a)):
-                probe_touches = probe_touches or bool(self.geom_is_probe[own] and self.geom_is_drogue[other])
-                if self.geom_is_receiver[own] and not receiver_touches:
+                probe = bool(self.geom_is_probe[own])
+                probe_touches = probe_touches or bool(probe and self.geom_is_drogue[other])
+                stray_probe = probe and not self.geom_is_drogue[other]
+                if (self.geom_is_receiver[own] or stray_probe) and not receiver_touches:
                     receiver_touches = self.geom_names[other]
         return probe_touches, receiver_touches

@@ -1,9 +1,12 @@
 """The navigator on frames drawn without any simulator: pixels and gyro in, belief, window and command out."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from dockair.calibration import Camera, GyroSheet, LedRing, Mounting, NavigationSheets, StartGeometry
+from dockair.errors import DockairError
 from dockair.messages import CameraFrame, ImuSample, Window
 from dockair.nav.navigator import Navigator
 from dockair.rotations import matrix_from_yaw_pitch_roll
@@ -160,3 +163,8 @@ def test_the_image_shift_of_a_turning_camera_has_the_sign_of_the_pinhole(axis):
     turned = (exp(-w_B * dt) @ far_B) @ R_BC
     expected = camera.pixels_from_points(turned)[0] - np.array(camera.principal_point_px)
     np.testing.assert_allclose(shift, expected, rtol=0.02, atol=0.05)
+
+
+def test_a_ring_that_cannot_be_identified_is_refused_before_the_first_frame():
+    with pytest.raises(DockairError, match="ring.count: expected 8 LEDs"):
+        Navigator(replace(sheets(), ring=LedRing(count=6)))

@@ -1,15 +1,20 @@
 """What a scenario is made of: geometry of the default hardware, and nothing drawn in what the navigation gets."""
 
+import sys
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from dockair.calibration import Camera, LedRing
+from dockair.errors import DockairError
+from dockair.nav.guidance.approach import GuidanceSettings
 from dockair.parameters import load_parameters
 from dockair.scenarios.build import MountingParameters, build, guidance_settings
 from dockair.scenarios.message_log import numbers
 from dockair.scenarios.schema import load_scenario
+from dockair.scenarios.truth_navigation import TruthNavigator
 from dockair.sim.hose.coupling import CouplingParameters
 
 SPARE_BEYOND_M, SPARE_M = 3.0, 0.5
@@ -79,3 +84,26 @@ def test_the_drogues_nominal_attitude_points_along_the_hose():
     sheets = truth_parts(1).sheets
     assert sheets.start.R_BD[0, 0] > np.cos(np.radians(5.0))
     np.testing.assert_allclose(sheets.start.R_BD @ sheets.start.R_BD.T, np.eye(3), atol=1e-12)
+
+
+class Disguised(TruthNavigator):
+    """What somebody might name in a scenario to get the truth without the mark."""
+
+    def __init__(self, sheets):
+        super().__init__(sheets, GuidanceSettings())
+
+
+def test_the_truth_is_given_to_no_navigator_but_truth(monkeypatch):
+    monkeypatch.setitem(sys.modules, "disguise", SimpleNamespace(Disguised=Disguised))
+    with pytest.raises(DockairError, match="perfect navigation"):
+        build(load_scenario("still_air", {"navigation.navigator": "disguise:Disguised"}), 0)
+
+
+def test_a_ring_that_does_not_fit_the_drogue_is_refused():
+    with pytest.raises(DockairError, match="ring's own diameter, 0.5 m"):
+        build(load_scenario("truth_navigation", {"parameters.drogue.ring_diameter_m": 0.6}), 0)
+
+
+def test_the_navigation_is_not_told_of_a_changed_drogue():
+    changed = load_scenario("truth_navigation", {"parameters.drogue.mass_kg": 29.0, "parameters.hose.length_m": 20.0})
+    assert np.array_equal(numbers(build(changed, 1).sheets), numbers(truth_parts(1).sheets))

@@ -40,7 +40,7 @@ def test_contacts_tell_probe_from_receiver_whichever_geom_comes_first(world):
         ([], (False, "")),
         ([(probe, rim)], (True, "")),
         ([(rim, probe)], (True, "")),
-        ([(probe, hose)], (False, "")),  # the hose is not the drogue
+        ([(probe, hose)], (False, "hose_3")),  # the hose is not the drogue: a probe that strikes it has collided
         ([(hose, nose)], (False, "hose_3")),
         ([(nose, wing), (rim, probe)], (True, "tanker_wing_left")),
     ):

@@ -218,3 +218,19 @@ def test_exposing_changes_nothing_in_the_world(make_camera: Callable[..., Made])
     camera.expose(world.data, 0.0, 0, None)
     mujoco.mj_getState(world.model, world.data, after, mujoco.mjtState.mjSTATE_INTEGRATION)
     assert np.array_equal(before, after)
+
+
+def test_the_camera_stands_and_looks_as_it_is_built_into_the_receiver(make_camera: Callable[..., Made]) -> None:
+    """Place and axes by MuJoCo's own quaternions; without this every other test would turn with a wrong pose."""
+    world, camera = make_camera()
+    world.put("receiver", np.array([10.0, -20.0, 30.0]), exp(np.array([0.9, -0.7, 1.3])))
+    body = world.data.body("receiver")
+    built = world.as_built.mounting
+    place = np.zeros(3)
+    mujoco.mju_rotVecQuat(place, built.p_BC, body.xquat)
+    R_WC, p_WC = camera.pose(world.data)
+    np.testing.assert_allclose(p_WC, body.xpos + place, atol=1e-9)
+    for axis in range(3):
+        turned = np.zeros(3)
+        mujoco.mju_rotVecQuat(turned, np.ascontiguousarray(built.R_BC[:, axis]), body.xquat)
+        np.testing.assert_allclose(R_WC[:, axis], turned, atol=1e-9)
