@@ -9,7 +9,7 @@ from hashlib import blake2b
 import numpy as np
 
 #: Every source of randomness there is; a new one is added here so that no two modules share a name by accident.
-STREAM_NAMES = ("start", "gust", "as_built", "gyro", "image", "latency", "inertial_velocity")
+STREAM_NAMES = ("start", "gust", "as_built", "gyro", "image", "inertial_velocity")
 
 
 def _words(name: str) -> tuple[int, int]:
