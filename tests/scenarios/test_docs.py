@@ -1,0 +1,50 @@
+"""What the pages show works as shown."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+
+
+def python_blocks(page):
+    return re.findall(r"```python\n(.*?)```", (ROOT / page).read_text(encoding="utf-8"), re.DOTALL)
+
+
+def run(folder, *arguments):
+    return subprocess.run([sys.executable, *arguments], cwd=folder, capture_output=True, text=True, check=False)
+
+
+@pytest.mark.slow
+@pytest.mark.gl
+def test_the_navigator_of_ones_own_flies_from_the_folder_one_stands_in_and_replays(tmp_path):
+    (tmp_path / "own_command.py").write_text(python_blocks("docs/navigation.md")[0], encoding="utf-8")
+    short = ("--set", "flight.duration_s=1", "--out", "flown")
+    flown = run(tmp_path, "-m", "dockair", "fly", "--set", "navigation.navigator=own_command:OwnCommand", *short)
+    assert flown.returncode == 0, flown.stderr
+    assert flown.stdout.startswith("timeout")
+    replayed = run(tmp_path, "-m", "dockair", "replay", "flown")
+    assert replayed.returncode == 0 and replayed.stdout.startswith("identical"), replayed.stderr
+
+
+@pytest.mark.parametrize("page", ["README.md", "docs/environments.md", "docs/navigation.md", "docs/results.md"])
+def test_code_on_a_page_is_python(page):
+    blocks = python_blocks(page)
+    assert blocks
+    for block in blocks:
+        compile(block, page, "exec")
+
+
+def test_every_relative_link_leads_somewhere():
+    pages = [*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md")]
+    assert len(pages) > 10
+    broken = [
+        f"{page.relative_to(ROOT)}: {target}"
+        for page in pages
+        for target in re.findall(r"\]\((?!https?:|#)([^)#\s]+)", page.read_text(encoding="utf-8"))
+        if not (page.parent / target).exists()
+    ]
+    assert broken == []
