@@ -138,7 +138,8 @@ class Mounting:
     R_BC: Array  #: (3, 3) camera axes in body axes
     p_BC: Array  #: (3,) camera [m]
     p_BP: Array  #: (3,) probe tip [m]
-    R_BI: Array = field(default_factory=lambda: np.eye(3))  #: (3, 3) gyro axes in body axes
+    R_BI: Array = field(default_factory=lambda: np.eye(3))  #: (3, 3) IMU axes in body axes
+    p_BI: Array = field(default_factory=lambda: np.zeros(3))  #: (3,) IMU [m]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -39,7 +39,7 @@ class Window:
 class CameraFrame:
     """One exposure, as read out."""
 
-    time_stamp_s: float  #: middle of the exposure, on the clock that also stamps the gyro
+    time_stamp_s: float  #: middle of the exposure, on the clock that also stamps the IMU
     pixels: NDArray[np.uint8]  #: (rows, columns) of the window
     window: Window  #: which part of the sensor was read
     exposure_s: float
@@ -48,10 +48,12 @@ class CameraFrame:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ImuSample:
-    """One gyro sample."""
+    """One sample of three gyros and three accelerometers."""
 
     time_stamp_s: float
     angular_rate_rad_s: Array  #: (3,) w_WI_I, as measured
+    specific_force_m_s2: Array = field(default_factory=lambda: np.full(3, np.nan))
+    #: (3,) acceleration of I less gravity, I axes, as measured; NaN where no accelerometers are fitted
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

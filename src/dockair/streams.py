@@ -9,7 +9,21 @@ from hashlib import blake2b
 import numpy as np
 
 #: Every source of randomness there is; a new one is added here so that no two modules share a name by accident.
-STREAM_NAMES = ("start", "gust", "as_built", "gyro", "image", "inertial_velocity")
+STREAM_NAMES = (
+    "start",
+    "gust",
+    "as_built",
+    "gyro",
+    "accelerometer",
+    "imu_clock",
+    "image",
+    "fixed_pattern",
+    "frame_transfer",
+    "clouds",
+    "dirt",
+    "faults",
+    "inertial_velocity",
+)
 
 
 def _words(name: str) -> tuple[int, int]:
