@@ -65,6 +65,8 @@ class Navigator:
         if imu:
             self._time_s = imu[-1].time_stamp_s
             self._filter.propagate(imu)
+        else:  # the IMU has dropped out: the last rate is held
+            self._time_s += 1.0 / self._sheets.control_rate_hz
         if frame is not None:
             self._take(frame)
         return self._solution()
@@ -116,7 +118,7 @@ class Navigator:
         return np.asarray(self._sheets.camera.focal_length_px * (time_s - before_s) * np.array([w_C[2], -w_C[1]]))
 
     def _solution(self) -> NavSolution:
-        state = self._filter.state()
+        state = self._filter.state(self._time_s)
         sigma_lateral_m = float(np.sqrt(np.linalg.eigvalsh(state.covariance[4:6, 4:6])[-1]))
         aged_s = self._time_s - self._used_time_s
         valid = sigma_lateral_m <= self._settings.usable_sigma_m and aged_s <= self._settings.usable_age_s

@@ -25,15 +25,18 @@ from dockair.sim.aircraft.flight_control import FlightControlParameters
 from dockair.sim.aircraft.receiver import Receiver
 from dockair.sim.aircraft.trim import level_trim
 from dockair.sim.as_built import AsBuilt, AsBuiltParameters, draw_as_built
-from dockair.sim.camera.camera import CameraParameters, LedParameters, LightParameters, NearInfraredCamera
+from dockair.sim.camera.camera import CameraSeeds, CameraSheets, NearInfraredCamera
+from dockair.sim.camera.sheets import LedParameters
+from dockair.sim.camera.sky import Weather
+from dockair.sim.faults import Faults
 from dockair.sim.hose.chain import DrogueParameters, HoseParameters
 from dockair.sim.hose.coupling import CouplingParameters
 from dockair.sim.hose.reel import ReelParameters
 from dockair.sim.hose.rest import rest_shape
-from dockair.sim.imu import Gyro, GyroParameters
+from dockair.sim.imu import Imu, ImuParameters
 from dockair.sim.outlines import TankerParameters
 from dockair.sim.world import World, WorldParameters, WorldStart
-from dockair.streams import counter_key, random_stream
+from dockair.streams import random_stream
 
 SETTLE_S = 12.0  # hose and gusts run this long before the flight: several periods of the drogue's swing
 SUN_OVERHEAD = np.array([0.0, 0.0, 1.0])  # lights the scene of a scenario without Sun
@@ -48,11 +51,12 @@ class MountingParameters:
     probe_tip_m: Array
     camera_position_m: Array
     camera_yaw_rad: float
+    imu_position_m: Array
 
     def mounting(self) -> Mounting:
         """Return the nominal mounting; the camera's axis lies in the body's x-y plane."""
         R_BC = matrix_from_yaw_pitch_roll(self.camera_yaw_rad, 0.0, 0.0)
-        return Mounting(R_BC=R_BC, p_BC=self.camera_position_m, p_BP=self.probe_tip_m)
+        return Mounting(R_BC=R_BC, p_BC=self.camera_position_m, p_BP=self.probe_tip_m, p_BI=self.imu_position_m)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,10 +74,12 @@ class Parts:
 
     world: World
     camera: NearInfraredCamera | None  #: None where the truth navigates
-    gyro: Gyro
+    imu: Imu
+    faults: Faults
     navigator: Navigates
     recipe: NavigatorRecipe | None  #: how to make that navigator again, for a replay; None for the truth
     sheets: NavigationSheets
+    as_built: AsBuilt
     clock: Clock
     periods: Periods
 
@@ -106,18 +112,13 @@ def build(scenario: Scenario, seed: int) -> Parts:
     world = World(parameters, receiver, _gusts(scenario, seed, clock), start, clock)
     sheets = _navigation_sheets(scenario, parameters)
     _check_ring(sheets.ring, parameters.drogue)
-    leds, as_built = _as_built(scenario, seed, sheets)
-    gyro = Gyro(
-        _sheet(scenario, "gyro", GyroParameters),
-        scenario.rates.gyro_hz,
-        random_stream(seed, "gyro"),
-        as_built.mounting.R_BI,
-    )
+    as_built = _as_built(scenario, seed, sheets)
+    faults = Faults([table.fault for table in scenario.faults], sheets.ring.count)
     if scenario.navigation.is_truth:
         camera, recipe = None, None
         navigator: Navigates = TruthNavigator(sheets, guidance_settings(scenario))
     else:
-        camera = _camera(scenario, seed, leds, as_built, world)
+        camera = _camera(scenario, seed, as_built, faults, world)
         recipe = _recipe(scenario, sheets)
         navigator = recipe.build()
         if isinstance(navigator, TruthNavigator):  # its results would not be marked
@@ -130,7 +131,9 @@ def build(scenario: Scenario, seed: int) -> Parts:
     return Parts(
         world=world,
         camera=camera,
-        gyro=gyro,
+        imu=_imu(scenario, seed, as_built.mounting),
+        faults=faults,
+        as_built=as_built,
         navigator=navigator,
         recipe=recipe,
         sheets=sheets,
@@ -216,33 +219,63 @@ def _attitude_along(x_W: Array) -> Array:
     return matrix_from_yaw_pitch_roll(float(yaw), float(pitch), 0.0)
 
 
+def _imu_parameters(scenario: Scenario) -> ImuParameters:
+    return _sheet(scenario, f"imu_{scenario.hardware.imu}", ImuParameters)
+
+
 def _gyro_sheet(scenario: Scenario) -> GyroSheet:
-    gyro = _sheet(scenario, "gyro", GyroParameters)
+    imu = _imu_parameters(scenario)
     return GyroSheet(
         rate_hz=scenario.rates.gyro_hz,
-        noise_density_rad_s_rthz=gyro.noise_density_rad_s_rthz,
-        bias_sigma_rad_s=gyro.turn_on_bias_sigma_rad_s,
+        noise_density_rad_s_rthz=imu.gyro_noise_density_rad_s_rthz,
+        bias_sigma_rad_s=imu.gyro_turn_on_bias_sigma_rad_s,
     )
 
 
-def _as_built(scenario: Scenario, seed: int, sheets: NavigationSheets) -> tuple[LedParameters, AsBuilt]:
+def _imu(scenario: Scenario, seed: int, mounting: Mounting) -> Imu:
+    return Imu(
+        _imu_parameters(scenario),
+        scenario.rates.gyro_hz,
+        random_stream(seed, "gyro"),
+        random_stream(seed, "accelerometer"),
+        random_stream(seed, "imu_clock"),
+        mounting.R_BI,
+        mounting.p_BI,
+    )
+
+
+def _as_built(scenario: Scenario, seed: int, sheets: NavigationSheets) -> AsBuilt:
     """Draw the hardware as it was built."""
     leds = _sheet(scenario, "leds", LedParameters)
     parameters = _sheet(scenario, "as_built", AsBuiltParameters)
     rng = random_stream(seed, "as_built")
-    return leds, draw_as_built(sheets.camera, sheets.ring, sheets.mounting, parameters, leds, rng)
+    return draw_as_built(sheets.camera, sheets.ring, sheets.mounting, parameters, leds, rng)
 
 
-def _camera(scenario: Scenario, seed: int, leds: LedParameters, as_built: AsBuilt, world: World) -> NearInfraredCamera:
+def _camera(scenario: Scenario, seed: int, as_built: AsBuilt, faults: Faults, world: World) -> NearInfraredCamera:
+    table, weather = scenario.camera, scenario.weather
     return NearInfraredCamera(
-        _sheet(scenario, "camera", CameraParameters),
-        leds,
-        _sheet(scenario, "light", LightParameters),
+        camera_sheets(scenario),
         as_built,
-        counter_key(seed, "image"),
+        CameraSeeds.of(seed),
         world.model,
-        scenario.sun.direction_W,
+        sun_direction_W=scenario.sun_W,
+        weather=Weather(
+            cloud_cover=weather.cloud_cover,
+            cloud_optical_depth=weather.cloud_optical_depth,
+            visibility_m=weather.visibility_m,
+            night=weather.night,
+        ),
+        altitude_m=scenario.flight.altitude_m,
+        faults=faults,
+        automatic_exposure=table.exposure == "auto",
+        background=table.background,
     )
+
+
+def camera_sheets(scenario: Scenario) -> CameraSheets:
+    """Return the camera's sheets with the scenario's own values."""
+    return CameraSheets.load(scenario.camera.filter, scenario.parameters)
 
 
 def _recipe(scenario: Scenario, sheets: NavigationSheets) -> NavigatorRecipe:

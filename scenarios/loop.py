@@ -46,7 +46,8 @@ class Flight:
     def __init__(self, scenario: Scenario, seed: int, *, full_frames: bool = False) -> None:
         parts = build(scenario, seed)
         self.scenario, self.clock, self.sheets = scenario, parts.clock, parts.sheets
-        self.world, self.camera, self.gyro, self.navigator = parts.world, parts.camera, parts.gyro, parts.navigator
+        self.world, self.camera, self.imu, self.navigator = parts.world, parts.camera, parts.imu, parts.navigator
+        self._faults = parts.faults
         self.referee = Referee()
         self._full_frames = full_frames
         self._periods = parts.periods
@@ -73,7 +74,7 @@ class Flight:
             truth = self.world.step(self._command)
             self.referee.watch(truth)
             if truth.tick % self._periods.gyro == 0:
-                imu.append(self.gyro.step(truth.time_s, truth.w_WB_B))
+                imu += self._sampled(truth)
             if self.camera is not None and truth.tick % self._periods.camera == 0:
                 self._expose(self.camera, truth.time_s)
         frame = self._delivered(truth.time_s)
@@ -90,14 +91,21 @@ class Flight:
         if self.camera is not None:
             self.camera.close()
 
+    def _sampled(self, truth: Truth) -> list[ImuSample]:
+        """Return the IMU's sample, or nothing when it has dropped out."""
+        fault = self._faults.imu(truth.time_s) if self._faults.any else None
+        sample = self.imu.step(truth.time_s, truth.w_WB_B, truth.alpha_WB_B, truth.specific_force_B, fault)
+        return [] if sample is None else [sample]
+
     def _expose(self, camera: NearInfraredCamera, time_s: float) -> None:
         window = None if self._full_frames else self._window
         frame = camera.expose(self.world.data, time_s, self._frame_number, window)
         self._frame_number += 1
-        self._in_transfer.append((time_s + camera.latency_s(frame), frame))
+        if frame is not None:
+            self._in_transfer.append((time_s + camera.latency_s(frame), frame))
 
     def _delivered(self, time_s: float) -> CameraFrame | None:
-        """Return the oldest frame whose transfer is over, if there is one."""
+        """Return the oldest frame if its transfer is over: jitter of the transfer delays the frames behind it too."""
         if self._in_transfer and self._in_transfer[0][0] <= time_s:
             return self._in_transfer.popleft()[1]
         return None

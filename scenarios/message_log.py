@@ -2,7 +2,7 @@
 
 | file               | one row a control tick                                                             |
 |--------------------|------------------------------------------------------------------------------------|
-| messages.parquet   | gyro samples and, if one arrived, the frame: lossless PNG, window, stamp, exposure, gain |
+| messages.parquet   | IMU samples and, if one arrived, the frame: lossless PNG, window, stamp, exposure, gain |
 | estimates.parquet  | every field of `NavSolution`; all numbers as 64-bit floats                         |
 | navigator.json     | the navigator's class, its calibration sheets and settings, floats to the last bit,      |
 |                    | and a digest of the navigation's sources                                                 |
@@ -48,6 +48,7 @@ _MESSAGE_SCHEMA = pa.schema(
     [
         ("gyro_time_stamp_s", _FLOATS),
         ("gyro_angular_rate_rad_s", _FLOATS),
+        ("accelerometer_specific_force_m_s2", _FLOATS),
         ("frame_time_stamp_s", pa.float64()),
         *[(name, pa.int32()) for name in _WINDOW_COLUMNS],
         ("exposure_s", pa.float64()),
@@ -216,7 +217,8 @@ class MessageLog:
 
 
 def _compressed() -> list[str]:
-    leaves = ["gyro_time_stamp_s.list.element", "gyro_angular_rate_rad_s.list.element"]
+    imu = ("gyro_time_stamp_s", "gyro_angular_rate_rad_s", "accelerometer_specific_force_m_s2")
+    leaves = [f"{name}.list.element" for name in imu]
     return leaves + [f.name for f in _MESSAGE_SCHEMA if f.type != _FLOATS and f.name != "png"]
 
 
@@ -224,6 +226,7 @@ def _message_row(imu: tuple[ImuSample, ...], frame: CameraFrame | None) -> dict[
     row: dict[str, Any] = {
         "gyro_time_stamp_s": [sample.time_stamp_s for sample in imu],
         "gyro_angular_rate_rad_s": [float(rate) for sample in imu for rate in sample.angular_rate_rad_s],
+        "accelerometer_specific_force_m_s2": [float(f) for sample in imu for f in sample.specific_force_m_s2],
     }
     if frame is not None:
         row |= {name: getattr(frame.window, name) for name in _WINDOW_COLUMNS}
@@ -257,8 +260,11 @@ def read_messages(out_dir: str | Path, *, pixels: bool = True) -> Iterator[TickM
 
 def _tick_from_row(row: dict[str, Any], pixels: bool) -> TickMessages:
     rates = np.array(row["gyro_angular_rate_rad_s"], dtype=np.float64).reshape(-1, 3)
-    stamps = row["gyro_time_stamp_s"]
-    imu = tuple(ImuSample(time_stamp_s=t, angular_rate_rad_s=rate) for t, rate in zip(stamps, rates, strict=True))
+    forces = np.array(row["accelerometer_specific_force_m_s2"], dtype=np.float64).reshape(-1, 3)
+    imu = tuple(
+        ImuSample(time_stamp_s=t, angular_rate_rad_s=rate, specific_force_m_s2=force)
+        for t, rate, force in zip(row["gyro_time_stamp_s"], rates, forces, strict=True)
+    )
     png = row["png"]
     if png is None:
         return TickMessages(imu=imu, frame=None, png=None)

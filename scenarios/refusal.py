@@ -53,19 +53,26 @@ def _dotted(location: Sequence[int | str]) -> str:
 
 def _model_at(model: type[BaseModel], location: Sequence[int | str]) -> type[BaseModel]:
     for part in location:
-        annotation = model.model_fields[str(part)].annotation
-        assert isinstance(annotation, type) and issubclass(annotation, BaseModel)
-        model = annotation
+        if isinstance(part, str):
+            inner = _inner_model(model.model_fields[part])
+            assert inner is not None
+            model = inner
     return model
+
+
+def _inner_model(field: FieldInfo) -> type[BaseModel] | None:
+    """Return the model of a table, or of the elements of an array of tables; None for any other field."""
+    annotation = field.annotation
+    if get_origin(annotation) is tuple:
+        annotation = get_args(annotation)[0]
+    return annotation if isinstance(annotation, type) and issubclass(annotation, BaseModel) else None
 
 
 def _field_at(model: type[BaseModel], location: Sequence[int | str]) -> FieldInfo:
     """Return the field of the location; of an element (or of what lies deeper) the field that holds it."""
-    field = model.model_fields[str(location[0])]
-    inner = field.annotation
-    if len(location) > 1 and isinstance(inner, type) and issubclass(inner, BaseModel):
-        return _field_at(inner, location[1:])
-    return field
+    field, inner = model.model_fields[str(location[0])], _inner_model(model.model_fields[str(location[0])])
+    rest = [part for part in location[1:] if isinstance(part, str)]
+    return _field_at(inner, rest) if inner is not None and rest else field
 
 
 def _alternatives(annotation: Any) -> list[Any]:

@@ -16,6 +16,7 @@ from dockair.clock import Clock
 from dockair.errors import DockairError
 from dockair.parameters import load_parameters, read_sheet
 from dockair.rotations import Array
+from dockair.scenarios.fault_tables import FaultTable
 from dockair.scenarios.refusal import Expected, refusal
 from dockair.scenarios.scenario_file import ScenarioFile
 
@@ -162,9 +163,27 @@ class Guidance(_Table):
     stabilise_s: float = Field(default=3.0, ge=0.0, le=60.0)  #: steady in pre-contact before closing
 
 
-class Hardware(_Table):
-    """Calibration sheets of one's own, as paths from the scenario's file; without them the project's."""
+class Weather(_Table):
+    """What lies between and behind: clouds, haze, night."""
 
+    cloud_cover: float = Field(default=0.0, ge=0.0, le=1.0)  #: part of the sky under the layer of broken cloud
+    cloud_optical_depth: float = Field(default=12.0, gt=0.0, le=100.0)  #: mean, where there is cloud
+    visibility_m: float = Field(default=100e3, ge=50.0, le=300e3)  #: meteorological optical range
+    night: bool = False  #: no Sun, no daylight
+
+
+class CameraOptions(_Table):
+    """How the camera is run and simulated."""
+
+    filter: Literal["long_pass", "band_pass"] = "long_pass"
+    exposure: Literal["auto", "fixed"] = "auto"  #: "fixed": sheet `exposure`, exposure_s
+    background: Literal["auto", "mujoco", "analytic"] = "auto"  #: "auto": MuJoCo where the machine has OpenGL
+
+
+class Hardware(_Table):
+    """Grade of the IMU; calibration sheets of one's own, as paths from the scenario's file, else the project's."""
+
+    imu: Literal["tactical", "mti", "consumer"] = "mti"
     camera: str | None = None
     ring: str | None = None
 
@@ -217,10 +236,15 @@ class Scenario(_Table):
     rates: Rates = Rates()
     turbulence: Turbulence = Turbulence()
     sun: Sun = Sun()
+    weather: Weather = Weather()
+    camera: CameraOptions = CameraOptions()
     start: Start = Start()
     navigation: Navigation = Navigation()
     guidance: Guidance = Guidance()
     hardware: Hardware = Hardware()
+    faults: Annotated[
+        tuple[FaultTable, ...], BeforeValidator(_tuple_from_list), Expected("tables [[faults]], each with a kind")
+    ] = ()  #: what breaks, and when
     parameters: dict[str, dict[str, Any]] = {}  #: sheet -> key -> value instead of the sheet's
     accept: Accept = Accept()
 
@@ -228,7 +252,20 @@ class Scenario(_Table):
     def _parameters_fit(self) -> Self:
         for sheet, overrides in self.parameters.items():
             load_parameters(sheet, make_dataclass(sheet, sorted(read_sheet(sheet))), overrides)  # checks only
+            if sheet.startswith(("imu_", "filter_")) and sheet not in self.chosen_sheets:
+                expected = f"a sheet that this scenario uses ({', '.join(self.chosen_sheets)})"
+                raise DockairError(f"parameters.{sheet}", expected=expected, got=sheet)
         return self
+
+    @property
+    def chosen_sheets(self) -> tuple[str, str]:
+        """Sheets that are chosen by name: of the IMU and of the filter."""
+        return f"imu_{self.hardware.imu}", f"filter_{self.camera.filter}"
+
+    @property
+    def sun_W(self) -> Array | None:
+        """(3,) unit vector toward the Sun in W, None without Sun or at night."""
+        return None if self.weather.night else self.sun.direction_W
 
 
 def load_scenario(name_or_path: str | Path, overrides: Mapping[str, object] | None = None) -> Scenario:

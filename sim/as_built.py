@@ -1,21 +1,27 @@
 """What the hardware is, beside what its sheet says: drawn once a flight, known to the simulator alone.
 
-    R_BC = exp(a) R_BC,nominal,   a ~ N(0, sigma_a^2 I) about body axes; the gyro's R_BI likewise                (1)
+    R_BC = exp(a) R_BC,nominal,   a ~ N(0, sigma_a^2 I) about body axes; the IMU's R_BI likewise                 (1)
     f = f_nominal (1 + N(0, sigma_f^2)),   c = c_nominal + N(0, sigma_c^2)                                       (2)
     p_DL = (1 + dD/D) p_DL,nominal + N(0, sigma_L^2 I),   dD ~ N(0, sigma_D^2)                                   (3)
     I_0 = I_nominal x U(2/(1 + q), 2 q/(1 + q))      brightness bin of ratio q, mean 1                           (4)
+    (k1, k2, p1, p2) = nominal + N(0, (sigma_k1, sigma_k2, sigma_p, sigma_p)^2),   k3 as the sheet's             (5)
 
-The probe's tip stays where its sheet says: only the camera's place relative to it matters, and that is drawn.
-The pixel pitch is lithography: exact. Lens distortion is as the sheet's.
+The probe's tip and the IMU's place are where their sheets say: only the camera's place relative to the tip matters, and
+that is drawn. The pixel pitch is lithography: exact.
+Not modelled: errors of one calibration are correlated (k1 with k2 and f, p1 and p2 with c), so that its worst errors
+lie outside the calibrated field; here each is drawn by itself, and the corner gets the whole of all.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from dockair.calibration import Camera, LedRing, Mounting
-from dockair.rotations import Array, exp
-from dockair.sim.camera.radiometry import LedParameters
+from dockair.rotations import Array, exp, log
+from dockair.sim.camera.radiometry import led_intensity_w_sr
+from dockair.sim.camera.sheets import LedParameters
+
+Record = dict[str, float | list[float]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,6 +34,9 @@ class AsBuiltParameters:
     principal_point_sigma_px: float
     led_position_sigma_m: float  #: each axis
     ring_diameter_sigma_m: float
+    distortion_k1_sigma: float
+    distortion_k2_sigma: float
+    distortion_p_sigma: float  #: p1 and p2, each
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -38,6 +47,11 @@ class AsBuilt:
     ring_positions_D: Array  #: (n, 3) LEDs in drogue axes [m]
     led_intensity_w_sr: Array  #: (n,) on each LED's axis
     mounting: Mounting
+    differences: Record = field(default_factory=dict)  #: from the nominal sheets; empty if there are none
+
+    def record(self) -> Record:
+        """What was drawn, for a flight's log: as built minus nominal, units in the keys, axes as in the sheets."""
+        return dict(self.differences)
 
 
 def draw_as_built(
@@ -48,33 +62,68 @@ def draw_as_built(
     leds: LedParameters,
     rng: np.random.Generator,
 ) -> AsBuilt:
-    """Draw one piece of hardware around its nominal sheets, Eqs. (1) to (4).
+    """Draw one piece of hardware around its nominal sheets, Eqs. (1) to (5).
 
     The same numbers are drawn whatever the standard deviations are: setting one to zero leaves the others' draws.
     """
-    camera_angle, gyro_angle, camera_shift = rng.standard_normal((3, 3))
-    focal, *centre = rng.standard_normal(3)
+    camera_angle, imu_angle, camera_shift = rng.standard_normal((3, 3))
+    lens = rng.standard_normal(3)
     diameter = parameters.ring_diameter_sigma_m * rng.standard_normal()
     led_shift = parameters.led_position_sigma_m * rng.standard_normal((ring.count, 3))
     brightness = rng.uniform(size=ring.count)
+    distortion = rng.standard_normal(4)  # last: what was there before it keeps its draws
 
-    c_u, c_v = np.array(camera.principal_point_px) + parameters.principal_point_sigma_px * np.array(centre)
     low, high = 2.0 / (1.0 + leds.bin_ratio), 2.0 * leds.bin_ratio / (1.0 + leds.bin_ratio)
-    return AsBuilt(
-        camera=replace(
-            camera,
-            focal_length_m=camera.focal_length_m * (1.0 + parameters.focal_length_sigma * float(focal)),
-            principal_point_px=(float(c_u), float(c_v)),
-        ),
+    built = AsBuilt(
+        camera=_camera(camera, parameters, lens, distortion),
         ring_positions_D=_frozen(ring.positions_D * (1.0 + diameter / ring.diameter_m) + led_shift),
-        led_intensity_w_sr=_frozen(leds.intensity_w_sr * (low + (high - low) * brightness)),
-        mounting=Mounting(
+        led_intensity_w_sr=_frozen(led_intensity_w_sr(leds) * (low + (high - low) * brightness)),
+        mounting=replace(
+            mounting,
             R_BC=_frozen(exp(parameters.mounting_angle_sigma_rad * camera_angle) @ mounting.R_BC),
             p_BC=_frozen(mounting.p_BC + parameters.mounting_position_sigma_m * camera_shift),
-            p_BP=mounting.p_BP,
-            R_BI=_frozen(exp(parameters.mounting_angle_sigma_rad * gyro_angle) @ mounting.R_BI),
+            R_BI=_frozen(exp(parameters.mounting_angle_sigma_rad * imu_angle) @ mounting.R_BI),
         ),
     )
+    return replace(built, differences=_differences(built, camera, ring, mounting, led_intensity_w_sr(leds)))
+
+
+def _camera(nominal: Camera, parameters: AsBuiltParameters, lens: Array, distortion: Array) -> Camera:
+    """Eqs. (2) and (5), from standard normal draws."""
+    c_u, c_v = np.array(nominal.principal_point_px) + parameters.principal_point_sigma_px * lens[1:]
+    sigma_k1, sigma_k2, sigma_p = (
+        parameters.distortion_k1_sigma,
+        parameters.distortion_k2_sigma,
+        parameters.distortion_p_sigma,
+    )
+    error = np.array([sigma_k1, sigma_k2, sigma_p, sigma_p]) * distortion
+    k1, k2, p1, p2, k3 = (float(k) for k in np.append(error, 0.0) + _coefficients(nominal))
+    return replace(
+        nominal,
+        focal_length_m=nominal.focal_length_m * (1.0 + parameters.focal_length_sigma * float(lens[0])),
+        principal_point_px=(float(c_u), float(c_v)),
+        distortion=(k1, k2, p1, p2, k3) if error.any() else nominal.distortion,
+    )
+
+
+def _differences(built: AsBuilt, camera: Camera, ring: LedRing, mounting: Mounting, intensity_w_sr: float) -> Record:
+    differences = {
+        "camera_turn_B_rad": log(built.mounting.R_BC @ mounting.R_BC.T),
+        "camera_shift_B_m": built.mounting.p_BC - mounting.p_BC,
+        "imu_turn_B_rad": log(built.mounting.R_BI @ mounting.R_BI.T),
+        "focal_length_m": built.camera.focal_length_m - camera.focal_length_m,
+        "principal_point_px": np.subtract(built.camera.principal_point_px, camera.principal_point_px),
+        "distortion_k1_k2_p1_p2_k3": _coefficients(built.camera) - _coefficients(camera),
+        "led_shift_x_D_m": (built.ring_positions_D - ring.positions_D)[:, 0],
+        "led_shift_y_D_m": (built.ring_positions_D - ring.positions_D)[:, 1],
+        "led_shift_z_D_m": (built.ring_positions_D - ring.positions_D)[:, 2],
+        "led_intensity_w_sr": built.led_intensity_w_sr - intensity_w_sr,
+    }
+    return {key: np.asarray(value, dtype=float).tolist() for key, value in differences.items()}
+
+
+def _coefficients(camera: Camera) -> Array:
+    return np.array(camera.distortion if camera.distortion is not None else (0.0,) * 5)
 
 
 def _frozen(array: Array) -> Array:

@@ -15,7 +15,9 @@ class Truth:
     p_WB: Array  #: (3,) receiver centre of gravity [m]
     v_WB: Array  #: (3,) its velocity in W [m/s] (relative to the tanker's trim motion)
     w_WB_B: Array  #: (3,) receiver angular velocity in B [rad/s]
-    a_WB: Array  #: (3,) acceleration of the centre of gravity in W [m/s^2], gravity's part included
+    alpha_WB_B: Array  #: (3,) receiver angular acceleration in B [rad/s^2], over the tick that has just ended
+    a_WB: Array  #: (3,) acceleration of the centre of gravity in W [m/s^2], gravity's part included; likewise
+    specific_force_B: Array  #: (3,) the same less gravity, in B [m/s^2]: what an accelerometer there feels
     p_WP: Array  #: (3,) probe tip [m]
     v_WP: Array  #: (3,) its velocity [m/s]
     R_WD: Array  #: (3, 3) drogue attitude

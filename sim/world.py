@@ -65,6 +65,7 @@ class _Reactions:
     drogue_tension_n: float
     coupling_force_n: float
     a_WB: Array
+    alpha_WB_B: Array
 
 
 class World:
@@ -99,12 +100,12 @@ class World:
         self.rest = rest = self._tow.rest
         self.data.qpos[self._at.hinges] = hinge_angles(np.vstack([rest.t_W, rest.t_D_W])).ravel()
         self._put_receiver(np.array(_WAITING_PLACE_M))
-        self._reactions = _Reactions(rest.root_tension_n, rest.drogue_tension_n, 0.0, np.zeros(3))
+        self._reactions = _Reactions(rest.root_tension_n, rest.drogue_tension_n, 0.0, np.zeros(3), np.zeros(3))
         self._observe(0)
         p_WD_mean = self._settle(round(start.settle_s / clock.step_s))
         R_WB = np.asarray(receiver.trim_R_WB)
         self._put_receiver(p_WD_mean - R_WB @ (start.p_PD_B + p.mounting.p_BP))
-        self._reactions.a_WB = np.zeros(3)
+        self._reactions.a_WB, self._reactions.alpha_WB_B = np.zeros(3), np.zeros(3)
         self._observe(0)
 
     def step(self, command: ReceiverCommand) -> Truth:
@@ -202,6 +203,7 @@ class World:
             drogue_tension_n=_norm(data.cfrc_int[at.drogue, 3:]),
             coupling_force_n=pull,
             a_WB=data.qacc[at.receiver_dof][:3].copy(),
+            alpha_WB_B=data.qacc[at.receiver_dof][3:].copy(),
         )
 
     def _decide_coupling(self) -> None:
@@ -230,7 +232,9 @@ class World:
             p_WB=p_WB,
             v_WB=qvel[:3].copy(),
             w_WB_B=qvel[3:].copy(),
+            alpha_WB_B=solved.alpha_WB_B,
             a_WB=solved.a_WB,
+            specific_force_B=self._specific_force_B,
             p_WP=p_WB + p_BP_W,
             v_WP=qvel[:3] + cross(R_WB @ qvel[3:], p_BP_W),
             R_WD=R_WD,

@@ -1,106 +1,124 @@
-"""Where light falls on the pixels: the point spread function, integrated over each pixel and splatted.
+"""Where light falls on the pixels: the lens's point spread function at any depth, splatted.
 
-Diffraction by a round aperture is taken as three Gaussians, with scale q = wavelength x f-number:
-
-    PSF(r) = Sum_k w_k N(r; s_k),   s_k^2 = (a_k q)^2 + d^2 + b^2/16 + c^2/12                                    (1)
-    b = (f^2/N) |1/x - 1/x_focus|       diameter of the defocused disc                                           (2)
-    c = f x die / x                     side of the die's image
-
-d is the spread of charge in the silicon; each blur but diffraction's enters through its variance alone.
-A pixel takes the difference of two error functions in each direction and for each k.
-
-The mixture's encircled energy is within 2.0 % of the Airy pattern's at every radius (fit out to 8 q); the brightest
-pixel of a blob is within 2 % (f/8, in focus). Its far wings are Gaussian beyond 15 q where the true ones fall as r^-3:
-where an LED is more than 100 times over full well, its blob is too small by a fraction of a pixel.
-Not modelled: aberrations, spikes of the iris, motion smear.
-Source: Born & Wolf, Principles of Optics, section 8.5.2 (Airy pattern); variance of a uniform disc b^2/16 an axis.
+The blur of a point depends on its depth x through 1/x alone, in which the defocused disc and the die's image are
+linear. Cores [point_spread] are made when they are first needed, at steps of 1/x over which either grows by half a
+pixel, and interpolated by a parabola.
 """
 
-import math
+from dataclasses import replace
+from typing import Final
 
 import numpy as np
-from numba import njit
+from numpy.typing import NDArray
 
 from dockair.calibration import Camera
 from dockair.rotations import Array
-from dockair.sim.camera.radiometry import CameraParameters
+from dockair.sim.camera.point_spread import Spread, airy_px, blur_px, core, transfer
+from dockair.sim.camera.sheets import LensParameters, SensorParameters
+from dockair.sim.camera.splat import splat
 
-#: Gaussian mixture of the Airy pattern: least squares of the encircled energy 1 - J0^2(pi x) - J1^2(pi x), x = r/q.
-AIRY_WEIGHTS: Array = np.array([0.8184, 0.1287, 0.0529])
-AIRY_SIGMAS: Array = np.array([0.3898, 1.5343, 6.4933])
-_REACH_SIGMAS = 5.0  # of the widest part; 6e-7 of its energy lies beyond
-
-
-def psf_sigmas_px(parameters: CameraParameters, camera: Camera, wavelength_m: float, x: Array, size_m: float) -> Array:
-    """(n, 3) standard deviations [px] of the mixture's parts for sources at depths x (n,) [m], Eqs. (1) and (2).
-
-    Args:
-        parameters: f-number, focus, diffusion.
-        camera: focal length and pixel.
-        wavelength_m: of the light.
-        x: depth of each source along the lens's axis; infinity for the Sun.
-        size_m: side of the source, 0 for a point.
-    """
-    f, p = camera.focal_length_m, camera.pixel_pitch_m
-    inverse = 1.0 / np.asarray(x, dtype=float)
-    defocus = f**2 / parameters.f_number * np.abs(inverse - 1.0 / parameters.focus_distance_m) / p
-    die = f * size_m * inverse / p
-    blur = parameters.diffusion_px**2 + defocus**2 / 16.0 + die**2 / 12.0
-    diffraction = AIRY_SIGMAS * wavelength_m * parameters.f_number / p
-    return np.asarray(np.sqrt(diffraction**2 + blur[:, None]))
+NEAREST_M: Final = 0.5  #: nearer points are as blurred as at this depth
+_STEP_PX = 0.5  # growth of the disc or of the die's image between two tabulated depths ...
+_STEP_RINGS = 1.2  # ... but no more than this many q: a disc's middle brightens and darkens again within 8 q
+_SIZES = 8  # of sources whose cores are kept
+_EDGE_NODES = 4096
 
 
-@njit(cache=True)
-def splat(
-    image: Array,
-    row_start: int,
-    column_start: int,
-    pixels: Array,
-    electrons: Array,
-    sigmas: Array,
-    weights: Array,
-    reach_sigmas: float,
-) -> None:
-    """Add blobs to an image in place.
+class PointSpread:
+    """The point spread function of one lens and sensor at one wavelength. It remembers tables, never results."""
 
-    Args:
-        image: (rows, columns) expected electrons of the window.
-        row_start: first row of the window on the sensor.
-        column_start: its first column.
-        pixels: (n, 2) true positions (u, v) on the sensor.
-        electrons: (n,) of each whole blob.
-        sigmas: (n, k) of the parts of the mixture [px].
-        weights: (k,) of the parts.
-        reach_sigmas: half-width of the splat in units of each part's sigma.
-    """
-    rows, columns = image.shape
-    for i in range(pixels.shape[0]):
-        u, v = pixels[i, 0] - column_start, pixels[i, 1] - row_start
-        for k in range(weights.shape[0]):
-            scale = 1.0 / (sigmas[i, k] * math.sqrt(2.0))
-            reach = math.ceil(reach_sigmas * sigmas[i, k]) + 1
-            r0, r1 = max(0, math.floor(v - reach)), min(rows, math.ceil(v + reach) + 1)
-            c0, c1 = max(0, math.floor(u - reach)), min(columns, math.ceil(u + reach) + 1)
-            if r0 >= r1 or c0 >= c1:
-                continue
-            across = np.empty(c1 - c0)
-            for c in range(c0, c1):
-                across[c - c0] = 0.5 * (math.erf((c + 0.5 - u) * scale) - math.erf((c - 0.5 - u) * scale))
-            for r in range(r0, r1):
-                down = 0.5 * (math.erf((r + 0.5 - v) * scale) - math.erf((r - 0.5 - v) * scale))
-                amount = electrons[i] * weights[k] * down
-                for c in range(c0, c1):
-                    image[r, c] += amount * across[c - c0]
+    def __init__(self, lens: LensParameters, sensor: SensorParameters, camera: Camera, wavelength_m: float) -> None:
+        """Prepare; cores are made when first needed, 4 ms each at f/8.
+
+        Args:
+            lens: f-number and focus.
+            sensor: diffusion.
+            camera: focal length and pixel pitch.
+            wavelength_m: of the light.
+        """
+        self._lens, self._camera = lens, camera
+        self._sharp = Spread(airy=airy_px(lens, camera, wavelength_m), diffusion=sensor.diffusion_px, blur=0.0, die=0.0)
+        self._cores: dict[float, _Cores] = {}
+
+    def splat(
+        self,
+        image: NDArray[np.float32],
+        start: tuple[int, int],
+        pixels: Array,
+        electrons: Array,
+        depth_m: Array,
+        size_m: float,
+        smear_px: Array,
+    ) -> None:
+        """Add point sources to expected electrons, in place.
+
+        Args:
+            image: (rows, columns) of the window.
+            start: (row, column) of the window's first pixel.
+            pixels: (n, 2) true (u, v) at the middle of the exposure; outside is allowed, NaN adds nothing.
+            electrons: (n,) of each whole blob.
+            depth_m: (n,) along the lens's axis; infinity for the Sun's.
+            size_m: side of the sources, 0 for points.
+            smear_px: (n, 2) way (du, dv) during the exposure.
+        """
+        cores = self._cores.get(size_m)
+        if cores is None:
+            if len(self._cores) == _SIZES:
+                del self._cores[next(iter(self._cores))]
+            cores = self._cores[size_m] = _Cores(self._lens, self._camera, self._sharp, size_m)
+        levels = cores.levels(depth_m)
+        splat(image, start, pixels, electrons, smear_px, levels, cores.tables, self._sharp.wing)
+
+    def edge_sigma_px(self) -> float:
+        """Gaussian equivalent [px] of the blur of the Sun's edge: the same slope in the middle of a straight edge.
+
+        The slope is the line spread at 0, the integral of the spectrum along one axis; the pixel's box is in it.
+        """
+        blur = abs(float(blur_px(self._lens, self._camera, np.zeros(1))[0]))
+        f = (np.arange(_EDGE_NODES) + 0.5) / (_EDGE_NODES * self._sharp.airy)
+        line = transfer(f, self._sharp.airy, blur) * np.exp(-2.0 * (np.pi * self._sharp.diffusion * f) ** 2)
+        slope = 2.0 * float((line * np.sinc(f)).sum()) * (f[1] - f[0])
+        return 1.0 / (np.sqrt(2.0 * np.pi) * slope)
 
 
-def add_blobs(image: Array, start: tuple[int, int], pixels: Array, electrons: Array, sigmas_px: Array) -> None:
-    """Add point sources to expected electrons, in place.
+class _Cores:
+    """Cores of one size of source, at whole levels of 1/x."""
 
-    Args:
-        image: (rows, columns) of the window.
-        start: (row, column) of the window's first pixel.
-        pixels: (n, 2) true (u, v); any that lie far outside add nothing.
-        electrons: (n,) of each whole blob.
-        sigmas_px: (n, 3) of `psf_sigmas_px`.
-    """
-    splat(image, start[0], start[1], pixels, electrons, sigmas_px, AIRY_WEIGHTS, _REACH_SIGMAS)
+    def __init__(self, lens: LensParameters, camera: Camera, sharp: Spread, size_m: float) -> None:
+        ends = np.array([0.0, 1.0 / NEAREST_M])
+        growth = max(float(np.ptp(blur_px(lens, camera, ends))), camera.focal_length_px * size_m / NEAREST_M)
+        step = min(_STEP_PX, _STEP_RINGS * sharp.airy)
+        inverse_depth = np.linspace(*ends, max(int(np.ceil(growth / step)), 2) + 1)
+        self._levels_m = 1.0 / inverse_depth[1]
+        self._sharp = sharp
+        self._blurs, self._dies = blur_px(lens, camera, inverse_depth), camera.focal_length_px * size_m * inverse_depth
+        self._made = np.zeros(len(inverse_depth), dtype=np.bool_)
+        self._begins = np.zeros(len(inverse_depth), dtype=np.int64)
+        spreads = [self._spread(k) for k in range(len(inverse_depth))]
+        self._half_widths, self._phases = (np.array(a) for a in zip(*((s.half_width, s.phases) for s in spreads)))
+        self._pool = np.zeros(0, dtype=np.float32)
+
+    @property
+    def tables(self) -> tuple[NDArray[np.float32], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+        """What `splat` reads."""
+        return self._pool, self._begins, self._half_widths, self._phases
+
+    def levels(self, depth_m: Array) -> Array:
+        """(n,) depths in steps of the tables; makes the cores around them."""
+        levels = np.nan_to_num(self._levels_m / np.maximum(depth_m, NEAREST_M))
+        middle = np.clip((levels + 0.5).astype(np.int64), 1, len(self._made) - 2)
+        for offset in (-1, 0, 1):
+            if not self._made[middle + offset].all():
+                for k in np.unique(middle + offset):
+                    self._make(int(k))
+        return levels
+
+    def _make(self, k: int) -> None:
+        if self._made[k]:
+            return
+        self._begins[k] = len(self._pool)
+        self._pool = np.concatenate([self._pool, core(self._spread(k)).ravel()])
+        self._made[k] = True
+
+    def _spread(self, k: int) -> Spread:
+        return replace(self._sharp, blur=abs(float(self._blurs[k])), die=float(self._dies[k]))

@@ -2,7 +2,10 @@
 
 from dataclasses import dataclass
 
+from dockair.errors import DockairError
 from dockair.rotations import Array
+
+OUTPUTS_OF_BITS = {10: (2, 4, 8, 16), 12: (2, 4)}  #: CMV2000: the LVDS outputs that can read so many bits a pixel
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,14 +57,43 @@ class SensorParameters:
     transfer_s: float
     transfer_jitter_s: float
 
+    def __post_init__(self) -> None:
+        """Refuse what the sensor cannot do, however the values came together."""
+        allowed = OUTPUTS_OF_BITS.get(self.converter_bits)
+        if allowed is None:
+            exist = [str(bits) for bits in OUTPUTS_OF_BITS]
+            raise DockairError("sensor.converter_bits", expected="a converter's depth", got=self.converter_bits, exists=exist)
+        if self.outputs not in allowed:
+            expected = f"a number of outputs that reads {self.converter_bits} bits"
+            raise DockairError("sensor.outputs", expected=expected, got=self.outputs, exists=[str(n) for n in allowed])
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ExposureParameters:
     """Sheet `exposure`."""
 
-    exposure_s: float
+    automatic: bool
+    exposure_s: float  #: the first one; every one, if not automatic
     shortest_s: float
     longest_s: float
+    metered_pixel: int
+    target_level: float
+    clipped_level: float
+    clipped_factor: float
+    longest_step: float
+    dead_band: float
+
+    def __post_init__(self) -> None:
+        """Refuse limits that exclude each other or the exposure."""
+        if not self.shortest_s < self.longest_s:
+            expected = f"less than exposure.longest_s = {self.longest_s} s"
+            raise DockairError("exposure.shortest_s", expected=expected, got=self.shortest_s)
+        if not self.shortest_s <= self.exposure_s <= self.longest_s:
+            expected = f"{self.shortest_s} to {self.longest_s} s (exposure.shortest_s, exposure.longest_s)"
+            raise DockairError("exposure.exposure_s", expected=expected, got=self.exposure_s)
+        if not self.target_level * (1.0 + self.dead_band) < self.clipped_level:
+            expected = f"so that with dead_band it stays below exposure.clipped_level = {self.clipped_level}"
+            raise DockairError("exposure.target_level", expected=expected, got=self.target_level)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,6 +104,7 @@ class LedParameters:
     rated_current_a: float
     drive_current_a: float
     junction_temperature_c: float
+    reference_temperature_c: float
     intensity_per_k: float
     wavelength_per_k: float
     bin_ratio: float
@@ -82,30 +115,59 @@ class LedParameters:
     occlusion_clearance_m: float
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class LightParameters:
     """Sheet `light`."""
 
-    wavelength_m: Array  #: (n,) nodes of the next
-    sun_irradiance_w_m3: Array  #: (n,)
-    air_transmittance: float
     sun_angular_radius_rad: float
+    gas_scale_height_m: float
+    haze_scale_height_m: float
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class GlareParameters:
     """Sheet `glare`."""
 
     veiling_glare: float
     veiling_decay_rad: float
+    halo_share: Array  #: (n,) of the parts of the halo
+    halo_core_rad: Array  #: (n,)
+    halo_exponent: Array  #: (n,)
+    iris_blades: int
+    iris_angle_rad: float
+    spike_share: float
+    spike_fan_rad: float
+    ghost_position: Array  #: (m,) of the ghosts
+    ghost_defocus_m: Array  #: (m,)
+    ghost_share: Array  #: (m,)
+    dirt_smallest_rad: float
+    dirt_largest_rad: float
+    dirt_darkest: float
+    dirt_slope: float
+    dirt_scatter: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SurfaceParameters:
     """Sheet `surfaces`."""
 
-    specular_reflectance: float
+    refractive_index: float
+    metal_reflectance: float
+    paint_share: float
+    metal_share: float
+    rubber_share: float
+    glass_share: float
+    paint_roughness_rad: float
+    metal_roughness_rad: float
+    rubber_roughness_rad: float
+    glass_roughness_rad: float
     grazing_rad: float
+    faintest_glint_m2_sr: float
+    faintest_radiance: float
+    patch_step_rad: float
+    led_side_light: float
+    led_seat_m: float
+    faintest_reflection: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -13,9 +13,10 @@ The simulator draws *as-built* values around these; they are other objects and n
 """
 
 import tomllib
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -38,7 +39,40 @@ def _from_toml(cls: type[Any], path: str | Path) -> Any:
     unknown = sorted(set(table) - set(names))
     if unknown:
         raise DockairError(f"{path}: {unknown[0]}", expected="a known key", got=unknown[0], exists=names)
-    return cls(**{k: tuple(v) if isinstance(v, list) else v for k, v in table.items()})
+    for name in names:
+        if name not in table and name not in cls.OPTIONAL:
+            raise DockairError(f"{path}: {name}", expected=_limits_in_words(cls, name), got="no such key", exists=names)
+    try:
+        return cls(**{k: tuple(v) if isinstance(v, list) else v for k, v in table.items()})
+    except DockairError as error:
+        where = f"{path}: {error.where.partition('.')[2]}"
+        raise DockairError(where, expected=error.expected, got=error.got, exists=error.exists) from None
+
+
+def _limits_in_words(cls: type[Any], name: str) -> str:
+    if name not in cls.LIMITS:
+        return "its numbers"
+    low, high, unit = cls.LIMITS[name]
+    return f"a number from {low:g} to {high:g} {unit}"
+
+
+def _check_limits(sheet: Any, where: str) -> None:
+    """Refuse a number outside its limits, which a wrong unit usually is, and what is no number."""
+    for name, (low, high, _) in sheet.LIMITS.items():
+        value = getattr(sheet, name)
+        whole = isinstance(next(f.default for f in fields(sheet) if f.name == name), int)
+        kinds = (int, np.integer) if whole else (int, float, np.integer, np.floating)
+        if isinstance(value, bool) or not isinstance(value, kinds) or not low <= value <= high:
+            raise DockairError(f"{where}.{name}", expected=_limits_in_words(type(sheet), name), got=value)
+
+
+def _check_vector(value: Any, count: int, bound: float, where: str, words: str) -> None:
+    try:
+        array = np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        array = np.empty(0)
+    if array.shape != (count,) or not (np.abs(array) <= bound).all():
+        raise DockairError(where, expected=f"{words}, none beyond {bound:g}", got=value)
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,16 +86,24 @@ class Camera:
     principal_point_px: tuple[float, float] = (1023.5, 543.5)
     distortion: tuple[float, float, float, float, float] | None = None  #: k1, k2, p1, p2, k3
 
+    LIMITS: ClassVar[Mapping[str, tuple[float, float, str]]] = {
+        "focal_length_m": (1e-3, 1.0, "m"),
+        "pixel_pitch_m": (1e-6, 50e-6, "m"),
+        "width_px": (16, 16384, "px"),
+        "height_px": (16, 16384, "px"),
+    }
+    OPTIONAL: ClassVar[tuple[str, ...]] = ("distortion",)
+
     def __post_init__(self) -> None:
-        for name in ("focal_length_m", "pixel_pitch_m", "width_px", "height_px"):
-            if not getattr(self, name) > 0:
-                raise DockairError(f"camera.{name}", expected="a number > 0", got=getattr(self, name))
-        if self.distortion is not None and len(self.distortion) != 5:
-            raise DockairError("camera.distortion", expected="5 numbers k1, k2, p1, p2, k3", got=self.distortion)
+        _check_limits(self, "camera")
+        bound = 2.0 * max(self.width_px, self.height_px)
+        _check_vector(self.principal_point_px, 2, bound, "camera.principal_point_px", "2 numbers [px]")
+        if self.distortion is not None:
+            _check_vector(self.distortion, 5, 10.0, "camera.distortion", "5 numbers k1, k2, p1, p2, k3")
 
     @classmethod
     def from_toml(cls, path: str | Path) -> Self:
-        """Read the sheet from a TOML file whose keys are the fields."""
+        """Read the sheet from a TOML file whose keys are the fields, all of them but those of OPTIONAL."""
         return _from_toml(cls, path)  # type: ignore[no-any-return]
 
     @property
@@ -112,15 +154,18 @@ class LedRing:
     diameter_m: float = 0.5
     count: int = 8
 
+    LIMITS: ClassVar[Mapping[str, tuple[float, float, str]]] = {
+        "diameter_m": (0.05, 5.0, "m"),
+        "count": (3, 64, "LEDs"),
+    }
+    OPTIONAL: ClassVar[tuple[str, ...]] = ()
+
     def __post_init__(self) -> None:
-        if not self.diameter_m > 0:
-            raise DockairError("ring.diameter_m", expected="a number > 0", got=self.diameter_m)
-        if self.count < 3:
-            raise DockairError("ring.count", expected="at least 3 LEDs", got=self.count)
+        _check_limits(self, "ring")
 
     @classmethod
     def from_toml(cls, path: str | Path) -> Self:
-        """Read the sheet from a TOML file whose keys are the fields."""
+        """Read the sheet from a TOML file whose keys are the fields, all of them but those of OPTIONAL."""
         return _from_toml(cls, path)  # type: ignore[no-any-return]
 
     @property

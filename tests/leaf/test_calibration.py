@@ -56,6 +56,13 @@ def test_distortion_is_opencvs():
     )
     np.testing.assert_allclose(DISTORTED.pixels_from_points(p_C), theirs.reshape(-1, 2), atol=1e-9)
 
+SHEET = """focal_length_m = 0.016
+pixel_pitch_m = 5.5e-6
+width_px = 2048
+height_px = 1088
+principal_point_px = [1023.5, 543.5]
+"""
+
 
 def test_points_beside_or_behind_the_camera_have_no_pixel():
     pixels = CAMERA.pixels_from_points(np.array([[-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]]))
@@ -78,6 +85,10 @@ def test_led_k_stands_at_k_eighths_from_left_to_up_in_the_plane_across_x():
         (lambda: Camera(width_px=-1), "camera.width_px"),
         (lambda: Camera(pixel_pitch_m=float("nan")), "camera.pixel_pitch_m"),
         (lambda: Camera(distortion=(0.1, 0.2)), "camera.distortion"),  # type: ignore[arg-type]
+        (lambda: Camera(distortion=(float("nan"), 0.0, 0.0, 0.0, 0.0)), "camera.distortion"),
+        (lambda: Camera(principal_point_px=(1023.5, 1e6)), "camera.principal_point_px"),
+        (lambda: Camera(focal_length_m=16.0), "camera.focal_length_m"),
+        (lambda: Camera(width_px=2048.0), "camera.width_px"),  # type: ignore[arg-type]
         (lambda: LedRing(diameter_m=-0.5), "ring.diameter_m"),
         (lambda: LedRing(count=2), "ring.count"),
     ],
@@ -90,8 +101,41 @@ def test_impossible_hardware_is_refused_by_name(make, where):
 
 def test_sheet_is_read_from_toml(tmp_path):
     file = tmp_path / "camera.toml"
-    file.write_text("focal_length_m = 0.025\ndistortion = [-0.1, 0.0, 0.0, 0.0, 0.0]\n", encoding="utf-8")
+    file.write_text(SHEET.replace("0.016", "0.025") + "distortion = [-0.1, 0.0, 0.0, 0.0, 0.0]\n", encoding="utf-8")
     assert Camera.from_toml(file) == Camera(focal_length_m=0.025, distortion=(-0.1, 0.0, 0.0, 0.0, 0.0))
+    file.write_text(SHEET, encoding="utf-8")
+    assert Camera.from_toml(file) == Camera()
+
+
+@pytest.mark.parametrize(
+    ("line", "key", "words"),
+    [
+        ("focal_length_m = 16.0", "focal_length_m", "from 0.001 to 1 m, got 16.0"),  # millimetres
+        ("pixel_pitch_m = 5.5", "pixel_pitch_m", "from 1e-06 to 5e-05 m, got 5.5"),  # micrometres
+        ("focal_length_mm = 16.0", "focal_length_mm", "a known key"),
+        ('width_px = "2048"', "width_px", "from 16 to 16384 px, got '2048'"),
+        ("width_px = true", "width_px", "from 16 to 16384 px, got True"),
+        ("principal_point_px = [1023.5]", "principal_point_px", "2 numbers [px]"),
+        ('principal_point_px = ["a", "b"]', "principal_point_px", "2 numbers [px]"),
+    ],
+)
+def test_a_wrong_unit_or_type_is_refused_with_file_key_and_limits(tmp_path, line, key, words):
+    file = tmp_path / "camera.toml"
+    kept = [old for old in SHEET.splitlines() if not old.startswith(line.split(" ")[0] + " ")]
+    file.write_text("\n".join([*kept, line]), encoding="utf-8")
+    with pytest.raises(DockairError) as error:
+        Camera.from_toml(file)
+    assert str(error.value).startswith(f"{file}: {key}: expected ")
+    assert words in str(error.value)
+
+
+@pytest.mark.parametrize("key", ["focal_length_m", "pixel_pitch_m", "width_px", "height_px", "principal_point_px"])
+def test_a_missing_key_is_refused_by_name(tmp_path, key):
+    file = tmp_path / "camera.toml"
+    file.write_text("\n".join(line for line in SHEET.splitlines() if not line.startswith(key)), encoding="utf-8")
+    with pytest.raises(DockairError, match="no such key") as error:
+        Camera.from_toml(file)
+    assert error.value.where == f"{file}: {key}"
 
 
 @pytest.mark.parametrize(

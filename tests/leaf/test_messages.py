@@ -10,8 +10,12 @@ def test_a_camera_frame_carries_what_a_camera_could_send_and_no_more() -> None:
     assert [f.name for f in fields(CameraFrame)] == ["time_stamp_s", "pixels", "window", "exposure_s", "gain"]
 
 
-def test_an_imu_sample_carries_its_stamp_and_the_measured_rate_and_no_more() -> None:
-    assert [f.name for f in fields(ImuSample)] == ["time_stamp_s", "angular_rate_rad_s"]
+def test_an_imu_sample_carries_its_stamp_and_what_gyros_and_accelerometers_measured_and_no_more() -> None:
+    assert [f.name for f in fields(ImuSample)] == ["time_stamp_s", "angular_rate_rad_s", "specific_force_m_s2"]
+
+
+def test_an_instrument_without_accelerometers_says_so() -> None:
+    assert np.isnan(ImuSample(time_stamp_s=0.0, angular_rate_rad_s=np.zeros(3)).specific_force_m_s2).all()
 
 
 @pytest.mark.parametrize(

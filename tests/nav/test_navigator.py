@@ -63,14 +63,14 @@ class Sky:
             time_stamp_s=time_s, pixels=image, window=window, exposure_s=EXPOSURE_S, gain=255.0 / 13500.0
         )
 
-    def step(self, *, camera=True):
+    def step(self, *, camera=True, gyro=True):
         times = (self.tick * 5 + np.arange(1, 6)) / 500.0
         self.tick += 1
         imu = tuple(ImuSample(time_stamp_s=float(t), angular_rate_rad_s=np.zeros(3)) for t in times)
         arrived = self.waiting.pop(0) if self.waiting else None
         if camera and self.tick % 2 == 0:
             self.waiting.append(self.frame(float(times[-1]), self.window))
-        solution = self.navigator.step(imu, arrived)
+        solution = self.navigator.step(imu if gyro else (), arrived)
         self.window = solution.window or self.sheets.camera.full_window
         return solution
 
@@ -140,6 +140,22 @@ def test_a_camera_that_goes_dark_is_a_status_and_ends_validity(render):
     assert not solution.valid and solution.window is None  # looks everywhere again
     sky.hidden = set()
     assert sky.run(0.5).valid
+
+
+def test_time_and_belief_go_on_while_the_imu_is_silent_and_after_it(render):
+    def path(t):
+        return np.array([4.0 - 1.0 * t, 0.2, -0.15])
+
+    sky = Sky(render, path)
+    sky.run(0.5)
+    before = sky.step()
+    silent = sky.run(0.2, gyro=False)
+    assert silent.time_stamp_s == pytest.approx(before.time_stamp_s + 0.2)
+    assert silent.valid and silent.frame_time_stamp_s > before.frame_time_stamp_s
+    assert np.abs(silent.p_PD_B - path(silent.time_stamp_s)).max() < 0.02
+    after = sky.run(0.2)
+    assert after.time_stamp_s == pytest.approx(silent.time_stamp_s + 0.2)
+    assert np.abs(after.p_PD_B - path(after.time_stamp_s)).max() < 0.02
 
 
 def test_the_same_messages_give_the_same_bits(render):

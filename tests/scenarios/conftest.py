@@ -64,7 +64,8 @@ class HandMadeFlight:
         latched = 6.55 <= t < 8.5
         return Truth(
             tick=tick, time_s=t, R_WB=R_WB, p_WB=p_WP - R_WB @ self.sheets.mounting.p_BP, v_WB=zero, w_WB_B=zero,
-            a_WB=zero, p_WP=p_WP, v_WP=np.array([1.2, 0.0, 0.0]), R_WD=R_WD, p_WD=p_WD, v_WD=zero, w_WD_D=zero,
+            alpha_WB_B=zero, a_WB=zero, specific_force_B=R_WB.T @ np.array([0.0, 0.0, 9.80665]),
+            p_WP=p_WP, v_WP=np.array([1.2, 0.0, 0.0]), R_WD=R_WD, p_WD=p_WD, v_WD=zero, w_WD_D=zero,
             p_WH=p_WD * s - np.array([0.0, 0.0, 0.5]) * s * (1 - s), R_WT=np.eye(3), p_WT=np.array([4.0, 0.0, 1.5]),
             reel_position_m=take_in, reel_rate_m_s=0.0, root_tension_n=1500.0, drogue_tension_n=1300.0,
             gust_B_m_s=zero, gust_D_m_s=zero, airspeed_m_s=180.0, angle_of_attack_rad=0.05, sideslip_rad=0.0,

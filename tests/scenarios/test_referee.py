@@ -14,7 +14,8 @@ def truth_at(time_s, tip_D, v_tip=(1.2, 0.0, 0.0), *, latched=False, touches=Fal
     """Drogue at rest at the world's origin, so that the tip in drogue axes is the tip in W."""
     zero, unit = np.zeros(3), np.eye(3)
     values = {f.name: 0.0 for f in dataclasses.fields(Truth)}
-    values |= {name: zero for name in values if name[:2] in ("p_", "v_", "w_", "a_") or name.startswith("gust")}
+    vectors = ("p_", "v_", "w_", "a_", "alpha_", "specific_force_", "gust")
+    values |= {name: zero for name in values if name.startswith(vectors)}
     values |= {"R_WB": unit if R_WB is None else R_WB, "R_WD": unit, "R_WT": unit, "p_WH": np.zeros((2, 3))}
     values |= {"tick": round(time_s * 1000), "time_s": time_s, "p_WP": np.array(tip_D), "v_WP": np.array(v_tip)}
     values |= {"latched": latched, "probe_touches_drogue": touches, "receiver_touches": hit}

@@ -1,0 +1,145 @@
+"""The tables `[[faults]]` of a scenario: what breaks, when, and how badly; units converted here.
+
+| kind            | keys beside start_s, stop_s                 | what happens                                       |
+|-----------------|---------------------------------------------|----------------------------------------------------|
+| led_off         | leds                                        | these LEDs are dark                                |
+| led_dim         | leds, factor                                | these LEDs shine with a part of their intensity    |
+| led_flicker     | leds, frequency_hz, duty, depth             | these LEDs flicker                                 |
+| camera_drop_out |                                             | no frame arrives                                   |
+| stuck_frame     |                                             | the camera sends its last picture again and again  |
+| hot_pixels      | count                                       | this many pixels of the sensor are white           |
+| dirty_window    | cover                                       | smudges on the window in front of the lens         |
+| exposure_stuck  | exposure_us                                 | the exposure stays at this time                    |
+| gyro_bias_step  | rate_deg_s                                  | the gyros' biases jump by this much                |
+| gyro_saturation | limit_deg_s                                 | the gyros' range shrinks to this                   |
+| gyro_drop_out   |                                             | no IMU sample arrives                              |
+
+Without `leds` all LEDs are meant; without `stop_s` a fault lasts to the end.
+"""
+
+from dataclasses import MISSING, fields
+from typing import Annotated, Any, Literal, Self
+
+import numpy as np
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
+
+from dockair.errors import DockairError
+from dockair.scenarios.refusal import Expected
+from dockair.sim.faults import (
+    CameraDropOut,
+    DirtyWindow,
+    ExposureStuck,
+    Fault,
+    GyroBiasStep,
+    GyroDropOut,
+    GyroSaturation,
+    HotPixels,
+    LedDim,
+    LedFlicker,
+    LedOff,
+    StuckFrame,
+)
+
+FaultKind = Literal[
+    "led_off",
+    "led_dim",
+    "led_flicker",
+    "camera_drop_out",
+    "stuck_frame",
+    "hot_pixels",
+    "dirty_window",
+    "exposure_stuck",
+    "gyro_bias_step",
+    "gyro_saturation",
+    "gyro_drop_out",
+]
+_CLASSES: dict[str, type[Fault]] = {
+    "led_off": LedOff,
+    "led_dim": LedDim,
+    "led_flicker": LedFlicker,
+    "camera_drop_out": CameraDropOut,
+    "stuck_frame": StuckFrame,
+    "hot_pixels": HotPixels,
+    "dirty_window": DirtyWindow,
+    "exposure_stuck": ExposureStuck,
+    "gyro_bias_step": GyroBiasStep,
+    "gyro_saturation": GyroSaturation,
+    "gyro_drop_out": GyroDropOut,
+}
+_COMMON = ("start_s", "stop_s")
+#: A field of a fault whose key here has another unit: field -> key, factor from key to field.
+_UNITS = {
+    "exposure_s": ("exposure_us", 1e-6),
+    "rate_rad_s": ("rate_deg_s", float(np.pi / 180.0)),
+    "limit_rad_s": ("limit_deg_s", float(np.pi / 180.0)),
+}
+
+
+def _own_fields(kind: str) -> dict[str, str]:
+    """Key -> field of the fault, without those that all faults have."""
+    names = [f.name for f in fields(_CLASSES[kind]) if f.name not in _COMMON]
+    return {_UNITS.get(name, (name, 1.0))[0]: name for name in names}
+
+
+def _has_default(kind: str, name: str) -> bool:
+    return next(f.default for f in fields(_CLASSES[kind]) if f.name == name) is not MISSING
+
+
+def _tuple_from_list(value: Any) -> Any:
+    return tuple(value) if isinstance(value, list) else value
+
+
+_Led = Annotated[int, Field(ge=0, le=7)]
+
+
+class FaultTable(BaseModel):
+    """One fault. Which of the optional keys it must have, `kind` says."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
+
+    kind: FaultKind
+    start_s: float = Field(default=0.0, ge=0.0)
+    stop_s: float | None = Field(default=None, gt=0.0)
+    leds: Annotated[
+        tuple[_Led, ...] | None, BeforeValidator(_tuple_from_list), Expected("numbers of LEDs, from 0 to 7")
+    ] = None
+    factor: float | None = Field(default=None, ge=0.0, le=1.0)
+    frequency_hz: float | None = Field(default=None, gt=0.0, le=1e5)
+    duty: float | None = Field(default=None, ge=0.0, le=1.0)  #: part of a period in which the LED is bright
+    depth: float | None = Field(default=None, ge=0.0, le=1.0)  #: how much of its intensity is missing in the dark part
+    count: int | None = Field(default=None, ge=1, le=100_000)
+    cover: float | None = Field(default=None, ge=0.0, le=1.0)  #: part of the window under smudges
+    exposure_us: float | None = Field(default=None, gt=0.0, le=20_000.0)
+    rate_deg_s: Annotated[
+        tuple[float, float, float] | None, BeforeValidator(_tuple_from_list), Expected("three numbers")
+    ] = None
+    limit_deg_s: float | None = Field(default=None, gt=0.0, le=5000.0)
+
+    @model_validator(mode="after")
+    def _keys_fit_the_kind(self) -> Self:
+        wanted = {key: _has_default(self.kind, name) for key, name in _own_fields(self.kind).items()}
+        for key in sorted(self.model_fields_set - {*wanted, *_COMMON, "kind"}):
+            exists = sorted({*wanted, *_COMMON, "kind"})
+            raise DockairError("faults", expected=f"a key of the kind {self.kind}", got=key, exists=exists)
+        for key, optional in wanted.items():
+            if getattr(self, key) is None and not optional:
+                raise DockairError("faults", expected=f"the key {key} of the kind {self.kind}", got=None)
+        if self.stop_s is not None and self.stop_s <= self.start_s:
+            raise DockairError("faults", expected=f"a stop_s after start_s = {self.start_s}", got=self.stop_s)
+        return self
+
+    @property
+    def fault(self) -> Fault:
+        """The fault, in SI units."""
+        values: dict[str, Any] = {"start_s": self.start_s}
+        if self.stop_s is not None:
+            values["stop_s"] = self.stop_s
+        for key, name in _own_fields(self.kind).items():
+            value = getattr(self, key)
+            if value is None:
+                continue  # the fault's own default
+            if name in _UNITS:
+                factor = _UNITS[name][1]
+                value = tuple(factor * v for v in value) if isinstance(value, tuple) else factor * value
+            values[name] = value
+        return _CLASSES[self.kind](**values)

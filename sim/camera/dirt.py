@@ -1,0 +1,65 @@
+"""Dirt on the window before the lens: smudges far out of focus that dim what is behind them and spread sunlight.
+
+    g = G(s_1) * n_1 + G(s_2) * n_2 + ...        white noise n_k smoothed by Gaussians G of smudge size, variance 1 (1)
+    T = 1 - (1 - T_min) min((g - g_c)/d, 1)      where g > g_c, else 1                                           (2)
+    veil and halo grow by   1 + scatter (1 - mean T)/(veil + halo)                                               (3)
+
+g_c is the quantile of g that leaves the part `cover` of the frame above it, so that more cover contains less; d is the
+fixed width of a smudge's slope. Of the light that dirt takes, the part `scatter` returns as veil and halo.
+
+Not modelled: that smudges move with the aperture's parallax; what they spread of LEDs (their halo stays unseen).
+Not valid for drops that focus light.
+Source: an edge 50 mm before an aperture of 2 mm is blurred over 40 mrad, which sets the sizes.
+"""
+
+import numpy as np
+from scipy.ndimage import gaussian_filter
+
+from dockair.calibration import Camera
+from dockair.errors import DockairError
+from dockair.rotations import Array
+from dockair.sim.camera.coarse_grid import SPACING_PX, CoarseGrid, nodes_around
+from dockair.sim.camera.sheets import GlareParameters
+
+_SIGMA_OF_SIZE = 0.25  # a Gaussian of this times a smudge's width makes blobs of about that width
+_SIZES = 3  # smudge sizes between smallest and largest, in equal ratios
+
+
+class Dirt:
+    """One dirty window.
+
+    Args:
+        parameters: sizes, darkness, scatter; the clean lens's veil and halo.
+        camera: as built.
+        rng: stream "dirt"; draws the same whatever the cover.
+        cover: part of the frame that is smudged, 0 to 1.
+    """
+
+    def __init__(self, parameters: GlareParameters, camera: Camera, rng: np.random.Generator, cover: float) -> None:
+        if not 0.0 <= cover <= 1.0:
+            raise DockairError("dirty window: cover", expected="a number in [0, 1]", got=cover)
+        first, shape = nodes_around(camera.full_window)
+        field = _field(parameters, camera.focal_length_px, rng, shape)
+        edge = float(np.quantile(field, 1.0 - cover)) if cover > 0.0 else np.inf
+        depth = np.clip((field - edge) / parameters.dirt_slope, 0.0, 1.0)
+        values = (1.0 - (1.0 - parameters.dirt_darkest) * depth).astype(np.float32)
+        values.setflags(write=False)
+        self.grid = CoarseGrid(values, first)  #: transmittance of the whole sensor
+        taken = 1.0 - float(values.mean(dtype=float))
+        spread = parameters.veiling_glare + float(parameters.halo_share.sum())
+        #: how much brighter than a clean lens's are veil and halo, Eq. (3); a lens with neither keeps neither
+        self.veil_factor = 1.0 + parameters.dirt_scatter * taken / spread if spread > 0.0 else 1.0
+
+    def at(self, pixels: Array) -> Array:
+        """(n,) transmittance at pixels (n, 2) (u, v)."""
+        return self.grid.at(pixels)
+
+
+def _field(parameters: GlareParameters, focal_px: float, rng: np.random.Generator, shape: tuple[int, int]) -> Array:
+    """(m, n) field g of Eq. (1)."""
+    total = np.zeros(shape)
+    for size_rad in np.geomspace(parameters.dirt_smallest_rad, parameters.dirt_largest_rad, _SIZES):
+        sigma = _SIGMA_OF_SIZE * size_rad * focal_px / SPACING_PX
+        # noise n_k of variance 1 smoothed by a Gaussian has the variance 1/(4 pi sigma^2)
+        total += 2.0 * np.sqrt(np.pi) * sigma * gaussian_filter(rng.standard_normal(shape), sigma, mode="wrap")
+    return np.asarray(total / np.sqrt(_SIZES))

@@ -1,0 +1,260 @@
+"""The scene as mirrors: which of its geoms reflect like what, prepared once a model.
+
+    balls     spheres and ellipsoids, and the round ends of capsules                       doubly curved
+    tubes     the sides of cylinders and capsules                                          curved once
+    facets    the faces of boxes, the flat ends of cylinders, flat ellipsoids in tiles     (nearly) flat
+    rim       the basket's rim, which the scene draws as straight capsules, as one torus
+
+An ellipsoid with half-axes a >= b >= c is flat when its middle is so little curved that a rough surface's slopes reach
+as far as the body does; then no single point stands for the glint and it is cut into tiles.
+
+A material follows from the geom's name. Not modelled: meshes, planes, height fields.
+Sources: do Carmo, Differential Geometry of Curves and Surfaces, section 3-3 (second fundamental form of a tile).
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from dockair.rotations import Array
+from dockair.sim.camera.occlusion import VISIBLE_GROUPS
+from dockair.sim.camera.sheets import SurfaceParameters
+
+PAINT, METAL, RUBBER, GLASS = range(4)
+RIM_GEOMS = "basket_rim"  #: how the names of the rim's pieces begin
+_MATERIALS = {"basket_": METAL, "coupling_": METAL, "probe_": METAL, "hose_": RUBBER, "led_housing_": RUBBER}
+_GLASS_GEOM = "canopy"  # the receiver's; the drogue's are canopy_0, canopy_1, ...
+_NEAR_LEDS = ("basket_rib", "coupling_", "probe_")  # what the LEDs shine on from nearby
+_FLAT_RATIO = 10.0  # of an ellipsoid's longest to its shortest half-axis
+_TILE_M = 0.5  # tiles of flat faces are no longer than this, up to _MOST_TILES a side
+_MOST_TILES = 12
+_TILES_ALONG, _TILES_AROUND = 20, 16  # of a flat ellipsoid
+_THINNEST_M = 0.02  # faces narrower than this are edges
+_SKIN_M = 1e-3  # a ray that starts on a surface starts this far off it
+
+_G = mujoco.mjtGeom
+
+
+class Balls(NamedTuple):
+    """Ellipsoids about a point on their geom's z axis."""
+
+    geom: NDArray[np.int64]  #: (n,)
+    material: NDArray[np.int64]  #: (n,)
+    axes: Array  #: (n, 3) half-axes [m]
+    at_z: Array  #: (n,) [m]
+    side: Array  #: (n,) 0 for the whole ball; 1 or -1 for the half toward z or -z
+
+
+class Tubes(NamedTuple):
+    """Round sides about their geom's z axis."""
+
+    geom: NDArray[np.int64]  #: (n,)
+    material: NDArray[np.int64]  #: (n,)
+    radius: Array  #: (n,) [m]
+    half_length: Array  #: (n,) [m]
+
+
+class Facets(NamedTuple):
+    """Small rectangles, flat or slightly curved, in their geom's axes."""
+
+    geom: NDArray[np.int64]  #: (n,)
+    material: NDArray[np.int64]  #: (n,)
+    frame: Array  #: (n, 4, 3) centre [m], normal, and the two tangents along the sides
+    half: Array  #: (n, 2) half sides [m]
+    curvature: Array  #: (n, 3) 11, 12, 22 of the second fundamental form, positive for convex [1/m]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rim:
+    """The basket's rim as a torus about its body's x axis."""
+
+    body: int
+    centre_x_m: float
+    radius_m: float
+    tube_radius_m: float
+    skin_m: float  #: how far the straight pieces that are drawn stick out of the torus, and a ray's skin
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Mirrors:
+    """Everything in a model that can mirror a light."""
+
+    balls: Balls
+    tubes: Tubes
+    facets: Facets
+    rim: Rim | None
+    near_balls: Balls  #: those that the LEDs shine on from nearby
+    near_tubes: Tubes
+
+    @classmethod
+    def of(cls, model: mujoco.MjModel) -> "Mirrors":
+        """Collect what is drawn."""
+        rim = rim_of(model)
+        balls, tubes, facets = [], [], []
+        near: list[bool] = []
+        for i in range(model.ngeom):
+            name = model.geom(i).name
+            drawn = VISIBLE_GROUPS[model.geom_group[i]] and model.geom_rgba[i, 3] > 0.0
+            if not drawn or (rim is not None and name.startswith(RIM_GEOMS)):
+                continue
+            material = material_of(name)
+            balls += [(i, material, *ball) for ball in _balls(model, i)]
+            tubes += [(i, material, *tube) for tube in _tubes(model, i)]
+            facets += [(i, material, *facet) for facet in _facets(model, i)]
+        near = [model.geom(i).name.startswith(_NEAR_LEDS) for i in range(model.ngeom)]
+        return cls(
+            balls=_ball_table(balls),
+            tubes=_tube_table(tubes),
+            facets=_facet_table(facets),
+            rim=rim,
+            near_balls=_ball_table([ball for ball in balls if near[ball[0]]]),
+            near_tubes=_tube_table([tube for tube in tubes if near[tube[0]]]),
+        )
+
+
+def material_of(geom: str) -> int:
+    """What a geom of this name is made of."""
+    if geom == _GLASS_GEOM:
+        return GLASS
+    return next((material for prefix, material in _MATERIALS.items() if geom.startswith(prefix)), PAINT)
+
+
+def finishes(surfaces: SurfaceParameters) -> Array:
+    """(4, 4) a row a material: refractive index (0 for metal), normal reflectance of metal, share, rms slope."""
+    p, n = surfaces, surfaces.refractive_index
+    return np.array(
+        [
+            [n, 0.0, p.paint_share, p.paint_roughness_rad],
+            [0.0, p.metal_reflectance, p.metal_share, p.metal_roughness_rad],
+            [n, 0.0, p.rubber_share, p.rubber_roughness_rad],
+            [n, 0.0, p.glass_share, p.glass_roughness_rad],
+        ]
+    )
+
+
+def rim_of(model: mujoco.MjModel) -> Rim | None:
+    """Return the torus through the capsules that draw the rim; None where the scene has none."""
+    pieces = [i for i in range(model.ngeom) if model.geom(i).name.startswith(RIM_GEOMS)]
+    if not pieces:
+        return None
+    middle = model.geom_pos[pieces]
+    chord = np.hypot(middle[:, 1], middle[:, 2])
+    radius = float(np.hypot(chord, model.geom_size[pieces, 1]).mean())
+    return Rim(
+        body=int(model.geom_bodyid[pieces[0]]),
+        centre_x_m=float(middle[:, 0].mean()),
+        radius_m=radius,
+        tube_radius_m=float(model.geom_size[pieces, 0].mean()),
+        skin_m=radius - float(chord.min()) + _SKIN_M,
+    )
+
+
+def _balls(model: mujoco.MjModel, i: int) -> list[tuple[Array, float, float]]:
+    """Half-axes, place on z and side of what is doubly curved in geom i."""
+    kind, size = model.geom_type[i], np.array(model.geom_size[i])
+    if kind == _G.mjGEOM_SPHERE:
+        return [(np.full(3, size[0]), 0.0, 0.0)]
+    if kind == _G.mjGEOM_ELLIPSOID and not _is_flat(size):
+        return [(size, 0.0, 0.0)]
+    if kind == _G.mjGEOM_CAPSULE:
+        return [(np.full(3, size[0]), side * size[1], side) for side in (1.0, -1.0)]
+    return []
+
+
+def _tubes(model: mujoco.MjModel, i: int) -> list[tuple[float, float]]:
+    if model.geom_type[i] in (_G.mjGEOM_CAPSULE, _G.mjGEOM_CYLINDER):
+        return [(float(model.geom_size[i, 0]), float(model.geom_size[i, 1]))]
+    return []
+
+
+def _facets(model: mujoco.MjModel, i: int) -> list[tuple[Array, tuple[float, float], tuple[float, float, float]]]:
+    """Frame, half sides and curvature of each tile of geom i."""
+    kind, size = model.geom_type[i], np.array(model.geom_size[i])
+    if kind == _G.mjGEOM_BOX:
+        return [tile for axis in range(3) for side in (1.0, -1.0) for tile in _face(size, axis, side)]
+    if kind == _G.mjGEOM_CYLINDER:  # a disc as the square of its area
+        half = 0.5 * np.sqrt(np.pi) * size[0]
+        box = np.array([half, half, size[1]])
+        return [tile for side in (1.0, -1.0) for tile in _face(box, 2, side)]
+    if kind == _G.mjGEOM_ELLIPSOID and _is_flat(size):
+        return _ellipsoid_tiles(size)
+    return []
+
+
+def _is_flat(axes: Array) -> bool:
+    return bool(axes.max() > _FLAT_RATIO * axes.min())
+
+
+def _face(half: Array, axis: int, side: float) -> list[tuple[Array, tuple[float, float], tuple[float, float, float]]]:
+    """The face of a box across one axis, in tiles."""
+    one, two = (axis + 1) % 3, (axis + 2) % 3
+    if min(half[one], half[two]) < 0.5 * _THINNEST_M:
+        return []
+    counts = [int(np.clip(np.ceil(2.0 * half[k] / _TILE_M), 1, _MOST_TILES)) for k in (one, two)]
+    sides = half[one] / counts[0], half[two] / counts[1]
+    frame = np.zeros((4, 3))
+    frame[0, axis], frame[1, axis], frame[2, one], frame[3, two] = side * half[axis], side, 1.0, 1.0
+    tiles = []
+    for j in range(counts[0]):
+        for k in range(counts[1]):
+            placed = frame.copy()
+            placed[0, one], placed[0, two] = (2 * j + 1) * sides[0] - half[one], (2 * k + 1) * sides[1] - half[two]
+            tiles.append((placed, sides, (0.0, 0.0, 0.0)))
+    return tiles
+
+
+def _ellipsoid_tiles(axes: Array) -> list[tuple[Array, tuple[float, float], tuple[float, float, float]]]:
+    """An ellipsoid cut along its longest axis, and around it."""
+    order = np.argsort(-axes)
+    longest, across, thin = (np.eye(3)[k] * axes[k] for k in order)
+    step_b, step_a = np.pi / _TILES_ALONG, 2.0 * np.pi / _TILES_AROUND
+    tiles = []
+    for b in (np.arange(_TILES_ALONG) + 0.5) * step_b - 0.5 * np.pi:
+        for a in (np.arange(_TILES_AROUND) + 0.5) * step_a:
+            around = np.cos(a) * thin + np.sin(a) * across
+            p = np.cos(b) * around + np.sin(b) * longest
+            along_b = -np.sin(b) * around + np.cos(b) * longest
+            along_a = np.cos(b) * (-np.sin(a) * thin + np.cos(a) * across)
+            gradient = p / axes**2
+            n = gradient / np.linalg.norm(gradient)
+            t1 = along_b / np.linalg.norm(along_b)
+            t2 = np.cross(n, t1)
+            area = float(np.linalg.norm(np.cross(along_a, along_b))) * step_a * step_b
+            half = 0.5 * float(np.linalg.norm(along_b)) * step_b
+            C = np.array([t1, t2]) @ np.diag(axes**-2.0) @ np.array([t1, t2]).T / np.linalg.norm(gradient)
+            tiles.append((np.array([p, n, t1, t2]), (half, 0.25 * area / half), (C[0, 0], C[0, 1], C[1, 1])))
+    return tiles
+
+
+def _ball_table(rows: list[tuple[int, int, Array, float, float]]) -> Balls:
+    geom, material, axes, at_z, side = zip(*rows, strict=True) if rows else ((),) * 5
+    return Balls(_index(geom), _index(material), np.reshape(axes, (-1, 3)).astype(float), _real(at_z), _real(side))
+
+
+def _tube_table(rows: list[tuple[int, int, float, float]]) -> Tubes:
+    geom, material, radius, half_length = zip(*rows, strict=True) if rows else ((),) * 4
+    return Tubes(_index(geom), _index(material), _real(radius), _real(half_length))
+
+
+def _facet_table(
+    rows: list[tuple[int, int, Array, tuple[float, float], tuple[float, float, float]]],
+) -> Facets:
+    geom, material, frame, half, curvature = zip(*rows, strict=True) if rows else ((),) * 5
+    return Facets(
+        _index(geom),
+        _index(material),
+        np.reshape(frame, (-1, 4, 3)).astype(float),
+        np.reshape(half, (-1, 2)).astype(float),
+        np.reshape(curvature, (-1, 3)).astype(float),
+    )
+
+
+def _index(values: object) -> NDArray[np.int64]:
+    return np.array(values, dtype=np.int64)
+
+
+def _real(values: object) -> Array:
+    return np.array(values, dtype=float)

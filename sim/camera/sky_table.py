@@ -1,0 +1,139 @@
+"""A function of direction, tabulated where it is looked at: the sky, read for every block of every frame.
+
+The sphere is unfolded onto a square by way of the octahedron (x is the direction of flight):
+
+    p = (y, z)/(|x| + |y| + |z|);     x < 0:  p <- (sgn p_y (1 - |p_z|), sgn p_z (1 - |p_y|))                    (1)
+
+Nodes stand on an even grid of p, 2/n rad apart straight ahead and up to 2.3 times that elsewhere; between them the
+value is bilinear. Tiles of nodes are computed when a picture first needs them, and their values do not depend on when.
+
+A block's value is a function of R and its own x and y alone. Source: Praun & Hoppe 2003 (octahedral maps).
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from dockair.rotations import Array
+
+_TILE = 64  # nodes a side
+_STEEPEST = 2.74  # |dp| <= (1 + sqrt 3) |d direction|, Eq. (1)
+
+
+class DirectionTable:
+    """Values (n, n) at the nodes; row 0 up, column 0 left, straight ahead in the middle."""
+
+    def __init__(self, function: Callable[[Array], Array], tiles: int) -> None:
+        """Set up an empty table.
+
+        Args:
+            function: (m, 3) unit vectors, W axes -> (m,) values.
+            tiles: a side, each of 64 x 64 nodes.
+        """
+        self._function, self._tiles = function, tiles
+        self._values: NDArray[np.float32] = np.empty((tiles * _TILE, tiles * _TILE), dtype=np.float32)
+        self._is_known = np.zeros((tiles, tiles), dtype=np.bool_)
+
+    def fill(self, out: NDArray[np.float32], R_WC: Array, x: Array, y: Array) -> None:
+        """Write the value toward (1, -x_j, -y_i), C axes, into out (rows, columns)."""
+        step = max(_largest_step(x), _largest_step(y), 1e-9)
+        cells = self._values.shape[0] - 1
+        stride = max(1, int((_TILE - 1) / (0.5 * cells * _STEEPEST * step)))
+        wanted = np.zeros_like(self._is_known)
+        R, columns = np.ascontiguousarray(R_WC, dtype=float), np.asarray(x, dtype=np.float32)
+        rows = np.asarray(y, dtype=float)
+        _mark(R, columns, rows, stride, cells, wanted)
+        for row, column in np.argwhere(wanted & ~self._is_known):
+            self._compute(int(row), int(column))
+        _sample(self._values, R, columns, rows, out)
+
+    def _compute(self, row: int, column: int) -> None:
+        """Tabulate a tile."""
+        i, j = np.meshgrid(np.arange(_TILE) + row * _TILE, np.arange(_TILE) + column * _TILE, indexing="ij")
+        values = self._function(directions_from_nodes(i.ravel(), j.ravel(), self._values.shape[0]))
+        place = slice(row * _TILE, (row + 1) * _TILE), slice(column * _TILE, (column + 1) * _TILE)
+        self._values[place] = values.reshape(_TILE, _TILE)
+        self._is_known[row, column] = True
+
+
+def directions_from_nodes(i: NDArray[np.int64], j: NDArray[np.int64], n: int) -> Array:
+    """(m, 3) unit vectors of nodes (row i, column j) of an (n, n) table, the inverse of Eq. (1)."""
+    p_y, p_z = 1.0 - 2.0 * j / (n - 1), 1.0 - 2.0 * i / (n - 1)
+    x = 1.0 - np.abs(p_y) - np.abs(p_z)
+    behind = x < 0.0
+    y = np.where(behind, np.copysign(1.0 - np.abs(p_z), p_y), p_y)
+    z = np.where(behind, np.copysign(1.0 - np.abs(p_y), p_z), p_z)
+    length = np.sqrt(x * x + y * y + z * z)
+    return np.stack([x / length, y / length, z / length], axis=1)
+
+
+def _largest_step(x: Array) -> float:
+    return float(np.abs(np.diff(x)).max()) if len(x) > 1 else 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def _node(
+    x: np.float32, y: np.float32, z: np.float32, half: np.float32
+) -> tuple[np.float32, np.float32]:
+    """Fractional row and column of a direction of any length, Eq. (1)."""
+    one = np.float32(1.0)
+    scale = one / (abs(x) + abs(y) + abs(z))
+    p_y, p_z = y * scale, z * scale
+    if x < np.float32(0.0):
+        q_y = one - abs(p_z)
+        q_z = one - abs(p_y)
+        p_y = q_y if p_y >= np.float32(0.0) else -q_y
+        p_z = q_z if p_z >= np.float32(0.0) else -q_z
+    return (one - p_z) * half, (one - p_y) * half
+
+
+@njit(cache=True, error_model="numpy")
+def _sample(
+    values: NDArray[np.float32], R: Array, x: NDArray[np.float32], y: Array, out: NDArray[np.float32]
+) -> None:
+    """Bilinear values toward (1, -x_j, -y_i); float32, the same sums for a block wherever its array begins."""
+    last = np.int32(values.shape[0] - 2)
+    half = np.float32(0.5 * (values.shape[0] - 1))
+    b_x, b_y, b_z = np.float32(R[0, 1]), np.float32(R[1, 1]), np.float32(R[2, 1])
+    for i in range(out.shape[0]):
+        a_x = np.float32(R[0, 0] - y[i] * R[0, 2])
+        a_y = np.float32(R[1, 0] - y[i] * R[1, 2])
+        a_z = np.float32(R[2, 0] - y[i] * R[2, 2])
+        for j in range(out.shape[1]):
+            v, u = _node(a_x - x[j] * b_x, a_y - x[j] * b_y, a_z - x[j] * b_z, half)
+            row, column = max(min(np.int32(v), last), np.int32(0)), max(min(np.int32(u), last), np.int32(0))
+            down, right = v - np.float32(row), u - np.float32(column)
+            top, bottom = values[row], values[row + 1]
+            a = top[column] + right * (top[column + 1] - top[column])
+            b = bottom[column] + right * (bottom[column + 1] - bottom[column])
+            out[i, j] = a + down * (b - a)
+
+
+@njit(cache=True)
+def _mark(
+    R: Array, x: NDArray[np.float32], y: Array, stride: int, cells: int, wanted: NDArray[np.bool_]
+) -> None:
+    """Mark the tiles of every stride-th block and their neighbours; no block in between lies farther than a tile."""
+    tiles = wanted.shape[0]
+    half = np.float32(0.5 * cells)
+    for i in range(0, len(y) + stride - 1, stride):
+        y_i = y[min(i, len(y) - 1)]
+        for j in range(0, len(x) + stride - 1, stride):
+            x_j = x[min(j, len(x) - 1)]
+            v, u = _node(
+                np.float32(R[0, 0] - y_i * R[0, 2] - x_j * R[0, 1]),
+                np.float32(R[1, 0] - y_i * R[1, 2] - x_j * R[1, 1]),
+                np.float32(R[2, 0] - y_i * R[2, 2] - x_j * R[2, 1]),
+                half,
+            )
+            row, column = int(v) // _TILE, int(u) // _TILE
+            for a in range(row - 1, row + 2):
+                for b in range(column - 1, column + 2):
+                    r, c = a, b
+                    if a < 0 or a >= tiles:  # the square's edges meet their own mirror images
+                        r, c = min(max(a, 0), tiles - 1), tiles - 1 - c
+                    if b < 0 or b >= tiles:
+                        r, c = tiles - 1 - r, min(max(c, 0), tiles - 1)
+                    wanted[r, c] = True

@@ -1,0 +1,111 @@
+"""What stands before the sky: the scene's solids, the light on them and the haze before them.
+
+    L = T rho (ambient + direct max(0, n . s)) + (1 - T) L_air,      T = exp(-b r)                               (1)
+
+in units of a white Lambertian surface in normal sunlight: reflectance rho, unit normal n, unit vector s toward the
+Sun, extinction b, slant range r. A solid is a sphere, ellipsoid, capsule, cylinder or box, opaque and matt; both ways
+of drawing it (`drawn`, `traced`) take it from here.
+
+Not modelled: shadows, interreflections, gloss (glints are point sources of their own), meshes.
+Source: Koschmieder's law of air light, in Middleton, Vision through the Atmosphere, ch. 4.
+"""
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from dockair.errors import DockairError
+from dockair.rotations import Array
+
+VISIBLE_GROUPS: NDArray[np.uint8] = np.array([1, 1, 1, 0, 0, 0], dtype=np.uint8)  #: MuJoCo's own default
+
+#: Kinds of solids, as numbers for compiled code.
+BALL, CAPSULE, CYLINDER, BOX = 0, 1, 2, 3
+_KIND_OF = {
+    mujoco.mjtGeom.mjGEOM_SPHERE: BALL,
+    mujoco.mjtGeom.mjGEOM_ELLIPSOID: BALL,
+    mujoco.mjtGeom.mjGEOM_CAPSULE: CAPSULE,
+    mujoco.mjtGeom.mjGEOM_CYLINDER: CYLINDER,
+    mujoco.mjtGeom.mjGEOM_BOX: BOX,
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Solids:
+    """The visible geoms of a model, in its order."""
+
+    geoms: NDArray[np.intp]  #: (n,) their numbers in the model
+    kinds: NDArray[np.int64]  #: (n,)
+    half_sizes_m: Array  #: (n, 3) half extents along their own axes; capsule: of its cylinder
+    bounds_m: Array  #: (n,) radius of the sphere around each
+    reflectances: Array  #: (n,)
+
+    @classmethod
+    def of(cls, model: mujoco.MjModel) -> "Solids":
+        """Take every geom of a visible group that is not fully transparent.
+
+        Raises:
+            DockairError: one of them is neither sphere, ellipsoid, capsule, cylinder nor box.
+        """
+        visible = VISIBLE_GROUPS[model.geom_group].astype(bool) & (model.geom_rgba[:, 3] > 0.0)
+        geoms = np.flatnonzero(visible)
+        types = [mujoco.mjtGeom(model.geom_type[i]) for i in geoms]
+        for i, kind in zip(geoms, types, strict=True):
+            if kind not in _KIND_OF:
+                name = model.geom(int(i)).name or f"number {i}"
+                got = kind.name.removeprefix("mjGEOM_").lower()
+                raise DockairError(f"geom {name}", expected="a sphere, ellipsoid, capsule, cylinder or box", got=got)
+        kinds = np.array([_KIND_OF[kind] for kind in types], dtype=np.int64)
+        size = model.geom_size[geoms]
+        spheres = np.array([kind == mujoco.mjtGeom.mjGEOM_SPHERE for kind in types], dtype=bool)
+        round_about_z = (kinds == CAPSULE) | (kinds == CYLINDER)
+        return cls(
+            geoms=geoms,
+            kinds=kinds,
+            half_sizes_m=np.column_stack(
+                [
+                    size[:, 0],
+                    np.where(spheres | round_about_z, size[:, 0], size[:, 1]),
+                    np.where(spheres, size[:, 0], np.where(round_about_z, size[:, 1], size[:, 2])),
+                ]
+            ),
+            bounds_m=np.array(model.geom_rbound[geoms]),
+            reflectances=np.array(model.geom_rgba[geoms, 0], dtype=float),
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Lighting:
+    """The light on the solids, as parts of the light on a surface that faces the Sun of a clear day."""
+
+    toward_W: Array  #: (3,) unit vector toward the Sun; anything where `direct` is 0
+    ambient: float  #: from all sides alike
+    direct: float  #: from the Sun
+
+    @classmethod
+    def of(cls, model: mujoco.MjModel, ambient: float) -> "Lighting":
+        """Sunlight from where the model's first light shines; no light at all where it has none.
+
+        Args:
+            model: the world's.
+            ambient: part of the light that comes from all sides.
+        """
+        if model.nlight == 0:
+            return cls(toward_W=np.array([0.0, 0.0, 1.0]), ambient=0.0, direct=0.0)
+        return cls(toward_W=-np.array(model.light_dir[0]), ambient=ambient, direct=1.0 - ambient)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Haze:
+    """The air between the lens and the solids."""
+
+    extinction_1_m: float = 0.0
+    airlight: float = 0.0  #: L_air of Eq. (1)
+
+
+def depth_limits_m(model: mujoco.MjModel) -> tuple[float, float]:
+    """Nearest and farthest depth drawn, MuJoCo's own clipping planes."""
+    extent = model.stat.extent
+    return float(model.vis.map.znear * extent), float(model.vis.map.zfar * extent)

@@ -1,0 +1,107 @@
+"""How much of the Sun's disc the lens sees: hidden by the scene along rays, dimmed by cloud.
+
+    visible = mean over the disc of clear(d) beam(d)                                                             (1)
+
+clear(d) is 1 where nothing lies along the ray d, beam(d) the cloud's transmittance. For what all of the disc does
+(stray light) the mean is taken over rings of equal area; for the disc's image, pixel by pixel: clouds at every pixel,
+the scene in blocks of k x k pixels.
+
+Not modelled: diffraction at the edges of what hides it; the camera's own place within its lens.
+"""
+
+from typing import Protocol
+
+import mujoco
+import numpy as np
+
+from dockair.calibration import Camera
+from dockair.rotations import Array
+from dockair.sim.camera.occlusion import clear_directions
+
+_RINGS = 4  # of equal area, with 6, 12, 18, 24 rays: 60 rays resolve 2 % of the disc
+_BLOCK_PX = 2
+
+
+class Beam(Protocol):
+    """What is asked of the sky: `dockair.sim.camera.sky.Sky`."""
+
+    def beam(self, directions_W: Array) -> Array:
+        """(n,) transmittance of sunlight from directions (n, 3)."""
+        ...
+
+
+class SunView:
+    """The Sun as one camera sees it.
+
+    Args:
+        model: what may hide it.
+        camera: as built.
+        sky: clouds.
+        sun_W: (3,) unit vector toward the Sun.
+        radius_rad: of its disc.
+        margin_px: how far the blurred disc reaches beyond its edge.
+    """
+
+    def __init__(
+        self, model: mujoco.MjModel, camera: Camera, sky: Beam, sun_W: Array, radius_rad: float, margin_px: float
+    ) -> None:
+        self._model, self._camera, self._sky, self._sun_W = model, camera, sky, sun_W
+        self._radius_px = camera.focal_length_px * float(np.tan(radius_rad)) + margin_px
+        self._disc_W = _disc_directions(sun_W, radius_rad)
+        self._dimmed = sky.beam(self._disc_W)
+
+    @property
+    def beam(self) -> float:
+        """Part of the sunlight that comes through the clouds."""
+        return float(self._dimmed.mean())
+
+    def visible(self, data: mujoco.MjData, p_WC: Array) -> float:
+        """Part of the disc that the lens sees, Eq. (1)."""
+        return float((self._dimmed * clear_directions(self._model, data, p_WC, self._disc_W)).mean())
+
+    def patch(self, data: mujoco.MjData, pose: tuple[Array, Array]) -> tuple[Array, tuple[int, int]] | None:
+        """What the pixels around the disc's image see of it.
+
+        Args:
+            data: positions up to date.
+            pose: R_WC and p_WC of the camera.
+
+        Returns:
+            (m, n) transmittance 0 to 1 of each pixel, and the sensor's (row, column) of the first; None where the disc
+            falls beside the sensor.
+        """
+        R_WC, p_WC = pose
+        sun_C = R_WC.T @ self._sun_W
+        if sun_C[0] <= 0.0:
+            return None
+        u, v = self._camera.pixels_from_points(sun_C[None])[0]
+        reach = self._radius_px
+        if not (-reach < u < self._camera.width_px + reach and -reach < v < self._camera.height_px + reach):
+            return None
+        first = int((v - reach) // _BLOCK_PX), int((u - reach) // _BLOCK_PX)
+        count = int(2.0 * reach // _BLOCK_PX) + 2
+        centres = _BLOCK_PX * (np.arange(count) + 0.5) - 0.5
+        rays = self._rays_W(R_WC, _BLOCK_PX * first[0] + centres, _BLOCK_PX * first[1] + centres)
+        clear = clear_directions(self._model, data, p_WC, rays).reshape(count, count)
+        start = _BLOCK_PX * first[0], _BLOCK_PX * first[1]
+        fine = np.arange(_BLOCK_PX * count)
+        dimmed = self._sky.beam(self._rays_W(R_WC, start[0] + fine, start[1] + fine)).reshape(len(fine), len(fine))
+        return np.asarray(dimmed * np.kron(clear, np.ones((_BLOCK_PX, _BLOCK_PX)))), start
+
+    def _rays_W(self, R_WC: Array, rows: Array, columns: Array) -> Array:
+        u, v = np.meshgrid(columns, rows)
+        return np.asarray(self._camera.rays_from_pixels(np.column_stack([u.ravel(), v.ravel()])) @ R_WC.T)
+
+
+def _disc_directions(axis: Array, radius_rad: float) -> Array:
+    """(n, 3) unit vectors over a cone of half-angle radius_rad, each standing for the same solid angle."""
+    across = np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))])
+    across /= np.linalg.norm(across)
+    basis = np.column_stack([across, np.cross(axis, across)])
+    per_ring = 6 * np.arange(1, _RINGS + 1)
+    edges = np.sqrt(np.concatenate([[0], np.cumsum(per_ring)]) / per_ring.sum())
+    radius = radius_rad * np.repeat(np.sqrt(0.5 * (edges[:-1] ** 2 + edges[1:] ** 2)), per_ring)
+    angle = np.concatenate([2.0 * np.pi * (np.arange(n) + 0.5) / n for n in per_ring])
+    offsets = radius[:, None] * np.column_stack([np.cos(angle), np.sin(angle)]) @ basis.T
+    directions = axis + offsets
+    return np.asarray(directions / np.linalg.norm(directions, axis=1, keepdims=True))
