@@ -25,7 +25,7 @@ from dockair.sim.aircraft.flight_control import FlightControlParameters
 from dockair.sim.aircraft.receiver import Receiver
 from dockair.sim.aircraft.trim import level_trim
 from dockair.sim.as_built import AsBuilt, AsBuiltParameters, draw_as_built
-from dockair.sim.camera.camera import CameraSeeds, CameraSheets, NearInfraredCamera
+from dockair.sim.camera.camera import CameraNoise, CameraSheets, NearInfraredCamera
 from dockair.sim.camera.sheets import LedParameters
 from dockair.sim.camera.sky import Weather
 from dockair.sim.faults import Faults
@@ -257,7 +257,7 @@ def _camera(scenario: Scenario, seed: int, as_built: AsBuilt, faults: Faults, wo
     return NearInfraredCamera(
         camera_sheets(scenario),
         as_built,
-        CameraSeeds.of(seed),
+        CameraNoise.of(seed),
         world.model,
         sun_direction_W=scenario.sun_W,
         weather=Weather(

@@ -1,4 +1,4 @@
-"""The command line: `dockair fly`, `scenarios`, `replay`, `bench`, `doctor`.
+"""The command line: `dockair fly`, `scenarios`, `replay`, `reproduce`, `bench`, `doctor`.
 
 Exit status: 0 done as asked, whatever the flight's outcome; 1 a replay that was not identical; 2 bad input;
 3 the machine lacks something. With `--json` one object goes to stdout and nothing else; progress and errors go to
@@ -126,18 +126,63 @@ def replay(
 
 
 @app.command()
+def reproduce(
+    wanted: Annotated[str | None, typer.Argument(metavar="[ID]", help="What to reproduce; without, the list.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder for the picture; out/reproduce by default.")] = None,
+    as_json: Json = False,
+) -> None:
+    """Reproduce a published figure or table: ours beside the source's, and a picture."""
+    from dockair.scenarios.output import show_reproduction, show_reproductions, show_working
+    from dockair.scenarios.reproduce import registry
+
+    if wanted is None:
+        if as_json:
+            _print_json({"ids": registry.ids()})
+        else:
+            show_reproductions(registry.titles())
+        return
+    folder = out or Path("out") / "reproduce"
+    with show_working(f"reproducing {wanted}"):
+        table = registry.reproduce(wanted, folder)
+    if as_json:
+        _print_json(table)
+    else:
+        show_reproduction(table, folder)
+
+
+class BenchSubject(Enum):
+    """What `bench` measures."""
+
+    FLIGHT = "flight"
+    SENSORS = "sensors"
+
+
+@app.command()
 def bench(
     scenario: ScenarioName = "default",
     settings: Settings = None,
     seconds: Annotated[float, typer.Option(min=1.0, max=600.0, help="Simulated time at most.")] = 20.0,
+    subject: Annotated[BenchSubject, typer.Option("--of", help="The closed loop, or the sensors' stages.")] = (
+        BenchSubject.FLIGHT
+    ),
     as_json: Json = False,
 ) -> None:
-    """Say how fast the closed loop runs here and where its time goes."""
+    """Say how fast the closed loop runs here and where its time goes; or how fast the sensors' stages are."""
     from dockair.scenarios.doctor import require_rendering
     from dockair.scenarios.output import show_bench
     from dockair.scenarios.schema import load_scenario
 
     chosen = load_scenario(scenario, _overrides(settings))
+    if subject is BenchSubject.SENSORS:
+        from dockair.scenarios.bench_sensors import bench_sensors
+        from dockair.scenarios.output import show_sensor_bench
+
+        figures = bench_sensors(chosen)
+        if as_json:
+            _print_json(figures)
+        else:
+            show_sensor_bench(figures)
+        return
     require_rendering()
     from dockair.scenarios.bench import bench as bench_scenario
 

@@ -3,6 +3,7 @@
 import os
 import sys
 from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
@@ -158,6 +159,59 @@ def show_bench(report: "BenchReport") -> None:
         milliseconds = figures["milliseconds_per_call"].get(part)
         table.add_row(part, f"{share:.1%}", "" if milliseconds is None else f"{milliseconds:.3f}")
     console.print(table)
+
+
+def show_working(text: str) -> AbstractContextManager[Any]:
+    """Show on stderr that something goes on, where it is a terminal."""
+    return Console(stderr=True, highlight=False).status(text)
+
+
+def show_reproductions(titles: Mapping[str, str]) -> None:
+    """Print what can be reproduced."""
+    table = Table(box=None, padding=(0, 1))
+    for heading in ("id", "what it shows"):
+        table.add_column(heading)
+    for name, title in titles.items():
+        table.add_row(name, title)
+    Console(highlight=False).print(table)
+
+
+def show_reproduction(reproduction: Mapping[str, Any], folder: Path) -> None:
+    """Print ours beside the reference's, one line a figure, and where the picture is."""
+    console = Console(highlight=False)
+    console.print(f"[bold]{reproduction['id']}[/]  {reproduction['source']}", soft_wrap=True)
+    table = Table(box=None, padding=(0, 1))
+    for heading in ("case", "figure", "ours", "reference"):
+        table.add_column(heading, justify="right" if heading in ("ours", "reference") else "left")
+    for row in reproduction["rows"]:
+        for figure, ours in row["ours"].items():
+            table.add_row(row["case"], figure, _figure(ours), _figure(row["reference"].get(figure)))
+    console.print(table)
+    for path in reproduction.get("pictures", ()):
+        console.print(f"  {folder / path}", soft_wrap=True)
+
+
+def _figure(value: Any) -> str:
+    if value is None:
+        return ""
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    if isinstance(value, (list, tuple)):
+        return ", ".join(_figure(entry) for entry in value)
+    return str(value)
+
+
+def show_sensor_bench(figures: Mapping[str, Any]) -> None:
+    """Print milliseconds of the sensors' stages and their ratios."""
+    console = Console(highlight=False)
+    table = Table(box=None, padding=(0, 1))
+    for heading in ("what", "ms"):
+        table.add_column(heading, justify="left" if heading == "what" else "right")
+    for what, milliseconds in figures["milliseconds"].items():
+        table.add_row(what, f"{milliseconds:.3f}")
+    console.print(table)
+    for what, ratio in figures["ratios"].items():
+        console.print(f"{what}: {ratio:.2f}")
 
 
 def _at(table: Mapping[str, Any], key: str) -> Any:

@@ -8,8 +8,54 @@ import sys
 from typing import Any
 
 import mujoco
+import numpy as np
+from numpy.typing import NDArray
 
 from dockair.errors import MachineError
+from dockair.sim.opengl import REMEDY
+
+_SMALLEST_FONT = 50
+
+
+class Canvas:
+    """A context, MuJoCo's renderer and its off-screen buffer.
+
+    Args:
+        model: whose meshes and textures can be drawn.
+        width: of the buffer [px].
+        height: of the buffer [px].
+        where: who asks, for the error.
+        font: MuJoCo's font scale.
+
+    Raises:
+        MachineError: no off-screen OpenGL here.
+    """
+
+    def __init__(self, model: mujoco.MjModel, width: int, height: int, where: str, font: int = _SMALLEST_FONT) -> None:
+        self._context, self._renderer = open_renderer(model, width, height, font, where)
+
+    def render(
+        self, scene: mujoco.MjvScene, colours: NDArray[np.uint8], depths: NDArray[np.float32] | None = None
+    ) -> None:
+        """Draw a scene into the buffer's lower left and read it, rows running upward.
+
+        Args:
+            scene: what is drawn.
+            colours: (rows, columns, 3), filled.
+            depths: (rows, columns), filled with OpenGL's depth, 0 near to 1 far.
+        """
+        rect = mujoco.MjrRect(0, 0, colours.shape[1], colours.shape[0])
+        self._context.make_current()
+        mujoco.mjr_render(rect, scene, self._renderer)
+        mujoco.mjr_readPixels(colours, depths, rect, self._renderer)
+
+    def close(self) -> None:
+        """Free renderer and context; twice is once."""
+        if self._context is not None:
+            self._context.make_current()
+            self._renderer.free()
+            self._context.free()
+        self._context = self._renderer = None
 
 
 def gl_context(width: int, height: int) -> Any:
@@ -45,11 +91,7 @@ def open_renderer(model: mujoco.MjModel, width: int, height: int, font: int, whe
     except Exception as error:  # whatever the driver's loader raises, the cause is the machine
         if context is not None:
             context.free()
-        raise MachineError(
-            where,
-            expected=f"an off-screen OpenGL context ({error})",
-            remedy="install libegl1 libgl1-mesa-dri libopengl0 (Debian, Ubuntu: apt-get install)",
-        ) from error
+        raise MachineError(where, expected=f"an off-screen OpenGL context ({error})", remedy=REMEDY) from error
     finally:
         quality.offsamples = samples
     mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, renderer)

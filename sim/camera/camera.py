@@ -1,16 +1,18 @@
 """The near-infrared camera: one exposure of the world, from radiance to the message that leaves the camera.
 
-    background (sky, scene, haze) + stray light + Sun's disc + point sources ► expected electrons
+    sky and scene in haze ► stray light of the Sun ► its disc ► point sources ► expected electrons
     expected electrons ► electronics ► pixels ► exposure control ► exposure of the next frame
 
-Point sources are LEDs, glints of the Sun, reflections of the LEDs and compact ghosts, each spread by `optics`, and
-smeared over the exposure by the motion of what they sit on. The image of an LED is hidden when something lies between
-it and the lens; then it is absent, as are LEDs outside the picture.
+Point sources are the LEDs, their reflections and the Sun's, each spread by `optics` and smeared over the exposure by the
+motion of what it sits on. An LED is hidden when something lies between it and the lens.
 
 Time: `expose` is called with the world at the middle of the exposure; the frame arrives `latency_s` later.
+Not modelled: motion of background and Sun during an exposure; glints move as if they stuck to their surfaces.
 """
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -18,20 +20,303 @@ from numpy.typing import NDArray
 
 from dockair.errors import DockairError
 from dockair.messages import CameraFrame, Window
+from dockair.parameters import load_parameters
 from dockair.rotations import Array
 from dockair.sim.as_built import AsBuilt
-from dockair.sim.camera import sheets
+from dockair.sim.camera import sheets as sheet
 from dockair.sim.camera.background import Background
+from dockair.sim.camera.dirt import Dirt
 from dockair.sim.camera.electronics import digitise, output_gain
 from dockair.sim.camera.exposure import ExposureControl
 from dockair.sim.camera.fixed_pattern import FixedPattern
 from dockair.sim.camera.glare import Glare
-from dockair.sim.camera.glints import Mirrors, find_glints
-from dockair.sim.camera.led_reflections import find_led_reflections
-from dockair.sim.camera.occlusion import hidden
 from dockair.sim.camera.optics import PointSpread
-from dockair.sim.camera.radiometry import led_electrons, responses
+from dockair.sim.camera.point_sources import PointSources, Sources
+from dockair.sim.camera.radiometry import extinction_1_m, led_wavelength_m, responses
 from dockair.sim.camera.readout import latency_s, transfer_jitter_s
-from dockair.sim.camera.sky import Sky
+from dockair.sim.camera.sky import Sky, Weather
 from dockair.sim.camera.sun_view import SunView
-from dockair.sim.faults import Faults
+from dockair.sim.faults import CameraFault, Faults, hot_pixel_places
+from dockair.streams import counter_key, random_stream
+
+_FAINTEST_E = 0.5  # a whole blob with fewer electrons is left out
+_EDGE_SIGMAS = 6.0  # how far the blurred edge of the Sun's disc is drawn
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class CameraSheets:
+    """All parameter sheets of a camera and of the light it works in; field names are the sheets'."""
+
+    lens: sheet.LensParameters
+    filter: sheet.FilterParameters
+    sensor: sheet.SensorParameters
+    exposure: sheet.ExposureParameters
+    leds: sheet.LedParameters
+    light: sheet.LightParameters
+    glare: sheet.GlareParameters
+    surfaces: sheet.SurfaceParameters
+    sky: sheet.SkyParameters
+    background: sheet.BackgroundParameters
+
+    @classmethod
+    def load(
+        cls, filter_name: str = "long_pass", overrides: Mapping[str, Mapping[str, Any]] | None = None
+    ) -> "CameraSheets":
+        """Read all sheets.
+
+        Args:
+            filter_name: "long_pass" or "band_pass".
+            overrides: sheet -> key -> value instead of the sheet's.
+        """
+        loaded: dict[str, Any] = {}
+        for entry in fields(cls):
+            name = f"filter_{filter_name}" if entry.name == "filter" else entry.name
+            loaded[entry.name] = load_parameters(name, entry.type, (overrides or {}).get(name))  # type: ignore[arg-type]
+        return cls(**loaded)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class CameraNoise:
+    """Where a camera's random numbers come from: keys of those that are functions of a place, streams of the others."""
+
+    image: int
+    fixed_pattern: int
+    hot_pixels: int
+    clouds: int
+    transfer: np.random.Generator
+    dirt: np.random.Generator
+
+    @classmethod
+    def of(cls, seed: int) -> "CameraNoise":
+        """Return the named streams of a scenario's seed."""
+        return cls(
+            image=counter_key(seed, "image"),
+            fixed_pattern=counter_key(seed, "fixed_pattern"),
+            hot_pixels=counter_key(seed, "hot_pixels"),
+            clouds=counter_key(seed, "clouds"),
+            transfer=random_stream(seed, "frame_transfer"),
+            dirt=random_stream(seed, "dirt"),
+        )
+
+
+class NearInfraredCamera:
+    """A camera as built, on the receiver. It reads the world and changes nothing in it.
+
+    Args:
+        sheets: nominal parameters.
+        as_built: the hardware.
+        noise: of `CameraNoise.of`.
+        model: the world's, with bodies "receiver" and "drogue".
+        sun_direction_W: (3,) unit vector toward the Sun; None for no Sun.
+        weather: clouds, haze, night.
+        altitude_m: of the flight.
+        faults: what breaks, and when.
+        automatic_exposure: whether the camera sets its exposure itself.
+        background: "mujoco", "analytic", or "auto" for the first that this machine has.
+    """
+
+    def __init__(
+        self,
+        sheets: CameraSheets,
+        as_built: AsBuilt,
+        noise: CameraNoise,
+        model: mujoco.MjModel,
+        *,
+        sun_direction_W: Array | None,
+        weather: Weather | None = None,
+        altitude_m: float = 6000.0,
+        faults: Faults | None = None,
+        automatic_exposure: bool = True,
+        background: str = "auto",
+    ) -> None:
+        weather = weather or Weather()
+        self._sheets, self._as_built, self._noise = sheets, as_built, noise
+        self._faults = faults or Faults((), len(as_built.led_intensity_w_sr))
+        self._receiver = model.body("receiver").id
+        camera = as_built.camera
+        elevation = np.pi / 2.0 if sun_direction_W is None else float(np.arcsin(sun_direction_W[2]))
+        self._response = responses(
+            sheets.lens,
+            sheets.filter,
+            sheets.sensor,
+            sheets.leds,
+            sheets.light,
+            camera,
+            altitude_m=altitude_m,
+            sun_elevation_rad=elevation,
+        )
+        wavelength = led_wavelength_m(sheets.leds)
+        self._spread = PointSpread(sheets.lens, sheets.sensor, camera, wavelength)
+        self._sky = Sky(sheets.sky, weather, sun_direction_W, altitude_m, noise.clouds)
+        self._extinction_1_m = extinction_1_m(weather.visibility_m)
+        self._background = Background(model, camera, sheets.background, self._sky, background)
+        self._sun: SunView | None = None
+        if sun_direction_W is not None:
+            sun_W = np.array(sun_direction_W, dtype=float)
+            margin = _EDGE_SIGMAS * self._spread.edge_sigma_px()
+            self._sun = SunView(model, camera, self._sky, sun_W, sheets.light.sun_angular_radius_rad, margin)
+            self._glare = Glare(sheets.glare, sheets.lens, camera, sheets.light, self._response, wavelength)
+        self._sources = PointSources(model, sheets, as_built, self._response, self._sun, self._extinction_1_m)
+        self._pattern = FixedPattern(sheets.sensor, noise.fixed_pattern, camera.height_px, camera.width_px)
+        self._control = ExposureControl(sheets.exposure, sheets.sensor, automatic=automatic_exposure)
+        self._dirt: tuple[float, Dirt | None] = 0.0, None
+        self._last: CameraFrame | None = None
+
+    def expose(self, data: mujoco.MjData, time_s: float, frame_number: int, window: Window | None) -> CameraFrame | None:
+        """Return the frame of the world as it stands; None when the camera has dropped out.
+
+        Args:
+            data: positions and velocities up to date (mj_step1 or mj_forward); only read.
+            time_s: middle of the exposure.
+            frame_number: which of the noise's frames this is.
+            window: what to read; None for the full frame.
+
+        Raises:
+            DockairError: the window is not inside the sensor.
+            MachineError: no off-screen OpenGL here, and the background is to be drawn with it.
+        """
+        window = self._checked(window)
+        fault = self._faults.camera(time_s)
+        if fault.dropped:
+            return None
+        if fault.stuck and self._last is not None:
+            return replace(self._last, time_stamp_s=time_s)
+        exposure_s = self.exposure_s(fault)
+        start = window.row_start, window.column_start
+        expected = self.expected_electrons(data, window, time_s, exposure_s)
+        pixels = digitise(
+            expected, self._sheets.sensor, self._pattern, self._noise.image, frame_number, start, exposure_s
+        )
+        self._whiten(pixels, window, fault.hot_pixels)
+        self._control.step(pixels, exposure_s)
+        pixels.setflags(write=False)
+        self._last = CameraFrame(
+            time_stamp_s=time_s,
+            pixels=pixels,  # type: ignore[arg-type]  # 8 bits
+            window=window,
+            exposure_s=exposure_s,
+            gain=output_gain(self._sheets.sensor),
+        )
+        return self._last
+
+    @property
+    def background(self) -> str:
+        """Which background is in use: "mujoco" or "analytic"."""
+        return self._background.backend
+
+    def exposure_s(self, fault: CameraFault | None = None) -> float:
+        """Exposure of the next frame [s]."""
+        stuck_at = None if fault is None else fault.exposure_s
+        return self._control.exposure_s if stuck_at is None else stuck_at
+
+    def latency_s(self, frame: CameraFrame) -> float:
+        """Draw the time [s] from the frame's stamp until it has arrived."""
+        sensor = self._sheets.sensor
+        return latency_s(frame.window, sensor, frame.exposure_s) + transfer_jitter_s(sensor, self._noise.transfer)
+
+    def reset(self) -> None:
+        """Forget the frames so far: the exposure is the first one again."""
+        self._control.reset()
+        self._last = None
+
+    def close(self) -> None:
+        """Free the OpenGL context."""
+        self._background.close()
+
+    def expected_electrons(
+        self, data: mujoco.MjData, window: Window, time_s: float = 0.0, exposure_s: float | None = None
+    ) -> NDArray[np.float32]:
+        """Return (rows, columns) expected electrons of the window, before any noise or clipping.
+
+        Args:
+            data: as of `expose`.
+            window: inside the sensor.
+            time_s: middle of the exposure, for faults.
+            exposure_s: None for that of the next frame.
+        """
+        exposure_s = self.exposure_s() if exposure_s is None else exposure_s
+        pose = self.pose(data)
+        dirt = self._dirt_at(time_s)
+        veil = 1.0 if dirt is None else dirt.veil_factor
+        sun_C, visible, stray = np.zeros(3), 0.0, None
+        if self._sun is not None:
+            sun_C = pose[0].T @ self._sun.direction_W
+            visible = self._sun.visible(data, pose[1]) if sun_C[0] > 0.0 else 0.0
+            stray = self._glare.stray(sun_C, visible, exposure_s, window, veil)
+        image = self._background.electrons(
+            data,
+            pose,
+            window,
+            self._response.white_e_s * exposure_s,
+            stray=stray,
+            dirt=None if dirt is None else dirt.grid,
+            extinction_1_m=self._extinction_1_m,
+        )
+        start = window.row_start, window.column_start
+        if self._sun is not None and visible > 0.0:
+            self._glare.add_fine(image, start, sun_C, visible, exposure_s, veil)
+            patch = self._sun.patch(data, pose)
+            if patch is not None:
+                self._glare.add_disc(image, start, sun_C, *patch, exposure_s, self._spread.edge_sigma_px())
+        factors = self._faults.led_factors(time_s, exposure_s)
+        for sources in self._sources.of(data, pose, exposure_s, factors):
+            self._add(image, start, sources, dirt)
+        return image
+
+    def pose(self, data: mujoco.MjData) -> tuple[Array, Array]:
+        """Return R_WC (3, 3) and p_WC (3,) of the camera as built [m]."""
+        R_WB = data.xmat[self._receiver].reshape(3, 3)
+        mounting = self._as_built.mounting
+        return R_WB @ mounting.R_BC, data.xpos[self._receiver] + R_WB @ mounting.p_BC
+
+    def led_pixels(self, data: mujoco.MjData) -> Array:
+        """(n, 2) where the lens puts the LEDs on the sensor, hidden or not [px]: truth, for logs and tests."""
+        R_WC, p_WC = self.pose(data)
+        return self._as_built.camera.pixels_from_points((self._sources.leds_W(data) - p_WC) @ R_WC)
+
+    def visible_leds(self, data: mujoco.MjData) -> NDArray[np.bool_]:
+        """(n,) which LEDs nothing hides from the lens: truth, for logs and tests. Outside the picture counts too."""
+        return self._sources.visible_leds(data, self.pose(data)[1])
+
+    def _add(self, image: NDArray[np.float32], start: tuple[int, int], sources: Sources, dirt: Dirt | None) -> None:
+        """Splat the sources that are bright enough and in front of the lens."""
+        kept = (sources.p_C[:, 0] > 0.0) & (sources.electrons > _FAINTEST_E)
+        if not kept.any():
+            return
+        camera, p_C, way = self._as_built.camera, sources.p_C[kept], 0.5 * sources.way_C_m[kept]
+        pixels = camera.pixels_from_points(p_C)
+        smear = camera.pixels_from_points(p_C + way) - camera.pixels_from_points(p_C - way)
+        electrons = sources.electrons[kept]
+        if dirt is not None:
+            electrons = electrons * dirt.at(pixels)
+        self._spread.splat(image, start, pixels, electrons, p_C[:, 0], sources.size_m, smear)
+
+    def _dirt_at(self, time_s: float) -> Dirt | None:
+        cover = self._faults.camera(time_s).dirt_cover
+        if cover != self._dirt[0]:
+            rng = np.random.Generator(type(self._noise.dirt.bit_generator)())
+            rng.bit_generator.state = self._noise.dirt.bit_generator.state  # the same smudges whatever their cover
+            dirt = Dirt(self._sheets.glare, self._as_built.camera, rng, cover) if cover > 0.0 else None
+            self._dirt = cover, dirt
+        return self._dirt[1]
+
+    def _whiten(self, pixels: NDArray[np.unsignedinteger], window: Window, count: int) -> None:
+        if count == 0:
+            return
+        camera = self._as_built.camera
+        places = hot_pixel_places(self._noise.hot_pixels, count, camera.height_px, camera.width_px)
+        places = places - (window.row_start, window.column_start)
+        places = places[((places >= 0) & (places < pixels.shape)).all(axis=1)]
+        pixels[places[:, 0], places[:, 1]] = np.iinfo(pixels.dtype).max
+
+    def _checked(self, window: Window | None) -> Window:
+        full = self._as_built.camera.full_window
+        if window is None:
+            return full
+        inside = (
+            0 <= window.row_start < window.row_stop <= full.row_stop
+            and 0 <= window.column_start < window.column_stop <= full.column_stop
+        )
+        if not inside:
+            raise DockairError("camera.window", expected=f"a window inside {full}", got=window)
+        return window

@@ -40,6 +40,7 @@ from scipy.special import ndtr, ndtri
 from dockair.rotations import Array
 
 _OCTAVES = 12  # 4096:1; the footprint ends the sum earlier
+_FINEST = 2.0  # lattice over footprint at which an octave has faded out, from twice that on
 _THICKEST = 4.0  # standard deviations that the threshold keeps away from an endless one (cover 0 or 1)
 _DIFFRACTED = 0.5  # share of the extinction: geometric optics' paradox
 _TURN = math.cos(0.65), math.sin(0.65)  # octave against octave, so that their lattices do not line up
@@ -176,10 +177,10 @@ def _fractal(u: Array, v: Array, size: Array, gain: float, key: np.uint64, out: 
     for n in range(len(out)):
         total, amplitude, x, y, cells = 0.0, 1.0, u[n], v[n], size[n]
         for octave in range(_OCTAVES):
-            if cells <= 1.0:
+            if cells <= _FINEST:
                 break
             seed = (key + np.uint64(octave)) * np.uint64(0xD1342543DE82EF95)
-            total += amplitude * min(cells - 1.0, 1.0) * _noise(x, y, seed)
+            total += amplitude * min(cells / _FINEST - 1.0, 1.0) * _noise(x, y, seed)
             x, y = 2.0 * (cos * x - sin * y) + 0.37, 2.0 * (sin * x + cos * y) + 0.71
             amplitude, cells = gain * amplitude, 0.5 * cells
         out[n] = total

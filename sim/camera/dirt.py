@@ -1,11 +1,12 @@
 """Dirt on the window before the lens: smudges far out of focus that dim what is behind them and spread sunlight.
 
     g = G(s_1) * n_1 + G(s_2) * n_2 + ...        white noise n_k smoothed by Gaussians G of smudge size, variance 1 (1)
-    T = 1 - (1 - T_min) min((g - g_c)/d, 1)      where g > g_c, else 1                                           (2)
+    h = max(g - g_c, 0)/d,   T = 1 - (1 - T_min) h^2/(1 + h^2)                                                   (2)
     veil and halo grow by   1 + scatter (1 - mean T)/(veil + halo)                                               (3)
 
 g_c is the quantile of g that leaves the part `cover` of the frame above it, so that more cover contains less; d is the
-fixed width of a smudge's slope. Of the light that dirt takes, the part `scatter` returns as veil and halo.
+thickness at which a smudge is half as dark as it can be. Of the light that dirt takes, the part `scatter` returns as
+veil and halo.
 
 Not modelled: that smudges move with the aperture's parallax; what they spread of LEDs (their halo stays unseen).
 Not valid for drops that focus light.
@@ -21,7 +22,7 @@ from dockair.rotations import Array
 from dockair.sim.camera.coarse_grid import SPACING_PX, CoarseGrid, nodes_around
 from dockair.sim.camera.sheets import GlareParameters
 
-_SIGMA_OF_SIZE = 0.25  # a Gaussian of this times a smudge's width makes blobs of about that width
+_SIGMA_OF_SIZE = 0.3  # a Gaussian of this times a smudge's width makes blobs of about that width
 _SIZES = 3  # smudge sizes between smallest and largest, in equal ratios
 
 
@@ -41,8 +42,8 @@ class Dirt:
         first, shape = nodes_around(camera.full_window)
         field = _field(parameters, camera.focal_length_px, rng, shape)
         edge = float(np.quantile(field, 1.0 - cover)) if cover > 0.0 else np.inf
-        depth = np.clip((field - edge) / parameters.dirt_slope, 0.0, 1.0)
-        values = (1.0 - (1.0 - parameters.dirt_darkest) * depth).astype(np.float32)
+        thick = np.maximum(field - edge, 0.0) / parameters.dirt_slope  # h of Eq. (2)
+        values = (1.0 - (1.0 - parameters.dirt_darkest) * thick**2 / (1.0 + thick**2)).astype(np.float32)
         values.setflags(write=False)
         self.grid = CoarseGrid(values, first)  #: transmittance of the whole sensor
         taken = 1.0 - float(values.mean(dtype=float))

@@ -81,9 +81,7 @@ class Ghosts:
         k = self._compact
         return CompactGhosts(self.places(sun_px)[k], electrons * self._f[k], self._radius[k])
 
-    def add_to_grid(
-        self, values: NDArray[np.float32], first: tuple[int, int], sun_px: Array, electrons: float
-    ) -> None:
+    def add_to_grid(self, values: NDArray[np.float32], first: tuple[int, int], sun_px: Array, electrons: float) -> None:
         """Add the large ones to nodes (m, n) [e-/px], in place; arguments as of `Halo.add_to_grid`."""
         self._add(values, first, SPACING_PX, sun_px, electrons, ~self._compact)
 

@@ -102,7 +102,7 @@ class Glare:
         T, g = self._transmittance, self._parameters.veiling_glare
         parts = {
             "disc": T * (1.0 - self._wing),
-            "halo": T * self._halo.share,
+            "halo": T * float(self._halo.shares.sum()),
             "spikes": T * self._spikes.share,
             "veil": T * g,
             "ghosts": T * self._ghosts.share,
@@ -128,7 +128,7 @@ class Glare:
         veil = veil_factor * self._parameters.veiling_glare * electrons
         values = np.full(shape, veil / (self._camera.width_px * self._camera.height_px), dtype=np.float32)
         centre = float(sun_px[0]), float(sun_px[1])
-        self._halo.add_to_grid(values, first, centre, veil_factor * electrons)
+        self._halo.add_to_grid(values, first, centre, self._halo_electrons(electrons, veil_factor))
         self._spikes.add_to_grid(values, first, centre, electrons)
         self._ghosts.add_to_grid(values, first, sun_px, electrons)
         return CoarseGrid(values, first)
@@ -155,7 +155,8 @@ class Glare:
         sun_px, electrons = self._source(sun_C, visible * exposure_s)
         if electrons < _FAINTEST_E:
             return
-        self._halo.add_to_pixels(image, start, (float(sun_px[0]), float(sun_px[1])), veil_factor * electrons)
+        centre = float(sun_px[0]), float(sun_px[1])
+        self._halo.add_to_pixels(image, start, centre, self._halo_electrons(electrons, veil_factor))
         self._ghosts.add_to_pixels(image, start, sun_px, electrons)
 
     def compact_ghosts(self, sun_C: Array, visible: float, exposure_s: float) -> CompactGhosts:
@@ -196,6 +197,10 @@ class Glare:
         sun_px = self._image_of(sun_C)
         electrons = self._flux_e_s * float(sun_C[0]) * visible_s
         return sun_px, electrons * math.exp(-((self._outside_rad(sun_px) / self._parameters.veiling_decay_rad) ** 2))
+
+    def _halo_electrons(self, electrons: float, veil_factor: float) -> Array:
+        """(n,) strength of each part of the halo; the last is diffraction, which dirt does not change."""
+        return electrons * np.append(np.full(len(self._halo.shares) - 1, veil_factor), 1.0)
 
     def _image_of(self, sun_C: Array) -> Array:
         """(2,) pixel of the Sun; beyond the field, where the distortion's polynomial ends, shifted as at its edge."""

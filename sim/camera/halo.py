@@ -8,8 +8,8 @@ Part k scatters the share w_k of a point's light by a law that falls off as a po
 which is Harvey's law of scatter from polished surfaces (slope -2 p_k, shoulder r_k). The Sun's is (1) averaged over
 the disc of radius R about r.
 
-Around the disc it is too steep for the nodes of a coarse grid. Within r_b = 96 pixels the grid carries the parabola that
-continues it with its slope, and the rest is added pixel by pixel:
+Around the disc it is too steep for the nodes of a coarse grid. Within r_b = 96 pixels the grid carries the parabola
+that continues it with its slope, and the rest is added pixel by pixel:
 
     grid:  h(r_b) + h'(r_b) (r^2 - r_b^2)/(2 r_b),      pixels:  h(r) - grid                                     (3)
 
@@ -37,7 +37,7 @@ _DISC_NODES = 16  # of the quadrature over the Sun's disc, in radius and in angl
 
 
 class Halo:
-    """Tables of the Sun's halo per unit of its flux.
+    """Tables of the Sun's halo per unit of its flux, part by part.
 
     Args:
         shares: (n,) w_k.
@@ -47,34 +47,35 @@ class Halo:
     """
 
     def __init__(self, shares: Array, cores_px: Array, exponents: Array, sun_radius_px: float) -> None:
-        self.share = float(np.sum(shares))  #: of the flux, over the whole plane
+        self.shares = np.asarray(shares, dtype=float)  #: (n,) of the flux, each over the whole plane
         self.near_px = max(_NEAR_PX, _NEAR_RADII * sun_radius_px)  #: r_b
-        self._law = np.asarray(shares, dtype=float), np.asarray(cores_px, dtype=float), np.asarray(exponents)
+        self._law = self.shares, np.asarray(cores_px, dtype=float), np.asarray(exponents, dtype=float)
         self._sun_radius = sun_radius_px
         x = np.arange(_CELLS) / _CELLS
         r = _KNEE_PX * x / (1.0 - x)
-        law = self.density(r)
+        law = self.densities(r)
         b, step = self.near_px, 1e-3 * self.near_px
-        low, at, high = self.density(np.array([b - step, b, b + step]))
+        low, at, high = self.densities(np.array([b - step, b, b + step])).T[:, :, None]
         grid = np.where(r < b, at + (high - low) / (4.0 * step * b) * (r**2 - b**2), law)
-        self._grid, self._rest = np.append(grid, 0.0), np.append(law - grid, 0.0)  # 0 at infinity
+        infinity = np.zeros((len(law), 1))
+        self._grid, self._rest = np.hstack([grid, infinity]), np.hstack([law - grid, infinity])
 
-    def density(self, r_px: Array) -> Array:
-        """(n,) part of the flux per square pixel at distances r_px (n,) from the middle of the Sun's image."""
+    def densities(self, r_px: Array) -> Array:
+        """(n, m) flux of each part per square pixel at distances r_px (m,) from the middle of the Sun's image."""
         shares, cores, exponents = self._law
         nodes, weights = np.polynomial.legendre.leggauss(_DISC_NODES)
         s = self._sun_radius * np.sqrt(0.5 * (nodes + 1.0))  # even in area
         angle = np.pi * (np.arange(_DISC_NODES) + 0.5) / _DISC_NODES
         r = np.asarray(r_px, dtype=float)[:, None, None]
         squared = r**2 + s[:, None] ** 2 + 2.0 * r * s[:, None] * np.cos(angle)
-        total = np.zeros(len(squared))
-        for w, core, p in zip(shares, cores, exponents, strict=True):
+        parts = np.empty((len(shares), len(squared)))
+        for k, (w, core, p) in enumerate(zip(shares, cores, exponents, strict=True)):
             law = w * (p - 1.0) / (np.pi * core**2) * (1.0 + squared / core**2) ** -p  # Eq. (1)
-            total += np.einsum("i,nij->n", 0.5 * weights, law) / _DISC_NODES
-        return total
+            parts[k] = np.einsum("i,nij->n", 0.5 * weights, law) / _DISC_NODES
+        return parts
 
     def add_to_grid(
-        self, values: NDArray[np.float32], first: tuple[int, int], centre: tuple[float, float], electrons: float
+        self, values: NDArray[np.float32], first: tuple[int, int], centre: tuple[float, float], electrons: Array
     ) -> None:
         """Add the smooth part of Eq. (3) to nodes, in place.
 
@@ -82,12 +83,12 @@ class Halo:
             values: (m, n) [e-/px].
             first: of the grid.
             centre: (u, v) of the Sun's image.
-            electrons: its flux.
+            electrons: (n,) the flux that each part is a share of.
         """
-        _add_to_grid(values, first, SPACING_PX, centre, electrons, _KNEE_PX, self._grid)
+        _add_to_grid(values, first, SPACING_PX, centre, _KNEE_PX, electrons @ self._grid)
 
     def add_to_pixels(
-        self, image: NDArray[np.float32], start: tuple[int, int], centre: tuple[float, float], electrons: float
+        self, image: NDArray[np.float32], start: tuple[int, int], centre: tuple[float, float], electrons: Array
     ) -> None:
         """Add the rest of Eq. (3) to expected electrons, in place.
 
@@ -95,9 +96,9 @@ class Halo:
             image: (rows, columns) of the window.
             start: (row, column) of its first pixel on the sensor.
             centre: (u, v) of the Sun's image.
-            electrons: its flux.
+            electrons: (n,) the flux that each part is a share of.
         """
-        _add_to_pixels(image, start, centre, self.near_px, electrons, _KNEE_PX, self._rest)
+        _add_to_pixels(image, start, centre, self.near_px, _KNEE_PX, electrons @ self._rest)
 
 
 @njit(cache=True)
@@ -106,7 +107,6 @@ def _add_to_grid(
     first: tuple[int, int],
     spacing: int,
     centre: tuple[float, float],
-    electrons: float,
     knee: float,
     table: Array,
 ) -> None:
@@ -118,7 +118,7 @@ def _add_to_grid(
             r = math.sqrt(du * du + dv * dv)
             x = cells * (r / (r + knee))
             k = min(int(x), cells - 1)
-            values[i, j] += electrons * (table[k] + (x - k) * (table[k + 1] - table[k]))
+            values[i, j] += table[k] + (x - k) * (table[k + 1] - table[k])
 
 
 @njit(cache=True)
@@ -127,7 +127,6 @@ def _add_to_pixels(
     start: tuple[int, int],
     centre: tuple[float, float],
     reach: float,
-    electrons: float,
     knee: float,
     table: Array,
 ) -> None:
@@ -144,4 +143,4 @@ def _add_to_pixels(
             d = math.sqrt(du * du + dv * dv)
             x = cells * (d / (d + knee))
             k = min(int(x), cells - 1)
-            image[r - start[0], c - start[1]] += electrons * (table[k] + (x - k) * (table[k + 1] - table[k]))
+            image[r - start[0], c - start[1]] += table[k] + (x - k) * (table[k + 1] - table[k])

@@ -5,6 +5,7 @@ linear. Cores [point_spread] are made when they are first needed, at steps of 1/
 pixel, and interpolated by a parabola.
 """
 
+import math
 from dataclasses import replace
 from typing import Final
 
@@ -15,11 +16,10 @@ from dockair.calibration import Camera
 from dockair.rotations import Array
 from dockair.sim.camera.point_spread import Spread, airy_px, blur_px, core, transfer
 from dockair.sim.camera.sheets import LensParameters, SensorParameters
-from dockair.sim.camera.splat import splat
+from dockair.sim.camera.splat import Tables, splat
 
 NEAREST_M: Final = 0.5  #: nearer points are as blurred as at this depth
-_STEP_PX = 0.5  # growth of the disc or of the die's image between two tabulated depths ...
-_STEP_RINGS = 1.2  # ... but no more than this many q: a disc's middle brightens and darkens again within 8 q
+_STEP_PX = 0.5  # growth of the disc or of the die's image between two tabulated depths
 _SIZES = 8  # of sources whose cores are kept
 _EDGE_NODES = 4096
 
@@ -66,7 +66,8 @@ class PointSpread:
             if len(self._cores) == _SIZES:
                 del self._cores[next(iter(self._cores))]
             cores = self._cores[size_m] = _Cores(self._lens, self._camera, self._sharp, size_m)
-        levels = cores.levels(depth_m)
+        levels = cores.levels(np.asarray(depth_m, dtype=float))
+        pixels, electrons, smear_px = (np.ascontiguousarray(a, dtype=float) for a in (pixels, electrons, smear_px))
         splat(image, start, pixels, electrons, smear_px, levels, cores.tables, self._sharp.wing)
 
     def edge_sigma_px(self) -> float:
@@ -78,28 +79,29 @@ class PointSpread:
         f = (np.arange(_EDGE_NODES) + 0.5) / (_EDGE_NODES * self._sharp.airy)
         line = transfer(f, self._sharp.airy, blur) * np.exp(-2.0 * (np.pi * self._sharp.diffusion * f) ** 2)
         slope = 2.0 * float((line * np.sinc(f)).sum()) * (f[1] - f[0])
-        return 1.0 / (np.sqrt(2.0 * np.pi) * slope)
+        return 1.0 / (math.sqrt(2.0 * math.pi) * slope)
 
 
 class _Cores:
     """Cores of one size of source, at whole levels of 1/x."""
 
     def __init__(self, lens: LensParameters, camera: Camera, sharp: Spread, size_m: float) -> None:
-        ends = np.array([0.0, 1.0 / NEAREST_M])
-        growth = max(float(np.ptp(blur_px(lens, camera, ends))), camera.focal_length_px * size_m / NEAREST_M)
-        step = min(_STEP_PX, _STEP_RINGS * sharp.airy)
-        inverse_depth = np.linspace(*ends, max(int(np.ceil(growth / step)), 2) + 1)
-        self._levels_m = 1.0 / inverse_depth[1]
+        nearest = 1.0 / NEAREST_M
+        growth = float(np.ptp(blur_px(lens, camera, np.array([0.0, nearest]))))
+        growth = max(growth, camera.focal_length_px * size_m * nearest)
+        inverse_depth = np.linspace(0.0, nearest, max(int(np.ceil(growth / _STEP_PX)), 2) + 1)
+        self._levels_m = 1.0 / inverse_depth[1]  # level = this / depth
         self._sharp = sharp
         self._blurs, self._dies = blur_px(lens, camera, inverse_depth), camera.focal_length_px * size_m * inverse_depth
         self._made = np.zeros(len(inverse_depth), dtype=np.bool_)
         self._begins = np.zeros(len(inverse_depth), dtype=np.int64)
         spreads = [self._spread(k) for k in range(len(inverse_depth))]
-        self._half_widths, self._phases = (np.array(a) for a in zip(*((s.half_width, s.phases) for s in spreads)))
+        self._half_widths = np.array([spread.half_width for spread in spreads])
+        self._phases = np.array([spread.phases for spread in spreads])
         self._pool = np.zeros(0, dtype=np.float32)
 
     @property
-    def tables(self) -> tuple[NDArray[np.float32], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    def tables(self) -> Tables:
         """What `splat` reads."""
         return self._pool, self._begins, self._half_widths, self._phases
 

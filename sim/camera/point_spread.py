@@ -69,9 +69,14 @@ class Spread:
         return _PHASES if self.blur + self.die < _WIDE_PX else _PHASES_WIDE
 
     @property
+    def margin(self) -> float:
+        """How far the core reaches beyond the disc and the die's image."""
+        return max(_CORE_PX, _CORE_RINGS * self.airy)
+
+    @property
     def half_width(self) -> int:
         """Radius of the core."""
-        return math.ceil(max(_CORE_PX, _CORE_RINGS * self.airy) + 0.5 * self.blur + math.sqrt(0.5) * self.die)
+        return math.ceil(self.margin + 0.5 * self.blur + math.sqrt(0.5) * self.die)
 
 
 def airy_px(lens: LensParameters, camera: Camera, wavelength_m: float) -> float:
@@ -124,7 +129,8 @@ def core(spread: Spread) -> NDArray[np.float32]:
     half, phases = spread.half_width, spread.phases
     fine = _core_on_fine_grid(spread)
     at = np.abs(phases * np.arange(-half, half + 1) - np.arange(phases // 2 + 1)[:, None])  # (p, n), into the fine grid
-    fade = np.clip(2.0 - 2.0 * np.hypot(at[:, None, :, None], at[:, None, :]) / (phases * half), 0.0, 1.0)
+    radius = np.hypot(at[:, None, :, None], at[:, None, :]) / phases
+    fade = np.clip((half - radius) / (0.5 * spread.margin), 0.0, 1.0)
     fade *= fade * (3.0 - 2.0 * fade)
     planes = fine[at[:, None, :, None], at[:, None, :]] * fade
     A, w = spread.wing

@@ -176,6 +176,29 @@ class SkyParameters:
 
     zenith: float
     horizon: float
+    aureole: float
+    aureole_decay_1_rad: float
+    molecular: float
+    night: float
+    cloud_height_m: float
+    cloud_cell_m: float
+    cloud_aspect: float
+    cloud_spectral_exponent: float
+    cloud_asymmetry: float
+    droplet_radius_m: float
+    wavelength_m: float
+    deck_cover: float
+    deck_top_m: float
+    deck_cell_m: float
+    deck_optical_depth: float
+    ground_reflectance: float
+    ground_contrast: float
+    ground_cell_m: float
+    aerosol_optical_depth: float
+    aerosol_scale_m: float
+    haze_depth_m: float
+    clear_visibility_m: float
+    earth_radius_m: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -47,7 +47,7 @@ class DirectionTable:
         _mark(R, columns, rows, stride, cells, wanted)
         for row, column in np.argwhere(wanted & ~self._is_known):
             self._compute(int(row), int(column))
-        _sample(self._values, R, columns, rows, out)
+        _sample(self._values.ravel(), cells + 1, R, columns, rows, out)
 
     def _compute(self, row: int, column: int) -> None:
         """Tabulate a tile."""
@@ -74,41 +74,44 @@ def _largest_step(x: Array) -> float:
 
 
 @njit(cache=True, error_model="numpy")
-def _node(
-    x: np.float32, y: np.float32, z: np.float32, half: np.float32
-) -> tuple[np.float32, np.float32]:
-    """Fractional row and column of a direction of any length, Eq. (1)."""
-    one = np.float32(1.0)
-    scale = one / (abs(x) + abs(y) + abs(z))
+def _node(x: np.float32, y: np.float32, z: np.float32, half: np.float32) -> tuple[np.float32, np.float32]:
+    """Fractional row and column of a direction of any length, Eq. (1); half is that of straight ahead."""
+    zero = np.float32(0.0)
+    scale = half / (abs(x) + abs(y) + abs(z))
     p_y, p_z = y * scale, z * scale
-    if x < np.float32(0.0):
-        q_y = one - abs(p_z)
-        q_z = one - abs(p_y)
-        p_y = q_y if p_y >= np.float32(0.0) else -q_y
-        p_z = q_z if p_z >= np.float32(0.0) else -q_z
-    return (one - p_z) * half, (one - p_y) * half
+    q_y, q_z = half - abs(p_z), half - abs(p_y)
+    q_y, q_z = (q_y if p_y >= zero else -q_y), (q_z if p_z >= zero else -q_z)
+    return half - (q_z if x < zero else p_z), half - (q_y if x < zero else p_y)
 
 
 @njit(cache=True, error_model="numpy")
 def _sample(
-    values: NDArray[np.float32], R: Array, x: NDArray[np.float32], y: Array, out: NDArray[np.float32]
+    values: NDArray[np.float32], n: int, R: Array, x: NDArray[np.float32], y: Array, out: NDArray[np.float32]
 ) -> None:
-    """Bilinear values toward (1, -x_j, -y_i); float32, the same sums for a block wherever its array begins."""
-    last = np.int32(values.shape[0] - 2)
-    half = np.float32(0.5 * (values.shape[0] - 1))
+    """Bilinear values toward (1, -x_j, -y_i) from (n n,) nodes; float32, the same sums wherever an array begins.
+
+    Places first, values second: only the first loop becomes vector code, and only if it stands alone.
+    """
+    last, width = np.int32(n - 2), np.int32(n)
+    half = np.float32(0.5 * (n - 1))
     b_x, b_y, b_z = np.float32(R[0, 1]), np.float32(R[1, 1]), np.float32(R[2, 1])
-    for i in range(out.shape[0]):
+    corner = np.empty(len(x), dtype=np.int32)
+    down, right = np.empty(len(x), dtype=np.float32), np.empty(len(x), dtype=np.float32)
+    for i in range(len(y)):
         a_x = np.float32(R[0, 0] - y[i] * R[0, 2])
         a_y = np.float32(R[1, 0] - y[i] * R[1, 2])
         a_z = np.float32(R[2, 0] - y[i] * R[2, 2])
-        for j in range(out.shape[1]):
+        for j in range(len(x)):
             v, u = _node(a_x - x[j] * b_x, a_y - x[j] * b_y, a_z - x[j] * b_z, half)
             row, column = max(min(np.int32(v), last), np.int32(0)), max(min(np.int32(u), last), np.int32(0))
-            down, right = v - np.float32(row), u - np.float32(column)
-            top, bottom = values[row], values[row + 1]
-            a = top[column] + right * (top[column + 1] - top[column])
-            b = bottom[column] + right * (bottom[column + 1] - bottom[column])
-            out[i, j] = a + down * (b - a)
+            corner[j] = row * width + column
+            down[j], right[j] = v - np.float32(row), u - np.float32(column)
+        for j in range(len(x)):
+            k = np.uint32(corner[j])
+            below = k + np.uint32(n)
+            a = values[k] + right[j] * (values[k + np.uint32(1)] - values[k])
+            b = values[below] + right[j] * (values[below + np.uint32(1)] - values[below])
+            out[i, j] = a + down[j] * (b - a)
 
 
 @njit(cache=True)

@@ -15,6 +15,7 @@ are the full frame's, bit for bit.
 """
 
 import math
+from typing import TypeAlias
 
 import numpy as np
 from numba import njit
@@ -27,6 +28,9 @@ SHORTEST_SMEAR_PX = 0.02  #: less counts as none: it adds 3e-5 px^2
 _REACH_CORES = 1.5  # the wings reach at least this many half-widths of the core, over which W exceeds (1)'s tail
 _SMEAR_STEPS = 4.0  # blobs per pixel of smear; the wings, smooth over w, need 1/w
 
+#: All cores one after the other; of each level: where its core begins, its half-width, its positions per pixel.
+Tables: TypeAlias = tuple[NDArray[np.float32], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]
+
 
 @njit(cache=True, error_model="numpy")
 def splat(
@@ -36,7 +40,7 @@ def splat(
     electrons: Array,
     smear: Array,
     levels: Array,
-    tables: tuple[NDArray[np.float32], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]],
+    tables: Tables,
     wing: tuple[float, float],
 ) -> None:
     """Add blobs to an image in place.
@@ -48,40 +52,46 @@ def splat(
         electrons: (n,) of each whole blob.
         smear: (n, 2) way of each blob's middle during the exposure [px].
         levels: (n,) depth of each, in steps of the tables.
-        tables: all cores one after the other, where each begins, their half-widths, phases per pixel.
+        tables: at least the three levels around each depth are filled.
         wing: A and w.
     """
     half_widths = tables[2]
     for i in range(pixels.shape[0]):
-        u, v, E = pixels[i, 0], pixels[i, 1], electrons[i]
+        (u, v), E = pixels[i], electrons[i]
         if not (E > 0.0 and math.isfinite(u) and math.isfinite(v)):
             continue
         middle = min(max(int(levels[i] + 0.5), 1), half_widths.shape[0] - 2)
         half = max(half_widths[middle - 1], half_widths[middle], half_widths[middle + 1])
         reach = max((wing[0] * E / FAINTEST_E) ** (1.0 / 3.0), _REACH_CORES * half)
-        du, dv = smear[i, 0], smear[i, 1]
+        du, dv = smear[i]
         length = math.hypot(du, dv)
-        far = reach + length + 1.0
-        if (
-            u + far < start[1]
-            or u - far > start[1] + image.shape[1]
-            or v + far < start[0]
-            or v - far > start[0] + image.shape[0]
-        ):
+        if _is_outside(image, start, u, v, reach + length):
             continue
-        count = 1
-        if length > SHORTEST_SMEAR_PX:
-            count = 2 + int(length / wing[1])
-        step = 1.0 / math.sqrt(max(count * count - 1.0, 1.0))
+        count = 2 + int(length / wing[1]) if length > SHORTEST_SMEAR_PX else 1
         for k in range(count):
-            along = (k - 0.5 * (count - 1)) * step
-            _add_wings(image, start, u + along * du, v + along * dv, E / count, reach, wing)
-        if count > 1:
-            count = 2 + int(_SMEAR_STEPS * length)
-        step = 1.0 / math.sqrt(max(count * count - 1.0, 1.0))
+            a = _along(k, count)
+            _add_wings(image, start, u + a * du, v + a * dv, E / count, reach, wing)
+        count = 2 + int(_SMEAR_STEPS * length) if length > SHORTEST_SMEAR_PX else 1
         for k in range(count):
-            along = (k - 0.5 * (count - 1)) * step
-            _add_core(image, start, u + along * du, v + along * dv, E / count, levels[i], middle, half, tables)
+            a = _along(k, count)
+            _add_core(image, start, u + a * du, v + a * dv, E / count, levels[i], middle, half, tables)
+
+
+@njit(cache=True)
+def _along(k: int, count: int) -> float:
+    """Place of the k-th of `count` blobs along a smear of length 1."""
+    return (k - 0.5 * (count - 1)) / math.sqrt(count * count - 1.0) if count > 1 else 0.0
+
+
+@njit(cache=True)
+def _is_outside(image: NDArray[np.float32], start: tuple[int, int], u: float, v: float, reach: float) -> bool:
+    """Whether a square about (u, v) misses the window."""
+    return (
+        u + reach < start[1]
+        or u - reach > start[1] + image.shape[1] - 1
+        or v + reach < start[0]
+        or v - reach > start[0] + image.shape[0] - 1
+    )
 
 
 @njit(cache=True, error_model="numpy")
@@ -135,16 +145,11 @@ def _add_core(
     level: float,
     middle: int,
     half: int,
-    tables: tuple[NDArray[np.float32], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]],
+    tables: Tables,
 ) -> None:
     """Add the interpolated core about (u, v)."""
     column, row = math.floor(u + 0.5), math.floor(v + 0.5)
-    if (
-        column + half < start[1]
-        or column - half >= start[1] + image.shape[1]
-        or row + half < start[0]
-        or row - half >= start[0] + image.shape[0]
-    ):
+    if _is_outside(image, start, column, row, half):
         return
     core = np.zeros((2 * half + 1, 2 * half + 1), np.float32)
     d = level - middle
@@ -171,7 +176,7 @@ def _gather(
     weight: float,
     right: float,
     down: float,
-    tables: tuple[NDArray[np.float32], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]],
+    tables: Tables,
 ) -> None:
     """Add `weight` x one level's core for a point `right` and `down` [0, 1/2 px] of a pixel's centre."""
     pool, begins, half_widths, phases_per_pixel = tables

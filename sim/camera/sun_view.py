@@ -40,12 +40,16 @@ class SunView:
         sun_W: (3,) unit vector toward the Sun.
         radius_rad: of its disc.
         margin_px: how far the blurred disc reaches beyond its edge.
+
+    Attributes:
+        direction_W: (3,) unit vector toward the Sun.
     """
 
     def __init__(
         self, model: mujoco.MjModel, camera: Camera, sky: Beam, sun_W: Array, radius_rad: float, margin_px: float
     ) -> None:
-        self._model, self._camera, self._sky, self._sun_W = model, camera, sky, sun_W
+        self._model, self._camera, self._sky = model, camera, sky
+        self.direction_W = sun_W
         self._radius_px = camera.focal_length_px * float(np.tan(radius_rad)) + margin_px
         self._disc_W = _disc_directions(sun_W, radius_rad)
         self._dimmed = sky.beam(self._disc_W)
@@ -71,7 +75,7 @@ class SunView:
             falls beside the sensor.
         """
         R_WC, p_WC = pose
-        sun_C = R_WC.T @ self._sun_W
+        sun_C = R_WC.T @ self.direction_W
         if sun_C[0] <= 0.0:
             return None
         u, v = self._camera.pixels_from_points(sun_C[None])[0]

@@ -24,9 +24,13 @@ from numba import njit
 from numpy.typing import NDArray
 
 from dockair.rotations import Array
-from dockair.sim.camera.solids import BALL, BOX, CAPSULE, Haze, Lighting, Solids, depth_limits_m
+from dockair.sim.camera.solids import BALL, BOX, CAPSULE, CYLINDER, Haze, Lighting, Solids, depth_limits_m
 
+_MOST_EDGES = 190  # pairs of 20 points: a box's corners and its edges' cuts
 _PARALLEL = 1e-24  # squared sine below which a ray runs along a tube
+_ON_SIDE = 1.0 - 1e-9  # part of a tube's length that is surely its side
+
+Triple = tuple[float, float, float]
 
 
 class TracedSolids:
@@ -90,33 +94,36 @@ def _trace(
     """Draw every solid; `centres` (n, 3) and `axes` (n, 3, 3) in C, `nearest` (rows, columns) depths so far."""
     kinds, half_sizes, reflectances = solids
     ambient, direct, extinction, air = shade
-    corners = np.empty((8, 3))
+    edges = np.empty((_MOST_EDGES, 4))
     for g in range(kinds.shape[0]):
         kind, h, M, c = kinds[g], half_sizes[g], axes[g], centres[g]
-        front = _box_picture(corners, c, M, h, kind == CAPSULE)
-        if front < near and corners[:, 0].max() < near:
+        count = _edges_of_box(edges, c, M, h, kind == CAPSULE, near)
+        if count == 0:
             continue
-        o, s = -(M.T @ c), M.T @ sun_C
-        row, row_stop = 0, y.shape[0]
-        if front >= near:
-            row, row_stop = _between(corners[:, 2].min(), corners[:, 2].max(), y)
+        row, row_stop = _between(edges[:count, 1::2].min(), edges[:count, 1::2].max(), y)
+        if row == row_stop:
+            continue
+        # To the solid's own axes, in units of its size: a unit ball, a tube of radius 1, a cube of half side 1
+        unit = (h[0], h[0], h[0]) if kind in (CAPSULE, CYLINDER) else (h[0], h[1], h[2])
+        o = _to_unit(-c[0], -c[1], -c[2], M, unit)
+        sun = _to_unit(sun_C[0], sun_C[1], sun_C[2], M, (1.0, 1.0, 1.0))
+        across = _to_unit(0.0, -1.0, 0.0, M, unit)
         for i in range(row, row_stop):
-            column, column_stop = 0, x.shape[0]
-            if front >= near:
-                left, right = _row_of_picture(corners, y[i])
-                column, column_stop = _between(left, right, x)
-            d0, d1, d2 = M[0, 0] - y[i] * M[2, 0], M[0, 1] - y[i] * M[2, 1], M[0, 2] - y[i] * M[2, 2]
+            left, right = _crossed(edges, count, y[i])
+            column, column_stop = _between(left, right, x)
+            ahead = _to_unit(1.0, 0.0, -y[i], M, unit)
             for j in range(column, column_stop):
-                d = (d0 - x[j] * M[1, 0], d1 - x[j] * M[1, 1], d2 - x[j] * M[1, 2])
+                d = (ahead[0] + x[j] * across[0], ahead[1] + x[j] * across[1], ahead[2] + x[j] * across[2])
                 if kind == BALL:
-                    t, cosine = _hit_ball(o, d, h, s)
+                    t = _hit_ball(o, d)
                 elif kind == BOX:
-                    t, cosine = _hit_box(o, d, h, s)
+                    t = _hit_box(o, d)
                 else:
-                    t, cosine = _hit_tube(o, d, h, s, kind == CAPSULE)
+                    t = _hit_tube(o, d, h[2] / h[0], kind == CAPSULE)
                 if near <= t < nearest[i, j]:
                     nearest[i, j] = t
-                    radiance = reflectances[g] * (ambient + direct * max(0.0, cosine))
+                    p = (o[0] + t * d[0], o[1] + t * d[1], o[2] + t * d[2])
+                    radiance = reflectances[g] * (ambient + direct * max(0.0, _cosine(kind, p, unit, h[2] / h[0], sun)))
                     if extinction > 0.0:
                         clear = math.exp(-extinction * t * math.sqrt(1.0 + x[j] * x[j] + y[i] * y[i]))
                         radiance = radiance * clear + air * (1.0 - clear)
@@ -124,37 +131,71 @@ def _trace(
 
 
 @njit(cache=True)
-def _box_picture(corners: Array, c: Array, M: Array, h: Array, capped: bool) -> float:
-    """Fill (8, 3) depths and tangents (x, y) of a solid's box; return the least depth."""
-    front = math.inf
-    length = h[2] + h[0] if capped else h[2]
-    for k in range(8):
-        a = h[0] if k & 1 else -h[0]
-        b = h[1] if k & 2 else -h[1]
-        e = length if k & 4 else -length
-        depth = c[0] + M[0, 0] * a + M[0, 1] * b + M[0, 2] * e
-        corners[k, 0] = depth
-        corners[k, 1] = -(c[1] + M[1, 0] * a + M[1, 1] * b + M[1, 2] * e) / depth
-        corners[k, 2] = -(c[2] + M[2, 0] * a + M[2, 1] * b + M[2, 2] * e) / depth
-        front = min(front, depth)
-    return front
+def _to_unit(a: float, b: float, c: float, M: Array, unit: Triple) -> Triple:
+    """Turn a vector of C into a solid's axes and scale it to units of its size."""
+    return (
+        (M[0, 0] * a + M[1, 0] * b + M[2, 0] * c) / unit[0],
+        (M[0, 1] * a + M[1, 1] * b + M[2, 1] * c) / unit[1],
+        (M[0, 2] * a + M[1, 2] * b + M[2, 2] * c) / unit[2],
+    )
 
 
 @njit(cache=True)
-def _row_of_picture(corners: Array, y: float) -> tuple[float, float]:
-    """Leftmost and rightmost tangent of a box's picture in one row: where its twelve edges cross it."""
-    left, right = math.inf, -math.inf
+def _edges_of_box(edges: Array, c: Array, M: Array, h: Array, capped: bool, near: float) -> int:
+    """Fill edges (m, 4), tangents (x, y) of two ends each, of the picture of a solid's box; return how many.
+
+    Of a box that reaches behind the near plane they join all corners of the part before it, pair by pair.
+    """
+    corners, picture = np.empty((8, 3)), np.empty((20, 2))
+    length = h[2] + h[0] if capped else h[2]
+    behind = 0
+    for k in range(8):
+        a, b, e = h[0] * (2 * (k & 1) - 1), h[1] * ((k & 2) - 1), length * ((k & 4) / 2 - 1)
+        for axis in range(3):
+            corners[k, axis] = c[axis] + M[axis, 0] * a + M[axis, 1] * b + M[axis, 2] * e
+        behind += corners[k, 0] < near
+    if behind == 8:
+        return 0
+    points = 0
+    for k in range(8):
+        if corners[k, 0] >= near:
+            picture[points] = -corners[k, 1:] / corners[k, 0]
+            points += 1
+    count = 0
     for a in range(8):
         for bit in (1, 2, 4):
             b = a | bit
-            if a & bit or (corners[a, 2] - y) * (corners[b, 2] - y) > 0.0:
+            if a & bit:
                 continue
-            rise = corners[b, 2] - corners[a, 2]
-            part = (y - corners[a, 2]) / rise if rise != 0.0 else 0.0
-            at = corners[a, 1] + part * (corners[b, 1] - corners[a, 1])
+            if behind == 0:
+                edges[count, :2], edges[count, 2:] = picture[a], picture[b]
+                count += 1
+            elif (corners[a, 0] < near) != (corners[b, 0] < near):
+                part = (near - corners[a, 0]) / (corners[b, 0] - corners[a, 0])
+                picture[points] = -(corners[a, 1:] + part * (corners[b, 1:] - corners[a, 1:])) / near
+                points += 1
+    if behind == 0:
+        return count
+    for a in range(points):
+        for b in range(a):
+            edges[count, :2], edges[count, 2:] = picture[a], picture[b]
+            count += 1
+    return count
+
+
+@njit(cache=True)
+def _crossed(edges: Array, count: int, y: float) -> tuple[float, float]:
+    """Leftmost and rightmost tangent at which edges cross a row."""
+    left, right = math.inf, -math.inf
+    for k in range(count):
+        x0, y0, x1, y1 = edges[k, 0], edges[k, 1], edges[k, 2], edges[k, 3]
+        if (y0 - y) * (y1 - y) > 0.0:
+            continue
+        if y0 == y1:
+            left, right = min(left, x0, x1), max(right, x0, x1)
+        else:
+            at = x0 + (y - y0) / (y1 - y0) * (x1 - x0)
             left, right = min(left, at), max(right, at)
-            if rise == 0.0:
-                left, right = min(left, corners[b, 1]), max(right, corners[b, 1])
     return left, right
 
 
@@ -173,78 +214,68 @@ def _between(low: float, high: float, tangents: Array) -> tuple[int, int]:
 
 
 @njit(cache=True)
-def _hit_ball(o: Array, d: tuple[float, float, float], h: Array, s: Array) -> tuple[float, float]:
-    """Depth of the entry, Eq. (1), and cosine of the Sun's incidence there; infinity for a miss."""
-    ox, oy, oz = o[0] / h[0], o[1] / h[1], o[2] / h[2]
-    dx, dy, dz = d[0] / h[0], d[1] / h[1], d[2] / h[2]
-    a = dx * dx + dy * dy + dz * dz
-    b = ox * dx + oy * dy + oz * dz
-    under = b * b - a * (ox * ox + oy * oy + oz * oz - 1.0)
-    if under <= 0.0:
-        return math.inf, 0.0
-    t = (-b - math.sqrt(under)) / a
-    nx, ny, nz = (ox + t * dx) / h[0], (oy + t * dy) / h[1], (oz + t * dz) / h[2]
-    return t, (nx * s[0] + ny * s[1] + nz * s[2]) / math.sqrt(nx * nx + ny * ny + nz * nz)
+def _hit_ball(o: Triple, d: Triple) -> float:
+    """Depth of the entry into the unit ball, Eq. (1); infinity for a miss."""
+    a = d[0] * d[0] + d[1] * d[1] + d[2] * d[2]
+    b = o[0] * d[0] + o[1] * d[1] + o[2] * d[2]
+    under = b * b - a * (o[0] * o[0] + o[1] * o[1] + o[2] * o[2] - 1.0)
+    return (-b - math.sqrt(under)) / a if under > 0.0 else math.inf
 
 
 @njit(cache=True)
-def _hit_tube(
-    o: Array, d: tuple[float, float, float], h: Array, s: Array, capped: bool
-) -> tuple[float, float]:
-    """The same for a tube along z, Eq. (2): a capsule where `capped` by balls, else a cylinder."""
-    r, half = h[0], h[2]
+def _hit_tube(o: Triple, d: Triple, half: float, capped: bool) -> float:
+    """The same for a tube of radius 1 along z, Eq. (2): a capsule where `capped` by balls, else a cylinder."""
     a = d[0] * d[0] + d[1] * d[1]
     b = o[0] * d[0] + o[1] * d[1]
-    c = o[0] * o[0] + o[1] * o[1] - r * r
+    c = o[0] * o[0] + o[1] * o[1] - 1.0
     under = b * b - a * c
     along = a <= _PARALLEL * d[2] * d[2]
     if c > 0.0 and (along or under <= 0.0):
-        return math.inf, 0.0
-    enters = -math.inf if along else (-b - math.sqrt(under)) / a
-    z = o[2] + enters * d[2] if not along else (-math.inf if d[2] > 0.0 else math.inf)
+        return math.inf
+    if along:
+        z, enters = (-math.inf if d[2] > 0.0 else math.inf), -math.inf
+    else:
+        enters = (-b - math.sqrt(under)) / a
+        z = o[2] + enters * d[2]
     if -half <= z <= half:
-        return enters, ((o[0] + enters * d[0]) * s[0] + (o[1] + enters * d[1]) * s[1]) / r
+        return enters
     end = half if z > half else -half
     if capped:
-        return _hit_end_ball(o, d, r, end, s)
+        return _hit_ball((o[0], o[1], o[2] - end), d)
     if d[2] * end >= 0.0:  # the tube is entered beyond this end and left farther away from it
-        return math.inf, 0.0
+        return math.inf
     t = (end - o[2]) / d[2]
     px, py = o[0] + t * d[0], o[1] + t * d[1]
-    if px * px + py * py > r * r:
-        return math.inf, 0.0
-    return t, s[2] if end > 0.0 else -s[2]
+    return t if px * px + py * py <= 1.0 else math.inf
 
 
 @njit(cache=True)
-def _hit_end_ball(
-    o: Array, d: tuple[float, float, float], r: float, end: float, s: Array
-) -> tuple[float, float]:
-    """The same for the ball at one end of a capsule."""
-    oz = o[2] - end
-    a = d[0] * d[0] + d[1] * d[1] + d[2] * d[2]
-    b = o[0] * d[0] + o[1] * d[1] + oz * d[2]
-    under = b * b - a * (o[0] * o[0] + o[1] * o[1] + oz * oz - r * r)
-    if under <= 0.0:
-        return math.inf, 0.0
-    t = (-b - math.sqrt(under)) / a
-    return t, ((o[0] + t * d[0]) * s[0] + (o[1] + t * d[1]) * s[1] + (oz + t * d[2]) * s[2]) / r
-
-
-@njit(cache=True)
-def _hit_box(o: Array, d: tuple[float, float, float], h: Array, s: Array) -> tuple[float, float]:
-    """The same for a box, Eq. (3)."""
-    enters, leaves, cosine = -math.inf, math.inf, 0.0
+def _hit_box(o: Triple, d: Triple) -> float:
+    """The same for the cube of half side 1, Eq. (3)."""
+    enters, leaves = -math.inf, math.inf
     for k in range(3):
         if d[k] == 0.0:
-            if abs(o[k]) > h[k]:
-                return math.inf, 0.0
+            if abs(o[k]) > 1.0:
+                return math.inf
             continue
-        side = -h[k] if d[k] > 0.0 else h[k]
-        t = (side - o[k]) / d[k]
-        if t > enters:
-            enters, cosine = t, (-s[k] if d[k] > 0.0 else s[k])
+        side = -1.0 if d[k] > 0.0 else 1.0
+        enters = max(enters, (side - o[k]) / d[k])
         leaves = min(leaves, (-side - o[k]) / d[k])
-    if enters > leaves:
-        return math.inf, 0.0
-    return enters, cosine
+    return enters if enters <= leaves else math.inf
+
+
+@njit(cache=True)
+def _cosine(kind: int, p: Triple, unit: Triple, half: float, sun: Triple) -> float:
+    """Cosine of the Sun's incidence where a solid is entered at p, in units of its size."""
+    if kind == BALL:
+        n = (p[0] / unit[0], p[1] / unit[1], p[2] / unit[2])
+    elif kind == BOX:
+        k = 0 if abs(p[0]) >= max(abs(p[1]), abs(p[2])) else (1 if abs(p[1]) >= abs(p[2]) else 2)
+        return math.copysign(1.0, p[k]) * sun[k]
+    elif abs(p[2]) < half * _ON_SIDE:
+        return p[0] * sun[0] + p[1] * sun[1]
+    elif kind == CAPSULE:
+        n = (p[0], p[1], p[2] - math.copysign(half, p[2]))
+    else:
+        return math.copysign(1.0, p[2]) * sun[2]
+    return (n[0] * sun[0] + n[1] * sun[1] + n[2] * sun[2]) / math.sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2])

@@ -21,7 +21,7 @@ STREAM_NAMES = (
     "frame_transfer",
     "clouds",
     "dirt",
-    "faults",
+    "hot_pixels",
     "inertial_velocity",
 )
 

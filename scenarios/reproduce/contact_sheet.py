@@ -1,0 +1,170 @@
+"""Sixteen frames of one ring: every light, weather, range and fault that the camera can meet, on one sheet.
+
+Each frame is the last of a few from a camera whose exposure control has settled, with the receiver put where the lens
+is so far behind the ring. The picture shows a quarter of the resolution, brightened, and the ring's surroundings as
+they are. The figures say what the frame does to the detection of LEDs; there is nothing published to compare with.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from dockair.messages import CameraFrame
+from dockair.nav.image.detect import detect
+from dockair.rotations import Array
+from dockair.scenarios.build import Parts, build
+from dockair.scenarios.schema import load_scenario
+from dockair.sim.camera.camera import NearInfraredCamera
+
+ID = "sensor/contact-sheet"
+TITLE = "sixteen frames: Sun, clouds, glints, night, haze, ranges, faults"
+PICTURE = "sensor-contact-sheet.png"
+_SETTLING_FRAMES = 8
+_FOUND_WITHIN_PX = 2.0
+_REDUCTION = 4
+_INSET_MARGIN = 1.6  # ring radii
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Shot:
+    """One frame: what differs from the default scenario, and how far the lens is from the ring."""
+
+    title: str
+    range_m: float = 6.0
+    settings: Mapping[str, Any] = field(default_factory=dict)
+
+
+def _sun(azimuth_deg: float, elevation_deg: float) -> dict[str, Any]:
+    return {"sun.azimuth_deg": azimuth_deg, "sun.elevation_deg": elevation_deg}
+
+
+_AHEAD = _sun(9.0, 9.0)
+SHOTS = (
+    Shot(title="30 m", range_m=30.0),
+    Shot(title="15 m", range_m=15.0),
+    Shot(title="6 m, Sun behind"),
+    Shot(title="2.5 m", range_m=2.5),
+    Shot(title="Sun abeam", settings=_sun(90.0, 30.0)),
+    Shot(title="glints: Sun high behind, bare metal", settings=_sun(150.0, 60.0) | {
+        "parameters.surfaces.metal_specular": 0.6
+    }),
+    Shot(title="Sun in view", range_m=10.0, settings=_AHEAD),
+    Shot(title="Sun in view, 20 nm band-pass", range_m=10.0, settings=_AHEAD | {"camera.filter": "band_pass"}),
+    Shot(title="low Sun, gaps in cloud", range_m=10.0, settings=_sun(5.0, 6.0) | {"weather.cloud_cover": 0.6}),
+    Shot(title="night", range_m=10.0, settings={"weather.night": True}),
+    Shot(title="haze, visibility 150 m", range_m=10.0, settings={"weather.visibility_m": 150.0}),
+    Shot(title="dirty window, Sun in view", range_m=10.0, settings=_AHEAD | {
+        "faults": [{"kind": "dirty_window", "cover": 0.4}]
+    }),
+    Shot(title="LEDs 1 and 2 off, 5 dim", settings={
+        "faults": [{"kind": "led_off", "leds": [1, 2]}, {"kind": "led_dim", "leds": [5], "factor": 0.2}]
+    }),
+    Shot(title="2000 hot pixels", settings={"faults": [{"kind": "hot_pixels", "count": 2000}]}),
+    Shot(title="exposure stuck at 500 µs", settings={"faults": [{"kind": "exposure_stuck", "exposure_us": 500.0}]}),
+    Shot(title="f/2.8, focused at 30 m", settings={
+        "parameters.lens.f_number": 2.8, "parameters.lens.focus_distance_m": 30.0
+    }),
+)
+
+
+def reproduce(out: Path | None) -> dict[str, Any]:
+    """Make the frames and, with a folder, the sheet."""
+    taken = [_take(shot) for shot in SHOTS]
+    rows = [{"case": shot.title, "ours": figures, "reference": {}} for shot, (_, _, figures) in zip(SHOTS, taken, strict=True)]
+    if out is not None:
+        _draw([(shot.title, frame, leds) for shot, (frame, leds, _) in zip(SHOTS, taken, strict=True)], out / PICTURE)
+    pictures = [] if out is None else [PICTURE]
+    return {"id": ID, "source": TITLE, "rows": rows, "pictures": pictures}
+
+
+def _take(shot: Shot) -> tuple[CameraFrame, Array, dict[str, float]]:
+    """The frame, where its LEDs are (n, 2) [px], and its figures."""
+    parts = build(load_scenario("still_air", {"seed": 3, **shot.settings}), 3)
+    assert parts.camera is not None
+    try:
+        data = _placed(parts, shot.range_m)
+        for k in range(_SETTLING_FRAMES):
+            frame = parts.camera.expose(data, 0.02 * k, k, None)
+        assert frame is not None
+        leds_px = parts.camera.led_pixels(data)
+        return frame, leds_px, _figures(parts.camera, data, frame, leds_px)
+    finally:
+        parts.camera.close()
+
+
+def _placed(parts: Parts, range_m: float) -> mujoco.MjData:
+    """The world with the receiver moved along its camera's axis until the lens is so far from the ring's centre."""
+    world, camera = parts.world, parts.camera
+    assert camera is not None
+    data = mujoco.MjData(world.model)
+    mujoco.mj_copyData(data, world.model, world.data)
+    R_WC, p_WC = camera.pose(data)
+    p_CD = R_WC.T @ (world.truth.p_WD - p_WC)
+    forward = p_CD[0] - np.sqrt(range_m**2 - p_CD[1] ** 2 - p_CD[2] ** 2)
+    joint = world.model.joint("receiver").qposadr[0]
+    data.qpos[joint : joint + 3] += forward * R_WC[:, 0]
+    mujoco.mj_forward(world.model, data)
+    return data
+
+
+def _figures(
+    camera: NearInfraredCamera, data: mujoco.MjData, frame: CameraFrame, leds_px: Array
+) -> dict[str, float]:
+    blobs = detect(frame.pixels, None, frame.window, gain_dn_per_electron=frame.gain)
+    visible = camera.visible_leds(data)
+    distance = np.linalg.norm(blobs.centroids_px[:, None] - leds_px[None], axis=2)
+    found = (distance < _FOUND_WITHIN_PX).any(axis=0)
+    false = ~(distance < _FOUND_WITHIN_PX).any(axis=1)
+    return {
+        "exposure_us": 1e6 * frame.exposure_s,
+        "background_dn": float(np.median(frame.pixels)),
+        "brightest_led_dn": float(max(_peak(frame.pixels, uv) for uv in leds_px)),
+        "leds_visible": int(visible.sum()),
+        "leds_found": int(found.sum()),
+        "other_blobs": int(false.sum()),
+    }
+
+
+def _peak(pixels: NDArray[np.uint8], uv: Array) -> int:
+    column, row = (round(float(c)) for c in uv)
+    around = pixels[max(row - 2, 0) : row + 3, max(column - 2, 0) : column + 3]
+    return int(around.max(initial=0))
+
+
+def _draw(frames: list[tuple[str, CameraFrame, Array]], path: Path) -> None:
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(14.0, 8.6), dpi=110, layout="constrained")
+    figure.get_layout_engine().set(w_pad=0.02, h_pad=0.02, wspace=0.0, hspace=0.02)  # type: ignore[union-attr]
+    for axes, (title, frame, leds_px) in zip(figure.subplots(4, 4).ravel(), frames, strict=True):
+        axes.imshow(_thumbnail(frame.pixels), cmap="gray", vmin=0.0, vmax=1.0, interpolation="nearest")
+        axes.set_title(f"{title}, {1e6 * frame.exposure_s:.0f} µs", fontsize=8, pad=2)
+        axes.set_axis_off()
+        inset = axes.inset_axes((0.0, 0.0, 0.32, 0.6))
+        inset.imshow(_surroundings(frame.pixels, leds_px), cmap="gray", vmin=0, vmax=255, interpolation="nearest")
+        inset.set_xticks([])
+        inset.set_yticks([])
+        for spine in inset.spines.values():
+            spine.set_color("tab:orange")
+    figure.savefig(path)
+
+
+def _thumbnail(pixels: NDArray[np.uint8]) -> Array:
+    """Brightest of each block, so that a far LED stays, brightened by a square root."""
+    rows, columns = (n // _REDUCTION for n in pixels.shape)
+    blocks = pixels[: rows * _REDUCTION, : columns * _REDUCTION].reshape(rows, _REDUCTION, columns, _REDUCTION)
+    return np.asarray(np.sqrt(blocks.max(axis=(1, 3)) / 255.0))
+
+
+def _surroundings(pixels: NDArray[np.uint8], leds_px: Array) -> NDArray[np.uint8]:
+    """A square around the ring, black where it leaves the frame."""
+    centre = leds_px.mean(axis=0)
+    half = int(np.ceil(_INSET_MARGIN * np.linalg.norm(leds_px - centre, axis=1).max())) + 4
+    column, row = (round(float(c)) for c in centre)
+    padded = np.pad(pixels, half)
+    return padded[row : row + 2 * half, column : column + 2 * half]

@@ -1,0 +1,37 @@
+"""What can be reproduced, by id.
+
+A reproduction is a function of a folder for its picture, or None for no picture. It returns
+
+    {"id": ..., "source": ..., "rows": [{"case": ..., "ours": {...}, "reference": {...}}]}
+
+with units in the keys; `ours` has every key of `reference`.
+"""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from dockair.errors import DockairError
+from dockair.scenarios.reproduce import sensor_band
+
+Reproduction = Callable[[Path | None], dict[str, Any]]
+
+_REPRODUCTIONS: dict[str, Reproduction] = {sensor_band.ID: sensor_band.reproduce}
+
+
+def ids() -> tuple[str, ...]:
+    """Return the ids, sorted."""
+    return tuple(sorted(_REPRODUCTIONS))
+
+
+def reproduce(wanted: str, out: Path | None = None) -> dict[str, Any]:
+    """Run one reproduction; with `out`, a folder that need not exist, its picture is put there.
+
+    Raises:
+        DockairError: no such id.
+    """
+    if wanted not in _REPRODUCTIONS:
+        raise DockairError("reproduce", expected="the id of a reproduction", got=wanted, exists=ids())
+    if out is not None:
+        out.mkdir(parents=True, exist_ok=True)
+    return _REPRODUCTIONS[wanted](out)

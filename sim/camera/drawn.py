@@ -1,0 +1,249 @@
+"""Draws solids with MuJoCo's off-screen renderer: the background where there is OpenGL.
+
+Only solids are drawn; the sky comes from elsewhere. Colour carries two things at once: red is the solid's grey
+
+    red = rho (ambient + direct max(0, n . s)),      blue = 1 where there is a solid, 0 where there is none           (1)
+
+because the light's ambient part is (ambient, 0, 1), its direct part (direct, 0, 0), a solid's colour (rho, 0, 1).
+So a solid in the dark still hides the sky.
+
+The frustum is off-centre, on the outer edges of the blocks asked for. Every solid is one of a few unit meshes
+(ball, tube, cube), stretched; how finely they are cut follows the solid's size in the picture, so that an outline is
+off by a quarter of a block at most, up to a radius of 100 blocks. The meshes' radius is that of the polygon whose
+outline is right in the mean. What lies outside the frustum is left out.
+
+The scene is shifted so that the lens is its origin, in double precision, before OpenGL's single precision sees it.
+Not modelled: more than 256 grey levels, more than one sample a block (edges are steps of a block), the round ends of
+capsules thinner than a block.
+"""
+
+import ctypes
+import math
+from typing import Any
+
+import mujoco
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from dockair.rotations import Array
+from dockair.sim.camera.solids import BALL, BOX, CAPSULE, Haze, Lighting, Solids, depth_limits_m
+from dockair.sim.camera.unit_meshes import BALLS, CUBE, LEVELS, TUBES, unit_meshes
+from dockair.sim.off_screen import Canvas
+
+_ROUND_END_BLOCKS = 0.5  # radius from which a capsule gets its round ends
+_HALF_LEVEL = 128  # of 256: blue is 0 or 255
+
+
+class DrawnSolids:
+    """Draws the solids of a model with OpenGL. The context is made at the first picture.
+
+    Args:
+        model: the world's; read only.
+        lighting: the light on the solids.
+        blocks_per_tangent: blocks of the picture in a tangent of 1.
+        most: (rows, columns) of the largest picture.
+
+    Raises:
+        DockairError: the model has a visible geom that is no solid.
+    """
+
+    name = "mujoco"
+
+    def __init__(
+        self, model: mujoco.MjModel, lighting: Lighting, blocks_per_tangent: float, most: tuple[int, int]
+    ) -> None:
+        self._solids, self._lighting, self._most = Solids.of(model), lighting, most
+        self._limits_m, self._scale = depth_limits_m(model), blocks_per_tangent
+        self._canvas: Canvas | None = None
+
+    def draw(
+        self,
+        out: NDArray[np.float32],
+        data: mujoco.MjData,
+        pose: tuple[Array, Array],
+        x: Array,
+        y: Array,
+        haze: Haze,
+    ) -> None:
+        """Lay the solids over a picture of the sky, in place.
+
+        Args:
+            out: (rows, columns) relative radiance, one value a block.
+            data: positions and attitudes up to date.
+            pose: R_WC and p_WC of the camera.
+            x: (columns,) tangents to the right of the axis, of the blocks' centres.
+            y: (rows,) tangents below it.
+            haze: the air in between.
+
+        Raises:
+            MachineError: no off-screen OpenGL here.
+        """
+        R_WC, p_WC = pose
+        if self._canvas is None:
+            self._open()
+        half = 0.5 / self._scale
+        frustum = np.array([x[0] - half, x[-1] + half, y[0] - half, y[-1] + half])
+        if not self._arrange(data, R_WC, p_WC, frustum):
+            return
+        self._aim(R_WC, frustum)
+        rows, columns = out.shape
+        colours = np.empty((rows, columns, 3), dtype=np.uint8)
+        depths = np.empty((rows, columns) if haze.extinction_1_m > 0.0 else (0, 0), dtype=np.float32)
+        assert self._canvas is not None
+        self._canvas.render(self._scene, colours, depths if depths.size else None)
+        _lay_over(out, colours, depths, x, y, haze.extinction_1_m, haze.airlight, self._limits_m)
+
+    def close(self) -> None:
+        """Free the OpenGL context."""
+        if self._canvas is not None:
+            self._canvas.close()
+        self._canvas = None
+
+    def _open(self) -> None:
+        meshes = unit_meshes()
+        rows, columns = self._most
+        self._canvas = Canvas(meshes, columns, rows, "camera")
+        s = self._solids
+        most = len(s.geoms) + 2 * int((s.kinds == CAPSULE).sum())
+        self._scene = mujoco.MjvScene(meshes, max(most, 1))
+        for flag in ("SHADOW", "REFLECTION", "SKYBOX", "HAZE", "FOG"):
+            self._scene.flags[getattr(mujoco.mjtRndFlag, f"mjRND_{flag}")] = 0
+        nothing, upright = np.zeros(3), np.eye(3).ravel()
+        self._geoms = list(self._scene.geoms[:most])
+        for geom in self._geoms:
+            mujoco.mjv_initGeom(geom, mujoco.mjtGeom.mjGEOM_MESH, nothing, nothing, upright, np.ones(4, np.float32))
+            geom.specular = geom.reflectance = geom.emission = 0.0
+        self._places, self._turns, self._colours = (
+            _all(self._geoms, name, shape) for name, shape in (("pos", (3,)), ("mat", (3, 3)), ("rgba", (4,)))
+        )
+        self._meshes = np.full(most, -1, dtype=np.int64)
+        self._set_light()
+
+    def _set_light(self) -> None:
+        light, lighting = self._scene.lights[0], self._lighting
+        self._scene.nlight = 1
+        light.type, light.headlight, light.castshadow = mujoco.mjtLightType.mjLIGHT_DIRECTIONAL, 0, 0
+        light.dir[:], light.attenuation[:] = -lighting.toward_W, (1.0, 0.0, 0.0)
+        light.ambient[:] = lighting.ambient, 0.0, 1.0
+        light.diffuse[:], light.specular[:] = (lighting.direct, 0.0, 0.0), 0.0
+
+    def _arrange(self, data: mujoco.MjData, R_WC: Array, p_WC: Array, frustum: Array) -> int:
+        """Put into the scene what may be seen; return how many pieces that is."""
+        s = self._solids
+        centres, axes = data.geom_xpos[s.geoms] - p_WC, data.geom_xmat[s.geoms].reshape(-1, 3, 3)
+        solids = s.kinds, s.half_sizes_m, s.bounds_m, s.reflectances
+        meshes = np.empty_like(self._meshes)
+        count = _pieces(
+            solids, centres, axes, R_WC, frustum, self._limits_m, self._scale,
+            (meshes, self._places, self._turns, self._colours),
+        )  # fmt: skip
+        for i in np.flatnonzero(meshes[:count] != self._meshes[:count]):
+            self._geoms[i].dataid = 2 * int(meshes[i])  # MuJoCo counts each mesh and its convex hull
+        self._meshes[:count] = meshes[:count]
+        self._scene.ngeom = count
+        return count
+
+    def _aim(self, R_WC: Array, frustum: Array) -> None:
+        """Set the frustum; OpenGL's x is right, its y up."""
+        near, far = self._limits_m
+        for camera in self._scene.camera:
+            camera.pos[:], camera.forward[:], camera.up[:] = 0.0, R_WC[:, 0], R_WC[:, 2]
+            camera.orthographic, camera.frustum_near, camera.frustum_far = 0, near, far
+            camera.frustum_center = 0.5 * near * (frustum[0] + frustum[1])
+            camera.frustum_width = 0.5 * near * (frustum[1] - frustum[0])
+            camera.frustum_bottom, camera.frustum_top = -near * frustum[3], -near * frustum[2]
+
+
+def _all(geoms: list[Any], name: str, shape: tuple[int, ...]) -> NDArray[np.float32]:
+    """One array over the same member of all geoms of a scene, which lie one after the other in memory."""
+    first = getattr(geoms[0], name).ctypes.data
+    step = getattr(geoms[1], name).ctypes.data - first if len(geoms) > 1 else 4 * math.prod(shape)
+    if getattr(geoms[-1], name).ctypes.data != first + step * (len(geoms) - 1):
+        raise RuntimeError("the geoms of a scene are not evenly spaced")
+    memory = (ctypes.c_char * (step * (len(geoms) - 1) + 4 * math.prod(shape))).from_address(first)
+    strides = (step, *(4 * math.prod(shape[i + 1 :]) for i in range(len(shape))))
+    return np.ndarray((len(geoms), *shape), dtype=np.float32, buffer=memory, strides=strides)
+
+
+@njit(cache=True)
+def _pieces(
+    solids: tuple[NDArray[np.int64], Array, Array, Array],
+    centres: Array,
+    axes: Array,
+    R_WC: Array,
+    frustum: Array,
+    limits: tuple[float, float],
+    scale: float,
+    pieces: tuple[NDArray[np.int64], NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]],
+) -> int:
+    """Fill (mesh, place, turn, colour) of the pieces of what the frustum may hold; return how many."""
+    kinds, half_sizes, bounds, reflectances = solids
+    meshes, places, turns, colours = pieces
+    count = 0
+    for g in range(kinds.shape[0]):
+        depth, left, up = 0.0, 0.0, 0.0
+        for k in range(3):
+            depth += R_WC[k, 0] * centres[g, k]
+            left += R_WC[k, 1] * centres[g, k]
+            up += R_WC[k, 2] * centres[g, k]
+        bound = bounds[g]
+        if depth + bound < limits[0] or depth - bound > limits[1]:
+            continue
+        if _beyond(-left, depth, frustum[0], frustum[1], bound) or _beyond(-up, depth, frustum[2], frustum[3], bound):
+            continue
+        kind, h = kinds[g], half_sizes[g]
+        radius = scale * (max(h[0], h[1], h[2]) if kind == BALL else h[0]) / max(depth - bound, limits[0])
+        level = 0
+        while level < LEVELS.shape[0] - 1 and radius > LEVELS[level]:
+            level += 1
+        ends = 3 if kind == CAPSULE and radius >= _ROUND_END_BLOCKS else 1
+        for part in range(ends):
+            size = (h[0], h[1], h[2]) if part == 0 else (h[0], h[0], h[0])
+            offset = 0.0 if part == 0 else (h[2] if part == 1 else -h[2])
+            if kind == BOX:
+                meshes[count] = CUBE
+            else:
+                meshes[count] = (BALLS if kind == BALL or part > 0 else TUBES) + level
+            for k in range(3):
+                places[count, k] = centres[g, k] + offset * axes[g, k, 2]
+                for axis in range(3):
+                    turns[count, k, axis] = axes[g, k, axis] * size[axis]
+            colours[count, 0], colours[count, 1], colours[count, 2], colours[count, 3] = reflectances[g], 0.0, 1.0, 1.0
+            count += 1
+    return count
+
+
+@njit(cache=True)
+def _beyond(across: float, depth: float, low: float, high: float, bound: float) -> bool:
+    """Whether a ball lies outside one pair of the frustum's side planes."""
+    return (across - low * depth < -bound * math.sqrt(1.0 + low * low)) or (
+        across - high * depth > bound * math.sqrt(1.0 + high * high)
+    )
+
+
+@njit(cache=True)
+def _lay_over(
+    out: NDArray[np.float32],
+    colours: NDArray[np.uint8],
+    depths: NDArray[np.float32],
+    x: Array,
+    y: Array,
+    extinction: float,
+    air: float,
+    limits: tuple[float, float],
+) -> None:
+    """Take the solids' grey, Eq. (1), where the picture has any; with haze before them if there are depths."""
+    near, far = limits
+    level = np.float32(1.0 / 255.0)
+    for i in range(out.shape[0]):
+        row = out.shape[0] - 1 - i  # OpenGL's first row is the lowest
+        for j in range(out.shape[1]):
+            if colours[row, j, 2] < _HALF_LEVEL:
+                continue
+            radiance = colours[row, j, 0] * level
+            if depths.size > 0:
+                t = near * far / (far - depths[row, j] * (far - near))
+                clear = math.exp(-extinction * t * math.sqrt(1.0 + x[j] * x[j] + y[i] * y[i]))
+                radiance = np.float32(radiance * clear + air * (1.0 - clear))
+            out[i, j] = radiance

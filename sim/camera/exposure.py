@@ -1,0 +1,87 @@
+"""The camera's exposure time: held, or set from frame to frame by what the frame before shows.
+
+    y = (level of the n-th brightest pixel - black) / (full scale - black)                                       (1)
+    next = exposure x (y < clipped_level ? min(target/y, longest_step) : clipped_factor), within the limits      (2)
+
+The exposure in (2) is the metered frame's own, so frames that were already under way when it changed cannot make it
+swing. A change smaller than the dead band is not made. This is what a camera's firmware can do: it knows grey levels
+and nothing of LEDs. A Sun's disc in the window has more pixels than are metered and drives the exposure to its
+shortest, LEDs or not.
+
+Not modelled: gain control; regions of interest; steps of the sensor's row clock (2.7 us, finer in practice).
+Sources: metering by a high quantile of the histogram is common practice; the figures are in sheet `exposure`.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dockair.errors import DockairError
+from dockair.sim.camera.electronics import OUTPUT_BITS, output_black, output_gain
+from dockair.sim.camera.sheets import ExposureParameters, SensorParameters
+
+
+class ExposureControl:
+    """Holds the exposure of the next frame."""
+
+    def __init__(self, parameters: ExposureParameters, sensor: SensorParameters) -> None:
+        """Start with the sheet's exposure.
+
+        Args:
+            parameters: sheet.
+            sensor: whose black level and full scale the grey levels refer to.
+        """
+        self._p = parameters
+        self._black = output_black(sensor)
+        full_well = self._black + output_gain(sensor) * sensor.full_well_e
+        self._span = min(full_well, 2.0**OUTPUT_BITS - 1.0) - self._black
+        self._exposure_s = parameters.exposure_s
+
+    @property
+    def exposure_s(self) -> float:
+        """Of the next frame [s]."""
+        return self._exposure_s
+
+    def reset(self) -> None:
+        """Forget all frames."""
+        self._exposure_s = self._p.exposure_s
+
+    def step(self, pixels: NDArray[np.uint8], exposure_s: float) -> float:
+        """Meter a frame and return the exposure of the next, Eq. (2) [s].
+
+        Args:
+            pixels: (rows, columns) as read out.
+            exposure_s: the frame's own.
+
+        Raises:
+            DockairError: an exposure that the hardware cannot have made.
+        """
+        p = self._p
+        if not p.shortest_s <= exposure_s <= p.longest_s:
+            expected = f"{p.shortest_s} to {p.longest_s} s (exposure.shortest_s, exposure.longest_s)"
+            raise DockairError("exposure_s", expected=expected, got=exposure_s)
+        if not p.automatic:
+            return self._exposure_s
+        y = (brightest_level(pixels, p.metered_pixel) - self._black) / self._span
+        if y >= p.clipped_level:
+            factor = p.clipped_factor
+        else:
+            factor = min(p.target_level / y, p.longest_step) if y > 0.0 else p.longest_step
+        wanted_s = min(max(exposure_s * factor, p.shortest_s), p.longest_s)
+        if abs(wanted_s - self._exposure_s) > p.dead_band * self._exposure_s:
+            self._exposure_s = wanted_s
+        return self._exposure_s
+
+
+def brightest_level(pixels: NDArray[np.uint8], n: int) -> int:
+    """Level of the n-th brightest pixel (of the darkest, if there are fewer).
+
+    The n rows with the highest maxima hold n pixels at least as bright as the n-th of these maxima: a brighter n-th
+    pixel is in those of the rows that exceed it, of which there are fewer than n.
+    """
+    if pixels.shape[0] < n:
+        return int(np.sort(pixels, axis=None)[max(pixels.size - n, 0)])
+    of_rows = pixels.max(axis=1)
+    floor = np.partition(of_rows, -n)[-n]
+    rows = pixels[of_rows > floor]
+    brighter = rows[rows > floor]
+    return int(floor if brighter.size < n else np.partition(brighter, -n)[-n])

@@ -1,0 +1,258 @@
+"""What is infinitely far away: clear sky, cloud above with gaps, cloud deck and ground below, haze, night.
+
+Relative radiance, 1 = a white Lambertian surface in normal sunlight, as a function of the direction in W alone: c is
+the cosine of the angle X from the Sun, s the sine of the elevation.
+
+    J(c) = horizon f,   f = 1 + a (exp(-d X) - exp(-d pi/2)) + e c^2                                            (1)
+    clear sky   J (1 - exp(-b m)),   b = -ln(1 - zenith/horizon),   m = 1/(|s| + 0.025 exp(-11 |s|))               (2)
+    cloud above at (x, y) = height (d_x, d_y)/(s + w), crossed at mu = (s + w)/(1 + w)                             (3)
+    surface below, depth h down:  d = -r s - sqrt(q),  q = (r - h)^2 - r^2 (1 - s^2),  mu = sqrt(q)/(r - h)          (4)
+    deck        R min(mu_0 (1 + w n), 1) + (1 - R) (what is below),   R = 1 - T(tau/mu)                           (5)
+    air before  L <- L exp(-b' m) + J' (1 - exp(-b' m)),   b' = aerosol (exp(-z_1/H) - exp(-z_2/H))                (6)
+    haze        L <- L exp(-b_h m) + J_h (1 - exp(-b_h m)),   b_h = (3.912/V - 3.912/V_clear) depth, not below 0   (7)
+
+Eq. (1) is the CIE clear sky's indicatrix, which is 1 at 90 degrees; (2) its gradation, scaled so that zenith and
+horizon at 90 degrees from the Sun are the sheet's. w is the thickness of cloud elements over their width: it keeps
+slant paths finite where a layer is seen edge-on. J' has less Sun in it where cloud shades the air (mean of the
+layer); J_h less where the haze itself does. The light that cloud sends down is `clouds`.
+
+Nothing here moves: W goes with the tanker, and in the minutes of a docking the clouds stay where they are.
+Not modelled: twilight, moon, the tanker's trails, shadows on the deck, polarisation, cloud at flight level other than as
+haze. Cloud above is one layer that starts over the aircraft; within it, or under the deck's top, this is not valid.
+Sources: ISO 15469 (CIE S 011), sky type 12; Rozenberg 1966 (air mass at the horizon); Koschmieder 1924 (3.912/V).
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dockair.errors import DockairError
+from dockair.rotations import Array
+from dockair.sim.camera.clouds import Droplets, Texture, optical_depth
+from dockair.sim.camera.sheets import SkyParameters
+from dockair.sim.camera.sky_table import DirectionTable
+
+_TILES = 48  # of the table, a side
+_NODE_RAD = 2.0 / (64 * _TILES)
+_KOSCHMIEDER = 3.912  # -ln 0.02, the contrast that an eye still sees
+_OVERHEAD = (0.0, 0.0, 1.0)
+_LAYERS = 0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0xD6E8FEB86659FD93  # keys apart: cloud above, deck, ground
+_AMBIENT_DIRECTIONS = 1024
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Weather:
+    """The flight's weather, as the scenario says."""
+
+    cloud_cover: float = 0.0  #: share of the layer above that is cloud, 0 to 1
+    cloud_optical_depth: float = 8.0  #: mean where there is cloud, straight through
+    visibility_m: float = 100e3  #: at flight level
+    night: bool = False
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.cloud_cover <= 1.0:
+            raise DockairError("sky.cloud_cover", expected="0 to 1", got=self.cloud_cover)
+        if not 0.0 <= self.cloud_optical_depth < math.inf:
+            raise DockairError("sky.cloud_optical_depth", expected="a depth >= 0", got=self.cloud_optical_depth)
+        if not self.visibility_m > 0.0:
+            raise DockairError("sky.visibility_m", expected="a distance > 0 m", got=self.visibility_m)
+
+
+class Sky:
+    """Radiance and transmittance by direction. Keeps what it has worked out; its answers do not depend on that."""
+
+    def __init__(
+        self, parameters: SkyParameters, weather: Weather, sun_direction_W: Array | None, altitude_m: float, key: int
+    ) -> None:
+        """Set up.
+
+        Args:
+            parameters: sheet.
+            weather: of the flight.
+            sun_direction_W: (3,) toward the Sun, of any length; None is overhead.
+            altitude_m: of the camera above the ground.
+            key: 64 bits of the stream "clouds".
+        """
+        p = self._p = parameters
+        self._weather, self._altitude_m = weather, altitude_m
+        sun = np.array(_OVERHEAD if sun_direction_W is None else sun_direction_W, dtype=float)
+        self._sun = sun / math.sqrt(float(sun @ sun))
+        self._mu_sun = (max(float(self._sun[2]), 0.0) + p.cloud_aspect) / (1.0 + p.cloud_aspect)
+        self._sine_sun = max(float(self._sun[2]), 0.0)
+        self._droplets = Droplets(
+            asymmetry=p.cloud_asymmetry, size_parameter=2.0 * math.pi * p.droplet_radius_m / p.wavelength_m
+        )
+        cells = p.cloud_cell_m, p.deck_cell_m, p.ground_cell_m
+        self._above, self._deck, self._ground = (
+            Texture(key=key ^ layer, cell_m=cell, spectral_exponent=p.cloud_spectral_exponent)
+            for layer, cell in zip(_LAYERS, cells, strict=True)
+        )
+        self._clear_depth = -math.log(1.0 - p.zenith / p.horizon)
+        self._clear_share = 1.0 - math.exp(-p.cloud_height_m / p.aerosol_scale_m)  # of the air, under the cloud
+        excess = _KOSCHMIEDER / weather.visibility_m - _KOSCHMIEDER / p.clear_visibility_m
+        self._haze_depth = max(excess, 0.0) * p.haze_depth_m
+        self._shade()
+        self._table = DirectionTable(self.radiance, _TILES)
+        self.ambient = self._ambient()  #: mean relative radiance of all directions: what lights the Sun's lee
+
+    def fill(self, out: NDArray[np.float32], R_WC: Array, x: Array, y: Array) -> None:
+        """Write the relative radiance toward (1, -x_j, -y_i), C axes, into out (rows, columns)."""
+        if self._weather.night:
+            out[:] = self._p.night
+        else:
+            self._table.fill(out, R_WC, x, y)
+
+    def beam(self, directions_W: Array) -> Array:
+        """Return (n,) transmittance of cloud and haze for sunlight from (n, 3) directions; 1 without either."""
+        d = _unit(directions_W)
+        if self._weather.night:
+            return np.zeros(len(d))
+        mu = self._slope(d) / (1.0 + self._p.cloud_aspect)
+        through = np.exp(-self._depth_above(d) / mu - self._haze_depth * _air_mass(d[:, 2]))
+        return np.where(self._surface(d[:, 2], self._altitude_m)[0], 0.0, through)
+
+    def airlight(self, direction_W: Array) -> float:
+        """Return the relative radiance of endless haze toward a direction (3,): what far objects fade into."""
+        if self._weather.night:
+            return self._p.night
+        d = _unit(np.asarray(direction_W, dtype=float)[None])
+        return float(self._haze(d @ self._sun)[0])
+
+    @property
+    def diffuse_share(self) -> float:
+        """Share of the light on a surface that faces the Sun which does not come from the Sun's direction."""
+        direct = float(self.beam(self._sun[None])[0])
+        return self.ambient / (self.ambient + direct)
+
+    def radiance(self, directions_W: Array) -> Array:
+        """Return (n,) relative radiances toward (n, 3) directions: what `fill` reads between nodes of a table."""
+        return self._radiance(_unit(directions_W), with_aureole=True)
+
+    def _radiance(self, d: Array, with_aureole: bool) -> Array:
+        if self._weather.night:
+            return np.full(len(d), self._p.night)
+        cosine = np.clip(d[:, 0] * self._sun[0] + d[:, 1] * self._sun[1] + d[:, 2] * self._sun[2], -1.0, 1.0)
+        out = np.empty(len(d))
+        ground = self._surface(d[:, 2], self._altitude_m)[0]
+        up, down = np.flatnonzero(~ground), np.flatnonzero(ground)
+        out[up] = self._sky(d[up], cosine[up], with_aureole)
+        out[down] = self._land(d[down], cosine[down])
+        if self._has_deck:
+            seen = np.flatnonzero(self._surface(d[:, 2], self._altitude_m - self._p.deck_top_m)[0])
+            out[seen] = self._with_deck(d[seen], cosine[seen], out[seen])
+        clear = np.exp(-self._haze_depth * _air_mass(d[:, 2]))
+        return np.asarray(out * clear + self._haze(cosine) * (1.0 - clear))
+
+    def _sky(self, d: Array, cosine: Array, with_aureole: bool) -> Array:
+        """Clear sky, Eq. (2), and the cloud in it, Eq. (3)."""
+        mass = _air_mass(d[:, 2])
+        before = np.exp(-self._clear_share * self._clear_depth * mass)
+        beyond = self._source(cosine, 1.0, 1.0) * (before - np.exp(-self._clear_depth * mass))
+        front = self._source(cosine, self._light_below, self._direct_below) * (1.0 - before)
+        if self._weather.cloud_cover <= 0.0:
+            return np.asarray(front + beyond)
+        depth = self._depth_above(d)
+        mu = self._slope(d) / (1.0 + self._p.cloud_aspect)
+        light = self._droplets.diffuse(depth, mu, self._mu_sun, cosine)
+        light += self._p.ground_reflectance * self._sine_sun * self._light_below * (
+            1.0 - self._droplets.transmittance(depth)
+        )
+        if with_aureole:
+            light += self._droplets.aureole(depth, mu, cosine)
+        return np.asarray(front + before * light + beyond * np.exp(-depth / mu))
+
+    def _land(self, d: Array, cosine: Array) -> Array:
+        """The ground through the air under the deck's top (or under the aircraft), Eqs. (4) and (6)."""
+        p = self._p
+        _, distance, mu = self._surface(d[:, 2], self._altitude_m)
+        noise = self._ground.at(d[:, 0] * distance, d[:, 1] * distance, _NODE_RAD * distance / np.sqrt(mu))
+        land = p.ground_reflectance * np.maximum(1.0 + p.ground_contrast * noise, 0.0)
+        light = land * self._sine_sun * self._light_below
+        top = p.deck_top_m if self._has_deck else self._altitude_m
+        return self._through_air(light, d[:, 2], cosine, 0.0, top)
+
+    def _with_deck(self, d: Array, cosine: Array, below: Array) -> Array:
+        """The deck before what is below it, Eqs. (4) to (6)."""
+        p = self._p
+        _, distance, mu = self._surface(d[:, 2], self._altitude_m - p.deck_top_m)
+        noise = self._deck.at(d[:, 0] * distance, d[:, 1] * distance, _NODE_RAD * distance / np.sqrt(mu))
+        depth = optical_depth(noise, p.deck_cover, p.deck_optical_depth)
+        reflectance = 1.0 - self._droplets.transmittance(depth * (1.0 + p.cloud_aspect) / (mu + p.cloud_aspect))
+        facing = np.clip(self._mu_sun * (1.0 + p.cloud_aspect * noise), 0.0, 1.0)
+        light = reflectance * facing * self._light_below + (1.0 - reflectance) * below
+        return self._through_air(light, d[:, 2], cosine, p.deck_top_m, self._altitude_m)
+
+    def _through_air(self, light: Array, sine: Array, cosine: Array, low_m: float, high_m: float) -> Array:
+        """Light from below through the clear air between two heights, Eq. (6)."""
+        p = self._p
+        depth = p.aerosol_optical_depth * (math.exp(-low_m / p.aerosol_scale_m) - math.exp(-high_m / p.aerosol_scale_m))
+        clear = np.exp(-depth * _air_mass(sine))
+        return np.asarray(light * clear + self._source(cosine, self._light_below, self._direct_below) * (1.0 - clear))
+
+    def _source(self, cosine: Array, light: float, direct: float) -> Array:
+        """J of Eq. (1) in air that `light` of all sunlight reaches, `direct` of that as a beam."""
+        p = self._p
+        angle = np.arccos(cosine)
+        decayed = np.exp(-p.aureole_decay_1_rad * angle) - math.exp(-0.5 * math.pi * p.aureole_decay_1_rad)
+        shape = p.aureole * decayed + p.molecular * cosine * cosine
+        return np.asarray(p.horizon * light * (1.0 + direct * shape))
+
+    def _haze(self, cosine: Array) -> Array:
+        """J_h of Eq. (7): the beam that gets through the haze makes J, the rest of the light is the same all round."""
+        sun_mass = float(_air_mass(self._sun[2:])[0])
+        beam = math.exp(-self._haze_depth * sun_mass)
+        through = float(self._droplets.transmittance(np.asarray(self._haze_depth)))
+        rest = self._mu_sun * max(through - beam, 0.0) * self._light_below
+        return self._source(cosine, self._light_below, self._direct_below) * beam + rest
+
+    def _shade(self) -> None:
+        """Mean light under the layer above, and how much of it still is a beam."""
+        cover, depth = self._weather.cloud_cover, self._weather.cloud_optical_depth
+        self._light_below = 1.0 - cover + cover * float(self._droplets.transmittance(np.asarray(depth)))
+        self._direct_below = (1.0 - cover + cover * math.exp(-0.5 * depth / self._mu_sun)) / self._light_below
+        self._has_deck = self._p.deck_cover > 0.0 and self._altitude_m > self._p.deck_top_m
+
+    def _depth_above(self, d: Array) -> Array:
+        """(n,) optical depth straight through the layer where rays (n, 3) cross it, Eq. (3)."""
+        p = self._p
+        if self._weather.cloud_cover <= 0.0:
+            return np.zeros(len(d))
+        slope = self._slope(d)
+        reach = p.cloud_height_m / slope
+        noise = self._above.at(d[:, 0] * reach, d[:, 1] * reach, _NODE_RAD * reach / np.sqrt(slope))
+        return optical_depth(noise, self._weather.cloud_cover, self._weather.cloud_optical_depth)
+
+    def _slope(self, d: Array) -> Array:
+        """s + w of Eq. (3); the rays that see the layer stay above half of w below level."""
+        w = self._p.cloud_aspect
+        return np.maximum(d[:, 2] + w, 0.5 * w)
+
+    def _surface(self, sine: Array, depth_m: float) -> tuple[NDArray[np.bool_], Array, Array]:
+        """Whether rays meet a sphere so far below, the distance, and the cosine of incidence there, Eq. (4)."""
+        r = self._p.earth_radius_m + self._altitude_m
+        q = (r - depth_m) ** 2 - r * r * (1.0 - sine * sine)
+        meets = (sine < 0.0) & (q > 0.0) & (depth_m > 0.0)
+        root = np.sqrt(np.maximum(q, 1.0))
+        return meets, -r * sine - root, root / (r - depth_m)
+
+    def _ambient(self) -> float:
+        """Mean radiance over a Fibonacci sphere; the aureole counts as direct light."""
+        k = np.arange(_AMBIENT_DIRECTIONS) + 0.5
+        z = 1.0 - 2.0 * k / _AMBIENT_DIRECTIONS
+        turn = math.pi * (1.0 + math.sqrt(5.0)) * k
+        across = np.sqrt(1.0 - z * z)
+        directions = np.stack([across * np.cos(turn), across * np.sin(turn), z], axis=1)
+        return float(self._radiance(directions, with_aureole=False).mean())
+
+
+def _air_mass(sine: Array) -> Array:
+    s = np.abs(sine)
+    return np.asarray(1.0 / (s + 0.025 * np.exp(-11.0 * s)))
+
+
+def _unit(directions: Array) -> Array:
+    d = np.asarray(directions, dtype=float)
+    length = np.sqrt(d[:, 0] * d[:, 0] + d[:, 1] * d[:, 1] + d[:, 2] * d[:, 2])
+    return np.asarray(d / length[:, None])

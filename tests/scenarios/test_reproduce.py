@@ -1,0 +1,77 @@
+"""Reproductions stand beside their sources, in the form that the command prints."""
+
+import json
+
+import cv2
+import pytest
+
+from dockair.errors import DockairError
+from dockair.scenarios.reproduce import registry
+
+
+@pytest.fixture(scope="module")
+def band():
+    return registry.reproduce("sensor/band")
+
+
+def _rows(result, start):
+    return [row for row in result["rows"] if row["case"].startswith(start)]
+
+
+@pytest.mark.parametrize("wanted", registry.ids())
+def test_every_reproduction_has_the_printed_form_and_is_json(wanted, tmp_path):
+    result = registry.reproduce(wanted, tmp_path / "new" / "folder")
+    assert json.loads(json.dumps(result, allow_nan=False)) == result
+    assert list(result) == ["id", "source", "rows"] and result["id"] == wanted
+    for row in result["rows"]:
+        assert list(row) == ["case", "ours", "reference"]
+        assert row["reference"].keys() <= row["ours"].keys() and row["reference"]
+    pictures = list((tmp_path / "new" / "folder").glob("*.png"))
+    assert len(pictures) == 1 and cv2.imread(str(pictures[0])).std() > 10.0
+
+
+def test_an_unknown_id_is_refused_with_those_that_exist():
+    with pytest.raises(DockairError, match=r"got 'sensor'; exists: .*sensor/band"):
+        registry.reproduce("sensor")
+
+
+def test_sunlight_in_the_camera_band_is_the_standards(band):
+    rows = _rows(band, "sunlight")
+    assert [row["case"] for row in rows][:2] == ["sunlight, 800-1000 nm", "sunlight, 840-860 nm"]
+    assert rows[0]["reference"] == {"extraterrestrial_w_m2": 183.83, "global_tilt_w_m2": 150.84, "direct_w_m2": 140.63}
+    for row in rows[:3]:
+        assert row["ours"] == pytest.approx(row["reference"], abs=0.006)
+    assert rows[3]["ours"] == pytest.approx(rows[3]["reference"], rel=0.005)  # outside 700-1150 nm every fifth one
+
+
+def test_the_default_sensor_is_table_4_and_reads_faster_than_its_180_hz(band):
+    (row,) = _rows(band, "table 4")
+    ours, printed = row["ours"], dict(row["reference"])
+    assert printed.pop("frame_rate_hz") == 180.0 <= ours["frame_rate_hz"]
+    assert (ours["width_px"], ours["height_px"], ours["pixel_pitch_um"]) == (2048, 1088, pytest.approx(5.5))
+    assert {key: ours[key] for key in printed} == pytest.approx(printed, rel=3e-3)  # 11.264 x 5.984 mm as 11.27 x 6
+
+
+def test_the_default_lens_is_table_5(band):
+    (row,) = _rows(band, "table 5")
+    assert row["ours"]["focal_length_mm"] == pytest.approx(row["reference"]["focal_length_mm"])
+    assert (row["ours"]["f_number_from"], row["ours"]["f_number_to"]) == (1.4, 16.0)
+    assert row["ours"]["focus_from_mm"] >= row["reference"]["focus_from_mm"] == 100.0
+
+
+def test_the_default_filter_is_table_6(band):
+    (row,) = _rows(band, "table 6")
+    assert row["reference"] == {
+        "cut_on_nm": 800.0,
+        "transmits_from_nm": 815.0,
+        "transmits_to_nm": 1650.0,
+        "rejects_to_nm": 785.0,
+    }
+    assert row["ours"] == pytest.approx(row["reference"], abs=0.15)
+
+
+def test_the_line_is_850_nm_and_nearly_all_electrons_come_from_the_band(band):
+    (row,) = _rows(band, "LEDs' line")
+    assert row["ours"]["led_wavelength_nm"] == pytest.approx(row["reference"]["led_wavelength_nm"])
+    assert row["ours"]["band_from_nm"] == pytest.approx(row["reference"]["band_from_nm"], abs=10.0)
+    assert row["ours"]["band_to_nm"] == pytest.approx(row["reference"]["band_to_nm"], abs=50.0)
