@@ -58,11 +58,11 @@ def _camera_figures(camera: NearInfraredCamera, world: World, name: str) -> dict
     full = Window(0, 1088, 0, 2048)
     figures = {}
     for what, window in (("full frame", full), ("400 rows", _ROWS), ("300 x 300", _SMALL)):
-        figures[f"{name}: expose, {what}"] = _least(lambda w=window: camera.expose(world.data, 0.0, 0, w))  # type: ignore[misc]
+        figures[f"{name}: expose, {what}"] = _least(lambda w=window: camera.expose(world.data, 0.0, 0, w))
         figures[f"{name}: without electronics, {what}"] = _least(
-            lambda w=window: camera.expected_electrons(world.data, w)  # type: ignore[misc]
+            lambda w=window: camera.expected_electrons(world.data, w)
         )
-        figures[f"{name}: background, {what}"] = _least(lambda w=window: camera.background_electrons(world.data, w))  # type: ignore[misc]
+        figures[f"{name}: background, {what}"] = _least(lambda w=window: camera.background_electrons(world.data, w))
     return figures
 
 

@@ -157,6 +157,11 @@ class Faults:
         """Whether there are any, at whatever time."""
         return bool(self._faults)
 
+    @property
+    def exposures_s(self) -> tuple[float, ...]:
+        """Exposures at which the camera will be stuck."""
+        return tuple(fault.exposure_s for fault in self._faults if isinstance(fault, ExposureStuck))
+
     def led_factors(self, time_s: float, exposure_s: float = 0.0) -> Array:
         """(n,) what is left of each LED's light in an exposure.
 

@@ -15,7 +15,7 @@ what a data sheet calls in-run bias stability, the floor of the curve: a Gauss-M
 has its highest Allan deviation, 0.6174 s, at 1.893 T. (sqrt(2 ln 2/pi) = 0.664 belongs to 1/f noise.)
 
 Samples are joined by straight lines, which by itself passes sinc^2(f dt): near half the sample rate the hold, not the
-filter, sets the gain. w_c = 2 pi bandwidth for a damping z of 0.707 (elsewhere the -3 dB point moves). The noise is added
+filter, sets the gain. w_c = 2 pi bandwidth for a damping z of 0.707 (elsewhere the -3 dB point moves). The noise comes
 after the filter.
 
 Not modelled: non-linearity, temperature, dead time, vibration rectification, the noise's own bandwidth.

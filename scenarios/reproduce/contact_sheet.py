@@ -50,32 +50,40 @@ SHOTS = (
     Shot(title="6 m, Sun behind"),
     Shot(title="2.5 m", range_m=2.5),
     Shot(title="Sun abeam", settings=_sun(90.0, 30.0)),
-    Shot(title="glints: Sun high behind, bare metal", settings=_sun(150.0, 60.0) | {
-        "parameters.surfaces.metal_specular": 0.6
-    }),
+    Shot(
+        title="glints: Sun high behind, bare metal",
+        settings=_sun(150.0, 60.0) | {"parameters.surfaces.metal_specular": 0.6},
+    ),
     Shot(title="Sun in view", range_m=10.0, settings=_AHEAD),
     Shot(title="Sun in view, 20 nm band-pass", range_m=10.0, settings=_AHEAD | {"camera.filter": "band_pass"}),
     Shot(title="low Sun, gaps in cloud", range_m=10.0, settings=_sun(5.0, 6.0) | {"weather.cloud_cover": 0.6}),
     Shot(title="night", range_m=10.0, settings={"weather.night": True}),
     Shot(title="haze, visibility 150 m", range_m=10.0, settings={"weather.visibility_m": 150.0}),
-    Shot(title="dirty window, Sun in view", range_m=10.0, settings=_AHEAD | {
-        "faults": [{"kind": "dirty_window", "cover": 0.4}]
-    }),
-    Shot(title="LEDs 1 and 2 off, 5 dim", settings={
-        "faults": [{"kind": "led_off", "leds": [1, 2]}, {"kind": "led_dim", "leds": [5], "factor": 0.2}]
-    }),
+    Shot(
+        title="dirty window, Sun in view",
+        range_m=10.0,
+        settings=_AHEAD | {"faults": [{"kind": "dirty_window", "cover": 0.4}]},
+    ),
+    Shot(
+        title="LEDs 1 and 2 off, 5 dim",
+        settings={"faults": [{"kind": "led_off", "leds": [1, 2]}, {"kind": "led_dim", "leds": [5], "factor": 0.2}]},
+    ),
     Shot(title="2000 hot pixels", settings={"faults": [{"kind": "hot_pixels", "count": 2000}]}),
     Shot(title="exposure stuck at 500 µs", settings={"faults": [{"kind": "exposure_stuck", "exposure_us": 500.0}]}),
-    Shot(title="f/2.8, focused at 30 m", settings={
-        "parameters.lens.f_number": 2.8, "parameters.lens.focus_distance_m": 30.0
-    }),
+    Shot(
+        title="f/2.8, focused at 30 m",
+        settings={"parameters.lens.f_number": 2.8, "parameters.lens.focus_distance_m": 30.0},
+    ),
 )
 
 
 def reproduce(out: Path | None) -> dict[str, Any]:
     """Make the frames and, with a folder, the sheet."""
     taken = [_take(shot) for shot in SHOTS]
-    rows = [{"case": shot.title, "ours": figures, "reference": {}} for shot, (_, _, figures) in zip(SHOTS, taken, strict=True)]
+    rows = [
+        {"case": shot.title, "ours": figures, "reference": {}}
+        for shot, (_, _, figures) in zip(SHOTS, taken, strict=True)
+    ]
     if out is not None:
         _draw([(shot.title, frame, leds) for shot, (frame, leds, _) in zip(SHOTS, taken, strict=True)], out / PICTURE)
     pictures = [] if out is None else [PICTURE]
@@ -112,9 +120,7 @@ def _placed(parts: Parts, range_m: float) -> mujoco.MjData:
     return data
 
 
-def _figures(
-    camera: NearInfraredCamera, data: mujoco.MjData, frame: CameraFrame, leds_px: Array
-) -> dict[str, float]:
+def _figures(camera: NearInfraredCamera, data: mujoco.MjData, frame: CameraFrame, leds_px: Array) -> dict[str, float]:
     blobs = detect(frame.pixels, None, frame.window, gain_dn_per_electron=frame.gain)
     visible = camera.visible_leds(data)
     distance = np.linalg.norm(blobs.centroids_px[:, None] - leds_px[None], axis=2)
@@ -140,7 +146,6 @@ def _draw(frames: list[tuple[str, CameraFrame, Array]], path: Path) -> None:
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(14.0, 8.6), dpi=110, layout="constrained")
-    figure.get_layout_engine().set(w_pad=0.02, h_pad=0.02, wspace=0.0, hspace=0.02)  # type: ignore[union-attr]
     for axes, (title, frame, leds_px) in zip(figure.subplots(4, 4).ravel(), frames, strict=True):
         axes.imshow(_thumbnail(frame.pixels), cmap="gray", vmin=0.0, vmax=1.0, interpolation="nearest")
         axes.set_title(f"{title}, {1e6 * frame.exposure_s:.0f} µs", fontsize=8, pad=2)

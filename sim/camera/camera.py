@@ -3,8 +3,8 @@
     sky and scene in haze ► stray light of the Sun ► its disc ► point sources ► expected electrons
     expected electrons ► electronics ► pixels ► exposure control ► exposure of the next frame
 
-Point sources are the LEDs, their reflections and the Sun's, each spread by `optics` and smeared over the exposure by the
-motion of what it sits on. An LED is hidden when something lies between it and the lens.
+Point sources are the LEDs, their reflections and the Sun's, each spread by `optics` and smeared over the exposure by
+the motion of what it sits on. An LED is hidden when something lies between it and the lens.
 
 Time: `expose` is called with the world at the middle of the exposure; the frame arrives `latency_s` later.
 Not modelled: motion of background and Sun during an exposure; glints move as if they stuck to their surfaces.
@@ -24,7 +24,8 @@ from dockair.parameters import load_parameters
 from dockair.rotations import Array
 from dockair.sim.as_built import AsBuilt
 from dockair.sim.camera import sheets as sheet
-from dockair.sim.camera.background import Background
+from dockair.sim.camera.background import Background, Lighting, available_backend
+from dockair.sim.camera.coarse_grid import CoarseGrid
 from dockair.sim.camera.dirt import Dirt
 from dockair.sim.camera.electronics import digitise, output_gain
 from dockair.sim.camera.exposure import ExposureControl
@@ -149,20 +150,25 @@ class NearInfraredCamera:
         self._spread = PointSpread(sheets.lens, sheets.sensor, camera, wavelength)
         self._sky = Sky(sheets.sky, weather, sun_direction_W, altitude_m, noise.clouds)
         self._extinction_1_m = extinction_1_m(weather.visibility_m)
-        self._background = Background(model, camera, sheets.background, self._sky, background)
         self._sun: SunView | None = None
+        self._glare = Glare(sheets.glare, sheets.lens, camera, sheets.light, self._response, wavelength)
         if sun_direction_W is not None:
             sun_W = np.array(sun_direction_W, dtype=float)
             margin = _EDGE_SIGMAS * self._spread.edge_sigma_px()
             self._sun = SunView(model, camera, self._sky, sun_W, sheets.light.sun_angular_radius_rad, margin)
-            self._glare = Glare(sheets.glare, sheets.lens, camera, sheets.light, self._response, wavelength)
+        backend = available_backend(background)
+        lighting = _lighting(self._sky, sheets.sky, weather, self._sun)
+        self._background = Background(model, camera, sheets.background, self._sky, backend, lighting)
         self._sources = PointSources(model, sheets, as_built, self._response, self._sun, self._extinction_1_m)
+        _check_stuck_exposures(self._faults, sheets.exposure)
         self._pattern = FixedPattern(sheets.sensor, noise.fixed_pattern, camera.height_px, camera.width_px)
         self._control = ExposureControl(sheets.exposure, sheets.sensor, automatic=automatic_exposure)
         self._dirt: tuple[float, Dirt | None] = 0.0, None
         self._last: CameraFrame | None = None
 
-    def expose(self, data: mujoco.MjData, time_s: float, frame_number: int, window: Window | None) -> CameraFrame | None:
+    def expose(
+        self, data: mujoco.MjData, time_s: float, frame_number: int, window: Window | None
+    ) -> CameraFrame | None:
         """Return the frame of the world as it stands; None when the camera has dropped out.
 
         Args:
@@ -192,7 +198,7 @@ class NearInfraredCamera:
         pixels.setflags(write=False)
         self._last = CameraFrame(
             time_stamp_s=time_s,
-            pixels=pixels,  # type: ignore[arg-type]  # 8 bits
+            pixels=pixels,
             window=window,
             exposure_s=exposure_s,
             gain=output_gain(self._sheets.sensor),
@@ -235,23 +241,11 @@ class NearInfraredCamera:
             exposure_s: None for that of the next frame.
         """
         exposure_s = self.exposure_s() if exposure_s is None else exposure_s
-        pose = self.pose(data)
-        dirt = self._dirt_at(time_s)
+        pose, dirt = self.pose(data), self._dirt_at(time_s)
         veil = 1.0 if dirt is None else dirt.veil_factor
-        sun_C, visible, stray = np.zeros(3), 0.0, None
-        if self._sun is not None:
-            sun_C = pose[0].T @ self._sun.direction_W
-            visible = self._sun.visible(data, pose[1]) if sun_C[0] > 0.0 else 0.0
-            stray = self._glare.stray(sun_C, visible, exposure_s, window, veil)
-        image = self._background.electrons(
-            data,
-            pose,
-            window,
-            self._response.white_e_s * exposure_s,
-            stray=stray,
-            dirt=None if dirt is None else dirt.grid,
-            extinction_1_m=self._extinction_1_m,
-        )
+        sun_C, visible = self._sun_in_view(data, pose)
+        stray = self._glare.stray(sun_C, visible, exposure_s, window, veil) if visible > 0.0 else None
+        image = self.background_electrons(data, window, exposure_s, stray, dirt)
         start = window.row_start, window.column_start
         if self._sun is not None and visible > 0.0:
             self._glare.add_fine(image, start, sun_C, visible, exposure_s, veil)
@@ -262,6 +256,35 @@ class NearInfraredCamera:
         for sources in self._sources.of(data, pose, exposure_s, factors):
             self._add(image, start, sources, dirt)
         return image
+
+    def background_electrons(
+        self,
+        data: mujoco.MjData,
+        window: Window,
+        exposure_s: float | None = None,
+        stray: CoarseGrid | None = None,
+        dirt: Dirt | None = None,
+    ) -> NDArray[np.float32]:
+        """Return (rows, columns) expected electrons of sky and scene alone, with stray light and dirt if given."""
+        exposure_s = self.exposure_s() if exposure_s is None else exposure_s
+        pose = self.pose(data)
+        return self._background.electrons(
+            data,
+            pose,
+            window,
+            self._response.white_e_s * exposure_s,
+            stray=stray,
+            dirt=None if dirt is None else dirt.grid,
+            extinction_1_m=self._extinction_1_m,
+            airlight=self._sky.airlight(pose[0][:, 0]),
+        )
+
+    def _sun_in_view(self, data: mujoco.MjData, pose: tuple[Array, Array]) -> tuple[Array, float]:
+        """(3,) unit vector toward the Sun in camera axes, and the part of its disc that the lens sees."""
+        if self._sun is None:
+            return np.zeros(3), 0.0
+        sun_C = pose[0].T @ self._sun.direction_W
+        return sun_C, self._sun.visible(data, pose[1]) if sun_C[0] > 0.0 else 0.0
 
     def pose(self, data: mujoco.MjData) -> tuple[Array, Array]:
         """Return R_WC (3, 3) and p_WC (3,) of the camera as built [m]."""
@@ -320,3 +343,20 @@ class NearInfraredCamera:
         if not inside:
             raise DockairError("camera.window", expected=f"a window inside {full}", got=window)
         return window
+
+
+def _lighting(sky: Sky, parameters: sheet.SkyParameters, weather: Weather, sun: SunView | None) -> Lighting:
+    """The light on the scene; without a Sun to be seen it comes from overhead, at night from nowhere in particular."""
+    overhead = np.array([0.0, 0.0, 1.0])
+    if weather.night:
+        return Lighting(toward_W=overhead, ambient=parameters.night, direct=0.0)
+    if sun is None:
+        return Lighting(toward_W=overhead, ambient=sky.ambient, direct=1.0)
+    return Lighting(toward_W=sun.direction_W, ambient=sky.ambient, direct=sun.beam)
+
+
+def _check_stuck_exposures(faults: Faults, exposure: sheet.ExposureParameters) -> None:
+    for stuck_at in faults.exposures_s:
+        if not exposure.shortest_s <= stuck_at <= exposure.longest_s:
+            expected = f"{1e6 * exposure.shortest_s:g} to {1e6 * exposure.longest_s:g} us, the hardware's limits"
+            raise DockairError("faults.exposure_us", expected=expected, got=round(1e6 * stuck_at, 6))

@@ -11,19 +11,20 @@ random number comes from a hash of (key, octave, lattice point).
 Light. Half of what droplets take out of a beam is diffracted, into a lobe a few degrees wide, and half is refracted.
 Both lobes are Henyey-Greenstein's, P(c; g) = (1 - g^2)/(1 + g^2 - 2 g c)^(3/2), of which n in a row make P(c; g^n):
 
-    g_d = 1 - 4/(pi x), x = 2 pi r/lambda   (tail of the Airy pattern),     g_r = 2 g - g_d                        (3)
+    g_d = 1 - z/(sqrt(3) x),  J_0(z)^2 + J_1(z)^2 = 1/2,  x = 2 pi r/lambda,     g_r = 2 g - g_d                    (3)
     beam      exp(-tau/mu_0)                                                                                    (4)
     aureole   P(c; g_d^m)/4 (exp(-t) - exp(-tau/mu)),     t = tau/2mu,  m = t/(1 - exp(-t))                       (5)
     lobe      P(c; g_r)/4 t (exp(-t_0) - exp(-t))/(t - t_0),    t_0 = tau/2mu_0     (scattered once)              (6)
     diffuse   mu_0 (T - exp(-t_0)(1 + F t_0)),  not below 0,    T = 1/(1 + 3/4 (1 - g) tau)                       (7)
 
 with c the cosine of the angle from the Sun, mu and mu_0 the cosines of incidence of sight and Sun, F the forward half
-of the refracted lobe and T the two-stream transmittance of a layer that absorbs nothing. Radiances are relative: 1 is a
-white Lambertian surface in normal sunlight. Beam, aureole, lobe and diffuse light add up to T mu_0.
+of the refracted lobe and T the two-stream transmittance of a layer that absorbs nothing. Half of the diffracted lobe lies
+within the same angle as of the Airy pattern, 1.7/x. Radiances are relative: 1 is a white Lambertian surface in normal
+sunlight. Beam, aureole, lobe and diffuse light together bring T mu_0 to a level surface, to an eighth.
 
 Not modelled: ice (halos, mock suns), rainbow and corona's rings, absorption, light that wanders sideways from one part
 of the layer to another (each ray meets a layer that is as thick everywhere as where it crosses), cloud sides, drift.
-Valid for the direction of view within the field (2); sums of few octaves have lighter tails than the normal law.
+The sum of octaves is normal to a percent of cover.
 Sources: Perlin 2002 (gradient noise); Cahalan & Snider 1989 (exponent 5/3 of cloud liquid water); van de Hulst, Light
 Scattering by Small Particles, sections 8.2 and 12.3 (half is diffracted, Airy); Kattawar 1975 (sums of
 Henyey-Greenstein lobes); Bohren 1987 (two-stream transmittance); Steele, Lea & Flood 2014 (hash).
@@ -34,7 +35,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 
 from dockair.rotations import Array
@@ -42,6 +42,7 @@ from dockair.rotations import Array
 _OCTAVES = 12  # 4096:1; the footprint ends the sum earlier
 _FINEST = 2.0  # lattice over footprint at which an octave has faded out, from twice that on
 _THICKEST = 4.0  # standard deviations that the threshold keeps away from an endless one (cover 0 or 1)
+_AIRY_HALF = 1.6747  # z of Eq. (3)
 _DIFFRACTED = 0.5  # share of the extinction: geometric optics' paradox
 _TURN = math.cos(0.65), math.sin(0.65)  # octave against octave, so that their lattices do not line up
 
@@ -94,7 +95,7 @@ class Droplets:
     @property
     def lobes(self) -> tuple[float, float]:
         """g_d and g_r, Eq. (3)."""
-        diffracted = 1.0 - 4.0 / (math.pi * self.size_parameter)
+        diffracted = 1.0 - _AIRY_HALF / (math.sqrt(3.0) * self.size_parameter)
         return diffracted, (self.asymmetry - _DIFFRACTED * diffracted) / (1.0 - _DIFFRACTED)
 
     def transmittance(self, depth: Array) -> Array:
@@ -117,8 +118,8 @@ class Droplets:
         """Return (n,) relative radiance of all other scattered light, Eqs. (6) and (7); arguments as `aureole`."""
         g = self.lobes[1]
         t, t_0 = (1.0 - _DIFFRACTED) * depth / mu, (1.0 - _DIFFRACTED) * depth / mu_0
-        apart = np.where(np.abs(t - t_0) > 1e-9, t - t_0, 1e-9)
-        once = 0.25 * lobe(cosine, np.asarray(g)) * t * np.exp(-t) * np.expm1(apart) / apart
+        apart = np.where(np.abs(t - t_0) > 1e-6, t - t_0, 1e-6)
+        once = 0.25 * lobe(cosine, np.asarray(g)) * t * (np.exp(apart - t) - np.exp(-t)) / apart
         rest = self.transmittance(depth) - np.exp(-t_0) * (1.0 + forward_half(g) * t_0)
         return np.asarray(once + mu_0 * np.maximum(rest, 0.0))
 

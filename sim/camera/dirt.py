@@ -1,12 +1,12 @@
 """Dirt on the window before the lens: smudges far out of focus that dim what is behind them and spread sunlight.
 
-    g = G(s_1) * n_1 + G(s_2) * n_2 + ...        white noise n_k smoothed by Gaussians G of smudge size, variance 1 (1)
+    g = Sum_k s_k g_k/|s|,   g_k = white noise smoothed by a Gaussian of smudge size s_k, variance 1             (1)
     h = max(g - g_c, 0)/d,   T = 1 - (1 - T_min) h^2/(1 + h^2)                                                   (2)
     veil and halo grow by   1 + scatter (1 - mean T)/(veil + halo)                                               (3)
 
-g_c is the quantile of g that leaves the part `cover` of the frame above it, so that more cover contains less; d is the
-thickness at which a smudge is half as dark as it can be. Of the light that dirt takes, the part `scatter` returns as
-veil and halo.
+Big smudges are thick. g_c is the quantile of g that leaves the part `cover` of the frame above it, so that more cover
+contains less; d is the thickness at which a smudge is half as dark as it can be. Of the light that dirt takes, the
+part `scatter` returns as veil and halo.
 
 Not modelled: that smudges move with the aperture's parallax; what they spread of LEDs (their halo stays unseen).
 Not valid for drops that focus light.
@@ -59,8 +59,14 @@ class Dirt:
 def _field(parameters: GlareParameters, focal_px: float, rng: np.random.Generator, shape: tuple[int, int]) -> Array:
     """(m, n) field g of Eq. (1)."""
     total = np.zeros(shape)
-    for size_rad in np.geomspace(parameters.dirt_smallest_rad, parameters.dirt_largest_rad, _SIZES):
-        sigma = _SIGMA_OF_SIZE * size_rad * focal_px / SPACING_PX
-        # noise n_k of variance 1 smoothed by a Gaussian has the variance 1/(4 pi sigma^2)
-        total += 2.0 * np.sqrt(np.pi) * sigma * gaussian_filter(rng.standard_normal(shape), sigma, mode="wrap")
-    return np.asarray(total / np.sqrt(_SIZES))
+    sigmas = (
+        _SIGMA_OF_SIZE
+        * focal_px
+        / SPACING_PX
+        * np.geomspace(parameters.dirt_smallest_rad, parameters.dirt_largest_rad, _SIZES)
+    )
+    for sigma in sigmas:
+        # noise of variance 1 smoothed by a Gaussian has the variance 1/(4 pi sigma^2)
+        unit = 2.0 * np.sqrt(np.pi) * sigma * gaussian_filter(rng.standard_normal(shape), sigma, mode="wrap")
+        total += sigma * unit
+    return np.asarray(total / np.sqrt(np.sum(sigmas**2)))

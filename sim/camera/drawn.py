@@ -2,9 +2,10 @@
 
 Only solids are drawn; the sky comes from elsewhere. Colour carries two things at once: red is the solid's grey
 
-    red = rho (ambient + direct max(0, n . s)),      blue = 1 where there is a solid, 0 where there is none           (1)
+    red = rho (ambient + direct max(0, n . s)) / (ambient + direct),      blue = 1 where there is a solid, else 0     (1)
 
-because the light's ambient part is (ambient, 0, 1), its direct part (direct, 0, 0), a solid's colour (rho, 0, 1).
+because the light's ambient part is (ambient, 0, 1), its direct part (direct, 0, 0), red over their sum, and a solid's
+colour (rho, 0, 1).
 So a solid in the dark still hides the sky.
 
 The frustum is off-centre, on the outer edges of the blocks asked for. Every solid is one of a few unit meshes
@@ -28,10 +29,10 @@ from numpy.typing import NDArray
 
 from dockair.rotations import Array
 from dockair.sim.camera.solids import BALL, BOX, CAPSULE, Haze, Lighting, Solids, depth_limits_m
-from dockair.sim.camera.unit_meshes import BALLS, CUBE, LEVELS, TUBES, unit_meshes
+from dockair.sim.camera.unit_meshes import BALLS, CUBE, ENDS, LEVELS, TUBES, unit_meshes
 from dockair.sim.off_screen import Canvas
 
-_ROUND_END_BLOCKS = 0.5  # radius from which a capsule gets its round ends
+_ROUND_END_BLOCKS = 1.0  # radius from which a capsule gets its round ends
 _HALF_LEVEL = 128  # of 256: blue is 0 or 255
 
 
@@ -55,6 +56,7 @@ class DrawnSolids:
     ) -> None:
         self._solids, self._lighting, self._most = Solids.of(model), lighting, most
         self._limits_m, self._scale = depth_limits_m(model), blocks_per_tangent
+        self._full = max(lighting.ambient + lighting.direct, np.finfo(float).tiny)  # of a white solid facing the Sun
         self._canvas: Canvas | None = None
 
     def draw(
@@ -92,7 +94,7 @@ class DrawnSolids:
         depths = np.empty((rows, columns) if haze.extinction_1_m > 0.0 else (0, 0), dtype=np.float32)
         assert self._canvas is not None
         self._canvas.render(self._scene, colours, depths if depths.size else None)
-        _lay_over(out, colours, depths, x, y, haze.extinction_1_m, haze.airlight, self._limits_m)
+        _lay_over(out, colours, self._full / 255.0, depths, x, y, haze.extinction_1_m, haze.airlight, self._limits_m)
 
     def close(self) -> None:
         """Free the OpenGL context."""
@@ -125,8 +127,8 @@ class DrawnSolids:
         self._scene.nlight = 1
         light.type, light.headlight, light.castshadow = mujoco.mjtLightType.mjLIGHT_DIRECTIONAL, 0, 0
         light.dir[:], light.attenuation[:] = -lighting.toward_W, (1.0, 0.0, 0.0)
-        light.ambient[:] = lighting.ambient, 0.0, 1.0
-        light.diffuse[:], light.specular[:] = (lighting.direct, 0.0, 0.0), 0.0
+        light.ambient[:] = lighting.ambient / self._full, 0.0, 1.0
+        light.diffuse[:], light.specular[:] = (lighting.direct / self._full, 0.0, 0.0), 0.0
 
     def _arrange(self, data: mujoco.MjData, R_WC: Array, p_WC: Array, frustum: Array) -> int:
         """Put into the scene what may be seen; return how many pieces that is."""
@@ -199,12 +201,15 @@ def _pieces(
             level += 1
         ends = 3 if kind == CAPSULE and radius >= _ROUND_END_BLOCKS else 1
         for part in range(ends):
-            size = (h[0], h[1], h[2]) if part == 0 else (h[0], h[0], h[0])
-            offset = 0.0 if part == 0 else (h[2] if part == 1 else -h[2])
+            side = 1.0 if part < 2 else -1.0  # of a capsule's end; the lower one is the upper one turned about x
+            size = (h[0], h[1], h[2]) if part == 0 else (h[0], side * h[0], side * h[0])
+            offset = 0.0 if part == 0 else side * h[2]
             if kind == BOX:
                 meshes[count] = CUBE
+            elif part > 0:
+                meshes[count] = ENDS + level
             else:
-                meshes[count] = (BALLS if kind == BALL or part > 0 else TUBES) + level
+                meshes[count] = (BALLS if kind == BALL else TUBES) + level
             for k in range(3):
                 places[count, k] = centres[g, k] + offset * axes[g, k, 2]
                 for axis in range(3):
@@ -226,6 +231,7 @@ def _beyond(across: float, depth: float, low: float, high: float, bound: float) 
 def _lay_over(
     out: NDArray[np.float32],
     colours: NDArray[np.uint8],
+    level: float,
     depths: NDArray[np.float32],
     x: Array,
     y: Array,
@@ -235,15 +241,14 @@ def _lay_over(
 ) -> None:
     """Take the solids' grey, Eq. (1), where the picture has any; with haze before them if there are depths."""
     near, far = limits
-    level = np.float32(1.0 / 255.0)
     for i in range(out.shape[0]):
         row = out.shape[0] - 1 - i  # OpenGL's first row is the lowest
         for j in range(out.shape[1]):
             if colours[row, j, 2] < _HALF_LEVEL:
                 continue
-            radiance = colours[row, j, 0] * level
+            radiance = level * colours[row, j, 0]
             if depths.size > 0:
                 t = near * far / (far - depths[row, j] * (far - near))
                 clear = math.exp(-extinction * t * math.sqrt(1.0 + x[j] * x[j] + y[i] * y[i]))
-                radiance = np.float32(radiance * clear + air * (1.0 - clear))
+                radiance = radiance * clear + air * (1.0 - clear)
             out[i, j] = radiance

@@ -23,14 +23,15 @@ from dockair.sim.camera.sheets import ExposureParameters, SensorParameters
 class ExposureControl:
     """Holds the exposure of the next frame."""
 
-    def __init__(self, parameters: ExposureParameters, sensor: SensorParameters) -> None:
+    def __init__(self, parameters: ExposureParameters, sensor: SensorParameters, automatic: bool = True) -> None:
         """Start with the sheet's exposure.
 
         Args:
             parameters: sheet.
             sensor: whose black level and full scale the grey levels refer to.
+            automatic: False holds the sheet's exposure.
         """
-        self._p = parameters
+        self._p, self._automatic = parameters, automatic
         self._black = output_black(sensor)
         full_well = self._black + output_gain(sensor) * sensor.full_well_e
         self._span = min(full_well, 2.0**OUTPUT_BITS - 1.0) - self._black
@@ -59,7 +60,7 @@ class ExposureControl:
         if not p.shortest_s <= exposure_s <= p.longest_s:
             expected = f"{p.shortest_s} to {p.longest_s} s (exposure.shortest_s, exposure.longest_s)"
             raise DockairError("exposure_s", expected=expected, got=exposure_s)
-        if not p.automatic:
+        if not self._automatic:
             return self._exposure_s
         y = (brightest_level(pixels, p.metered_pixel) - self._black) / self._span
         if y >= p.clipped_level:

@@ -31,7 +31,8 @@ from dockair.sim.camera.coarse_grid import SPACING_PX
 from dockair.sim.camera.iris import Iris
 
 _COMPACT_PX = 4.0 * SPACING_PX
-_SOFTEST_PX = 1.5 * SPACING_PX  # the sharpest edge that the coarse grid can hold
+_SHARPEST_PX = 1.5 * SPACING_PX  # edge, half-width, that the coarse grid can hold
+_SMALLEST_PX = 1.5  # radius: diffraction and the pixel make no image finer
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -68,7 +69,7 @@ class Ghosts:
         self._iris, self._s, self._f, self._c = iris, np.asarray(positions), np.asarray(shares), np.array(centre_px)
         sun = np.abs(self._s) * sun_radius_px
         self._polygon = pupil_px > sun
-        self._radius = np.maximum(np.maximum(pupil_px, sun), 0.5)  # no image is finer than the pixel
+        self._radius = np.maximum(np.maximum(pupil_px, sun), _SMALLEST_PX)
         self._edge = np.minimum(pupil_px, sun) * math.sqrt(5.0) / 2.0
         self._compact = self._radius + self._edge < _COMPACT_PX
 
@@ -101,12 +102,12 @@ class Ghosts:
         which: NDArray[np.bool_],
     ) -> None:
         places = self.places(sun_px)
-        softest = _SOFTEST_PX if spacing > 1 else 1.0
+        sharpest = _SHARPEST_PX if spacing > 1 else _SMALLEST_PX
         for k in np.flatnonzero(which):
             round_iris = Iris(blades=0, angle_rad=0.0)
             iris = self._iris if self._polygon[k] else round_iris
             a = iris.inscribed_radius(float(self._radius[k]))
-            w = min(max(float(self._edge[k]), softest), a)
+            w = min(max(float(self._edge[k]), sharpest), a)
             level = electrons * float(self._f[k]) / (iris.area_factor * (a**2 + w**2 / 5.0))
             u, v = places[k]
             corner = a / math.cos(math.pi / iris.blades) if iris.blades else a

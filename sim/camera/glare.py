@@ -23,10 +23,8 @@ Sources: ISO 9358 (glare index); the parts name theirs.
 """
 
 import math
-from dataclasses import dataclass
 from typing import Final
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
@@ -38,7 +36,6 @@ from dockair.sim.camera.coarse_grid import CoarseGrid, nodes_around
 from dockair.sim.camera.ghosts import CompactGhosts, Ghosts
 from dockair.sim.camera.halo import Halo
 from dockair.sim.camera.iris import Iris, Spikes
-from dockair.sim.camera.occlusion import VISIBLE_GROUPS
 from dockair.sim.camera.radiometry import Responses
 from dockair.sim.camera.sheets import GlareParameters, LensParameters, LightParameters
 from dockair.sim.camera.sun_disc import add_disc, image_of_disc
@@ -247,120 +244,3 @@ def _corners(camera: Camera) -> Array:
     (c_u, c_v), f = camera.principal_point_px, camera.focal_length_px
     u, v = np.meshgrid([0.0, camera.width_px - 1.0], [0.0, camera.height_px - 1.0])
     return np.column_stack([np.ones(4), -(u.ravel() - c_u) / f, -(v.ravel() - c_v) / f])
-
-
-RIM_GEOMS = "basket_rim"  #: how the names of the rim's pieces begin
-_SKIN_M = 1e-3  # a ray that starts on a surface starts this far off it
-_FIXED_POINT_STEPS = 6  # of (2) and (3), for the direction from the point to the camera; error falls by size/range
-_FLATTEST = 0.05  # seen along the rim's axis a whole circle would glint; a real rim's waviness limits it
-_ROUND = (mujoco.mjtGeom.mjGEOM_SPHERE, mujoco.mjtGeom.mjGEOM_ELLIPSOID)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Glints:
-    """Specular points that both the Sun and the camera see."""
-
-    p_W: Array  #: (n, 3) [m]
-    r1_r2_m2: Array  #: (n,) product of the principal radii
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Rim:
-    """The basket's rim as a torus about its body's x axis."""
-
-    body: int
-    centre_x_m: float
-    radius_m: float
-    tube_radius_m: float
-
-
-def rim_of(model: mujoco.MjModel) -> Rim | None:
-    """Return the torus through the capsules that draw the rim; None where the scene has none."""
-    pieces = [i for i in range(model.ngeom) if model.geom(i).name.startswith(RIM_GEOMS)]
-    if not pieces:
-        return None
-    middle = model.geom_pos[pieces]
-    chord = np.hypot(middle[:, 1], middle[:, 2])
-    return Rim(
-        body=int(model.geom_bodyid[pieces[0]]),
-        centre_x_m=float(middle[:, 0].mean()),
-        radius_m=float(np.hypot(chord, model.geom_size[pieces, 1]).mean()),
-        tube_radius_m=float(model.geom_size[pieces, 0].mean()),
-    )
-
-
-def is_clear(model: mujoco.MjModel, data: mujoco.MjData, p_W: Array, direction_W: Array, distance_m: float) -> bool:
-    """Say whether nothing visible lies within `distance_m` of p_W along a unit vector."""
-    which = np.zeros(1, dtype=np.int32)
-    hit = mujoco.mj_ray(model, data, p_W, direction_W, VISIBLE_GROUPS, 1, -1, which)
-    return hit < 0.0 or hit >= distance_m
-
-
-def find_glints(
-    model: mujoco.MjModel, data: mujoco.MjData, rim: Rim | None, p_WC: Array, s_W: Array, light: LightParameters
-) -> Glints:
-    """Return the glints in the scene, Eqs. (2) to (4).
-
-    Args:
-        model: geoms; those in hidden groups or fully transparent throw none.
-        data: their poses, up to date; not changed.
-        rim: of `rim_of`.
-        p_WC: (3,) the lens [m].
-        s_W: (3,) unit vector toward the Sun.
-        light: the limit of incidence.
-    """
-    seen = VISIBLE_GROUPS[model.geom_group].astype(bool) & (model.geom_rgba[:, 3] > 0.0)
-    found = [_on_ellipsoids(model, data, p_WC, s_W, np.flatnonzero(seen & np.isin(model.geom_type, _ROUND)))]
-    if rim is not None:
-        found += [_on_rim(data, rim, p_WC, s_W, side) for side in (1.0, -1.0)]
-    p, n, area = (np.concatenate(column) for column in zip(*found, strict=True))
-    kept = [i for i in range(len(p)) if _is_lit_and_seen(model, data, p[i], n[i], p_WC, s_W, light)]
-    return Glints(p_W=p[kept], r1_r2_m2=area[kept])
-
-
-def _on_ellipsoids(
-    model: mujoco.MjModel, data: mujoco.MjData, p_WC: Array, s_W: Array, which: NDArray[np.intp]
-) -> tuple[Array, Array, Array]:
-    """Points (m, 3), normals (m, 3) and products of radii (m,), Eq. (3)."""
-    sphere = (model.geom_type[which] == mujoco.mjtGeom.mjGEOM_SPHERE)[:, None]
-    A = np.where(sphere, model.geom_size[which, :1], model.geom_size[which])
-    R, centre = data.geom_xmat[which].reshape(-1, 3, 3), data.geom_xpos[which]
-    p, n, support = centre, np.zeros_like(centre), np.ones(len(which))
-    for _ in range(_FIXED_POINT_STEPS):
-        n = _bisector(s_W, p_WC - p)
-        n_local = np.einsum("mji,mj->mi", R, n)
-        support = np.linalg.norm(A * n_local, axis=1)
-        p = centre + np.einsum("mij,mj->mi", R, A**2 * n_local / support[:, None])
-    return p, n, np.prod(A, axis=1) ** 2 / support**4
-
-
-def _on_rim(data: mujoco.MjData, rim: Rim, p_WC: Array, s_W: Array, side: float) -> tuple[Array, Array, Array]:
-    """The rim's outer (side 1) or inner (side -1) specular point, Eq. (4); shapes as of `_on_ellipsoids`."""
-    x = data.xmat[rim.body].reshape(3, 3)[:, 0]
-    p = centre = data.xpos[rim.body] + rim.centre_x_m * x
-    n = e = np.zeros(3)
-    for _ in range(_FIXED_POINT_STEPS):
-        n = _bisector(s_W, (p_WC - p)[None])[0]
-        radial = n - (n @ x) * x
-        e = side * radial / max(float(np.linalg.norm(radial)), np.finfo(float).tiny)
-        p = centre + rim.radius_m * e + rim.tube_radius_m * n
-    slope = max(abs(float(n @ e)), _FLATTEST)
-    area = rim.tube_radius_m * abs(rim.radius_m + rim.tube_radius_m * float(n @ e)) / slope
-    return p[None], n[None], np.array([area])
-
-
-def _bisector(s: Array, v: Array) -> Array:
-    """(m, 3) unit vectors half-way between s (3,) and v (m, 3), Eq. (2)."""
-    both = s + v / np.linalg.norm(v, axis=1, keepdims=True)
-    return np.asarray(both / np.maximum(np.linalg.norm(both, axis=1, keepdims=True), np.finfo(float).tiny))
-
-
-def _is_lit_and_seen(
-    model: mujoco.MjModel, data: mujoco.MjData, p: Array, n: Array, p_WC: Array, s_W: Array, light: LightParameters
-) -> bool:
-    ray = p_WC - p
-    distance = float(np.linalg.norm(ray))
-    if n @ s_W < math.cos(light.glint_grazing_rad):  # as n halves the angle, the camera stands on the lit side too
-        return False
-    start = p + _SKIN_M * n
-    return is_clear(model, data, start, ray / distance, distance) and is_clear(model, data, start, s_W, np.inf)

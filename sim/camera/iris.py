@@ -11,8 +11,9 @@ has Q/(M r^2), M spikes. For the Sun, radius R in the image, light bent by less 
     l(s) = w/M (s/R^2) (1 + s^2/R^2)^(-3/2),   w = Q/R      from the Sun's centre; all of it is w, its tail Q/M s^2  (2)
     across:  b(t) = 15/(16 z) (1 - t^2/z^2)^2,   z^2 = 7 (R^2/4 + (c s)^2)                                       (3)
 
-The profile across has the variance of the disc's, R^2/4, and of the fan c by which real edges are not straight. What
-blades leave round, 1 - spike_share, is a halo of the same law (2) in all directions [halo, eq 1 with p = 3/2, core R].
+The profile across has the variance of the disc's, R^2/4, and of the fan c by which real edges are not straight; the
+coarse grid holds it to an eighth of its middle. What blades leave round, 1 - spike_share, is a halo of the law (2) in
+all directions [halo, eq 1 with p = 3/2, core R].
 
 An LED's spikes are left out: one of 5e4 e- at f/8 with 6 blades has, 6 px from its middle where its blob has ended,
 60 e- in each pixel-wide length of a spike and 30 e- in a pixel, half a grey level of eight bits; it falls as r^-2.

@@ -165,7 +165,7 @@ def _balls(model: mujoco.MjModel, i: int) -> list[tuple[Array, float, float]]:
 
 
 def _tubes(model: mujoco.MjModel, i: int) -> list[tuple[float, float]]:
-    if model.geom_type[i] in (_G.mjGEOM_CAPSULE, _G.mjGEOM_CYLINDER):
+    if int(model.geom_type[i]) in (int(_G.mjGEOM_CAPSULE), int(_G.mjGEOM_CYLINDER)):
         return [(float(model.geom_size[i, 0]), float(model.geom_size[i, 1]))]
     return []
 

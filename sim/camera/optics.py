@@ -21,7 +21,7 @@ from dockair.sim.camera.splat import Tables, splat
 NEAREST_M: Final = 0.5  #: nearer points are as blurred as at this depth
 _STEP_PX = 0.5  # growth of the disc or of the die's image between two tabulated depths
 _SIZES = 8  # of sources whose cores are kept
-_EDGE_NODES = 4096
+_EDGE_NODES = 1024
 
 
 class PointSpread:
@@ -38,6 +38,7 @@ class PointSpread:
         """
         self._lens, self._camera = lens, camera
         self._sharp = Spread(airy=airy_px(lens, camera, wavelength_m), diffusion=sensor.diffusion_px, blur=0.0, die=0.0)
+        self._edge_sigma_px = self._edge_sigma()
         self._cores: dict[float, _Cores] = {}
 
     def splat(
@@ -71,15 +72,16 @@ class PointSpread:
         splat(image, start, pixels, electrons, smear_px, levels, cores.tables, self._sharp.wing)
 
     def edge_sigma_px(self) -> float:
-        """Gaussian equivalent [px] of the blur of the Sun's edge: the same slope in the middle of a straight edge.
+        """Gaussian equivalent [px] of the blur of the Sun's edge: the same slope in the middle of a straight edge."""
+        return self._edge_sigma_px
 
-        The slope is the line spread at 0, the integral of the spectrum along one axis; the pixel's box is in it.
-        """
+    def _edge_sigma(self) -> float:
+        """From the line spread at 0, which is the integral of the spectrum along one axis, the pixel's box included."""
+        q, d = self._sharp.airy, self._sharp.diffusion
         blur = abs(float(blur_px(self._lens, self._camera, np.zeros(1))[0]))
-        f = (np.arange(_EDGE_NODES) + 0.5) / (_EDGE_NODES * self._sharp.airy)
-        line = transfer(f, self._sharp.airy, blur) * np.exp(-2.0 * (np.pi * self._sharp.diffusion * f) ** 2)
-        slope = 2.0 * float((line * np.sinc(f)).sum()) * (f[1] - f[0])
-        return 1.0 / (math.sqrt(2.0 * math.pi) * slope)
+        f = (np.arange(_EDGE_NODES) + 0.5) / (_EDGE_NODES * q)
+        line = transfer(f, q, blur) * np.exp(-2.0 * (np.pi * d * f) ** 2) * np.sinc(f)
+        return 1.0 / (math.sqrt(2.0 * math.pi) * 2.0 * float(line.sum()) / (_EDGE_NODES * q))
 
 
 class _Cores:

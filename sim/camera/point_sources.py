@@ -20,8 +20,9 @@ from numpy.typing import NDArray
 
 from dockair.rotations import Array
 from dockair.sim.as_built import AsBuilt
-from dockair.sim.camera.glints import Mirrors, find_glints
+from dockair.sim.camera.glints import find_glints
 from dockair.sim.camera.led_reflections import find_led_reflections
+from dockair.sim.camera.mirrors import Mirrors
 from dockair.sim.camera.occlusion import hidden
 from dockair.sim.camera.radiometry import Responses, led_electrons
 from dockair.sim.camera.sun_view import SunView
@@ -29,6 +30,8 @@ from dockair.sim.camera.sun_view import SunView
 if TYPE_CHECKING:  # the camera imports this module
     from dockair.sim.camera.camera import CameraSheets
 
+_SMALLEST_PX = 0.5  # of a patch that is not a point
+_LARGEST_STEP = 6.0  # 64 mm; larger flashes come as several patches
 _LED_AXIS_D = np.array([-1.0, 0.0, 0.0])  # [docs/notation.md]: LEDs shine aft
 
 
@@ -84,6 +87,9 @@ class PointSources:
             size_m=self._sheets.leds.die_size_m,
             way_C_m=exposure_s * self._velocity_C(data, pose, p_CL, leds_W),
         )
+        yield self._led_reflections(data, pose, exposure_s, leds_W, intensity)
+        if self._sun is not None and self._sun.beam > 0.0:
+            yield from self._glints(data, pose, exposure_s, self._sun)
 
     def leds_W(self, data: mujoco.MjData) -> Array:
         """(n, 3) the LEDs as built [m]."""
@@ -94,6 +100,57 @@ class PointSources:
         """(n,) which LEDs nothing hides from the lens."""
         clearance = self._sheets.leds.occlusion_clearance_m
         return np.logical_not(hidden(self._model, data, p_WC, self.leds_W(data), clearance))
+
+    def _led_reflections(
+        self, data: mujoco.MjData, pose: tuple[Array, Array], exposure_s: float, leds_W: Array, intensity: Array
+    ) -> Sources:
+        R_WC, p_WC = pose
+        axis_W = data.xmat[self._drogue].reshape(3, 3) @ _LED_AXIS_D
+        found = find_led_reflections(
+            self._model,
+            data,
+            self._mirrors,
+            p_WC,
+            leds_W,
+            axis_W,
+            intensity,
+            self._sheets.leds.pattern_exponent,
+            self._sheets.surfaces,
+        )
+        p_C = (found.p_W - p_WC) @ R_WC
+        # of the LEDs' spectrum, toward the lens: a source without a pattern
+        electrons = self._response.led_e_m2_sr_w_s * exposure_s * found.intensity_w_sr * self._per_area(p_C)
+        way_C_m = exposure_s * self._velocity_C(data, pose, p_C, None)
+        return Sources(p_C=p_C, electrons=electrons, size_m=0.0, way_C_m=way_C_m)
+
+    def _glints(
+        self, data: mujoco.MjData, pose: tuple[Array, Array], exposure_s: float, sun: SunView
+    ) -> Iterator[Sources]:
+        R_WC, p_WC = pose
+        found = find_glints(
+            self._model,
+            data,
+            self._mirrors,
+            p_WC,
+            sun.direction_W,
+            self._sheets.surfaces,
+            self._sheets.light,
+            R_WC[:, 0],
+        )
+        p_C = (found.p_W - p_WC) @ R_WC
+        electrons = self._response.glint_e_m2_s * sun.beam * exposure_s * found.area_m2_sr * self._per_area(p_C)
+        way_C_m = exposure_s * self._velocity_C(data, pose, p_C, None)
+        sizes_m = _rounded(found.size_m, self._as_built.camera.focal_length_px / np.maximum(p_C[:, 0], 1e-3))
+        for size_m in np.unique(sizes_m):
+            of_size = sizes_m == size_m
+            yield Sources(
+                p_C=p_C[of_size], electrons=electrons[of_size], size_m=float(size_m), way_C_m=way_C_m[of_size]
+            )
+
+    def _per_area(self, p_C: Array) -> Array:
+        """(n,) cos t/r^2 with what is left of the light on its way [1/m^2]."""
+        r = np.linalg.norm(p_C, axis=1)
+        return np.asarray(np.clip(p_C[:, 0] / r, 0.0, 1.0) * np.exp(-self._extinction_1_m * r) / r**2)
 
     def _velocity_C(
         self, data: mujoco.MjData, pose: tuple[Array, Array], p_C: Array, drogue_points_W: Array | None
@@ -110,3 +167,9 @@ class PointSources:
         root = data.subtree_com[self._model.body_rootid[body]]
         w_W, v_root = data.cvel[body, :3], data.cvel[body, 3:]
         return np.asarray(v_root + np.cross(w_W, points_W - root))
+
+
+def _rounded(size_m: Array, px_per_m: Array) -> Array:
+    """(n,) sizes in powers of two of a millimetre, so that few spread functions serve all; 0 under half a pixel."""
+    steps = np.round(np.log2(np.maximum(size_m, 1e-6) / 1e-3))
+    return np.where(size_m * px_per_m < _SMALLEST_PX, 0.0, 1e-3 * 2.0 ** np.clip(steps, -2.0, _LARGEST_STEP))

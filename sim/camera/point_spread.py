@@ -38,8 +38,9 @@ from dockair.rotations import Array
 from dockair.sim.camera.sheets import LensParameters
 
 _PHASES = 16  # tabulated positions per pixel ...
-_PHASES_WIDE = 8  # ... and where disc and die together exceed
-_WIDE_PX = 4.0
+_PHASES_SHARP, _SHARP_PX = 32, 0.2  # ... where lens and diffusion hardly blur the pixel's edges ...
+_PHASES_WIDE, _WIDE_PX = 8, 4.0  # ... and where disc and die are wide
+_AIRY_SIGMA = 0.4  # of the Airy pattern's core, in units of q
 _CORE_RINGS = 10.0  # the core's radius for a sharp point, in units of q ...
 _CORE_PX = 6.0  # ... and at least
 _WING_PX = 2.0  # least softening w of the wings: sampled at pixel centres they keep their sum to 4e-6
@@ -66,7 +67,9 @@ class Spread:
     @property
     def phases(self) -> int:
         """Tabulated positions per pixel."""
-        return _PHASES if self.blur + self.die < _WIDE_PX else _PHASES_WIDE
+        if self.blur + self.die > _WIDE_PX:
+            return _PHASES_WIDE
+        return _PHASES if math.hypot(self.diffusion, _AIRY_SIGMA * self.airy) > _SHARP_PX else _PHASES_SHARP
 
     @property
     def margin(self) -> float:

@@ -52,9 +52,7 @@ from dockair.sim.camera.sheets import (
 
 _BAND_STEP_M = 0.1e-9  # of the integral (1), whose steepest factor is a filter's edge of some nanometres
 _LED_SIGMAS = 6.0  # half width of the LED's integral
-_COSINES = (
-    1025  # nodes of the LED's response over the cosine of incidence; linear between, within 1e-4
-)
+_COSINES = 1025  # nodes of the LED's response over the cosine of incidence; linear between, within 1e-4
 _CONTRAST = 0.02  # of (7)
 _TABLE_AIR_MASS = 1.5  # of the ASTM table
 

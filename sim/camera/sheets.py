@@ -72,8 +72,7 @@ class SensorParameters:
 class ExposureParameters:
     """Sheet `exposure`."""
 
-    automatic: bool
-    exposure_s: float  #: the first one; every one, if not automatic
+    exposure_s: float  #: the first one; every one, if control is off
     shortest_s: float
     longest_s: float
     metered_pixel: int

@@ -17,8 +17,8 @@ slant paths finite where a layer is seen edge-on. J' has less Sun in it where cl
 layer); J_h less where the haze itself does. The light that cloud sends down is `clouds`.
 
 Nothing here moves: W goes with the tanker, and in the minutes of a docking the clouds stay where they are.
-Not modelled: twilight, moon, the tanker's trails, shadows on the deck, polarisation, cloud at flight level other than as
-haze. Cloud above is one layer that starts over the aircraft; within it, or under the deck's top, this is not valid.
+Not modelled: twilight, moon, vapour trails, shadows on the deck, polarisation; cloud at flight level but as haze. Cloud
+above is one layer that starts over the aircraft; within it, or under the deck's top, this is not valid.
 Sources: ISO 15469 (CIE S 011), sky type 12; Rozenberg 1966 (air mass at the horizon); Koschmieder 1924 (3.912/V).
 """
 
@@ -156,8 +156,11 @@ class Sky:
         depth = self._depth_above(d)
         mu = self._slope(d) / (1.0 + self._p.cloud_aspect)
         light = self._droplets.diffuse(depth, mu, self._mu_sun, cosine)
-        light += self._p.ground_reflectance * self._sine_sun * self._light_below * (
-            1.0 - self._droplets.transmittance(depth)
+        light += (
+            self._p.ground_reflectance
+            * self._sine_sun
+            * self._light_below
+            * (1.0 - self._droplets.transmittance(depth))
         )
         if with_aureole:
             light += self._droplets.aureole(depth, mu, cosine)
@@ -225,7 +228,7 @@ class Sky:
         return optical_depth(noise, self._weather.cloud_cover, self._weather.cloud_optical_depth)
 
     def _slope(self, d: Array) -> Array:
-        """s + w of Eq. (3); the rays that see the layer stay above half of w below level."""
+        """Return s + w of Eq. (3); the rays that see the layer stay above half of w below level."""
         w = self._p.cloud_aspect
         return np.maximum(d[:, 2] + w, 0.5 * w)
 

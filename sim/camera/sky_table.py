@@ -4,8 +4,8 @@ The sphere is unfolded onto a square by way of the octahedron (x is the directio
 
     p = (y, z)/(|x| + |y| + |z|);     x < 0:  p <- (sgn p_y (1 - |p_z|), sgn p_z (1 - |p_y|))                    (1)
 
-Nodes stand on an even grid of p, 2/n rad apart straight ahead and up to 2.3 times that elsewhere; between them the
-value is bilinear. Tiles of nodes are computed when a picture first needs them, and their values do not depend on when.
+Nodes stand on an even grid of p, 2/n rad apart straight ahead and up to 2.3 times that elsewhere, with rows of them on
+p_y = 0 and p_z = 0, where the map has a kink; between them the value is bilinear. Tiles of nodes are computed when a picture first needs them, and their values do not depend on when.
 
 A block's value is a function of R and its own x and y alone. Source: Praun & Hoppe 2003 (octahedral maps).
 """
@@ -39,7 +39,7 @@ class DirectionTable:
     def fill(self, out: NDArray[np.float32], R_WC: Array, x: Array, y: Array) -> None:
         """Write the value toward (1, -x_j, -y_i), C axes, into out (rows, columns)."""
         step = max(_largest_step(x), _largest_step(y), 1e-9)
-        cells = self._values.shape[0] - 1
+        cells = self._values.shape[0] - 2  # even, so that the middle is a node; the last row and column serve nothing
         stride = max(1, int((_TILE - 1) / (0.5 * cells * _STEEPEST * step)))
         wanted = np.zeros_like(self._is_known)
         R, columns = np.ascontiguousarray(R_WC, dtype=float), np.asarray(x, dtype=np.float32)
@@ -47,7 +47,7 @@ class DirectionTable:
         _mark(R, columns, rows, stride, cells, wanted)
         for row, column in np.argwhere(wanted & ~self._is_known):
             self._compute(int(row), int(column))
-        _sample(self._values.ravel(), cells + 1, R, columns, rows, out)
+        _sample(self._values.ravel(), cells + 2, R, columns, rows, out)
 
     def _compute(self, row: int, column: int) -> None:
         """Tabulate a tile."""
@@ -60,7 +60,7 @@ class DirectionTable:
 
 def directions_from_nodes(i: NDArray[np.int64], j: NDArray[np.int64], n: int) -> Array:
     """(m, 3) unit vectors of nodes (row i, column j) of an (n, n) table, the inverse of Eq. (1)."""
-    p_y, p_z = 1.0 - 2.0 * j / (n - 1), 1.0 - 2.0 * i / (n - 1)
+    p_y, p_z = 1.0 - 2.0 * j / (n - 2), 1.0 - 2.0 * i / (n - 2)
     x = 1.0 - np.abs(p_y) - np.abs(p_z)
     behind = x < 0.0
     y = np.where(behind, np.copysign(1.0 - np.abs(p_z), p_y), p_y)
@@ -92,8 +92,8 @@ def _sample(
 
     Places first, values second: only the first loop becomes vector code, and only if it stands alone.
     """
-    last, width = np.int32(n - 2), np.int32(n)
-    half = np.float32(0.5 * (n - 1))
+    last, width = np.int32(n - 3), np.int32(n)
+    half = np.float32(0.5 * (n - 2))
     b_x, b_y, b_z = np.float32(R[0, 1]), np.float32(R[1, 1]), np.float32(R[2, 1])
     corner = np.empty(len(x), dtype=np.int32)
     down, right = np.empty(len(x), dtype=np.float32), np.empty(len(x), dtype=np.float32)
@@ -115,9 +115,7 @@ def _sample(
 
 
 @njit(cache=True)
-def _mark(
-    R: Array, x: NDArray[np.float32], y: Array, stride: int, cells: int, wanted: NDArray[np.bool_]
-) -> None:
+def _mark(R: Array, x: NDArray[np.float32], y: Array, stride: int, cells: int, wanted: NDArray[np.bool_]) -> None:
     """Mark the tiles of every stride-th block and their neighbours; no block in between lies farther than a tile."""
     tiles = wanted.shape[0]
     half = np.float32(0.5 * cells)

@@ -3,7 +3,8 @@
     L = T rho (ambient + direct max(0, n . s)) + (1 - T) L_air,      T = exp(-b r)                               (1)
 
 in units of a white Lambertian surface in normal sunlight: reflectance rho, unit normal n, unit vector s toward the
-Sun, extinction b, slant range r. A solid is a sphere, ellipsoid, capsule, cylinder or box, opaque and matt; both ways
+Sun, extinction b, slant range r. `ambient` is the mean radiance of all directions, `direct` what clouds and haze let
+through of the Sun. A solid is a sphere, ellipsoid, capsule, cylinder or box, opaque and matt; both ways
 of drawing it (`drawn`, `traced`) take it from here.
 
 Not modelled: shadows, interreflections, gloss (glints are point sources of their own), meshes.
@@ -11,6 +12,7 @@ Source: Koschmieder's law of air light, in Middleton, Vision through the Atmosph
 """
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import mujoco
 import numpy as np
@@ -76,25 +78,34 @@ class Solids:
         )
 
 
+class Shines(Protocol):
+    """What is asked of the sky about its light: `dockair.sim.camera.sky.Sky`."""
+
+    @property
+    def ambient(self) -> float:
+        """Mean relative radiance of all directions."""
+        ...
+
+    def beam(self, directions_W: Array) -> Array:
+        """(n,) transmittance of sunlight from directions (n, 3)."""
+        ...
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Lighting:
-    """The light on the solids, as parts of the light on a surface that faces the Sun of a clear day."""
+    """The light on the solids, relative to sunlight on a surface that faces the Sun."""
 
     toward_W: Array  #: (3,) unit vector toward the Sun; anything where `direct` is 0
     ambient: float  #: from all sides alike
     direct: float  #: from the Sun
 
     @classmethod
-    def of(cls, model: mujoco.MjModel, ambient: float) -> "Lighting":
-        """Sunlight from where the model's first light shines; no light at all where it has none.
-
-        Args:
-            model: the world's.
-            ambient: part of the light that comes from all sides.
-        """
+    def of(cls, model: mujoco.MjModel, sky: Shines) -> "Lighting":
+        """Sunlight along the model's first light, if it has one, as much as the sky lets through."""
         if model.nlight == 0:
-            return cls(toward_W=np.array([0.0, 0.0, 1.0]), ambient=0.0, direct=0.0)
-        return cls(toward_W=-np.array(model.light_dir[0]), ambient=ambient, direct=1.0 - ambient)
+            return cls(toward_W=np.array([0.0, 0.0, 1.0]), ambient=sky.ambient, direct=0.0)
+        toward_W = -np.array(model.light_dir[0])
+        return cls(toward_W=toward_W, ambient=sky.ambient, direct=float(sky.beam(toward_W[None])[0]))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

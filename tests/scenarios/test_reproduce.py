@@ -18,11 +18,10 @@ def _rows(result, start):
     return [row for row in result["rows"] if row["case"].startswith(start)]
 
 
-@pytest.mark.parametrize("wanted", registry.ids())
-def test_every_reproduction_has_the_printed_form_and_is_json(wanted, tmp_path):
-    result = registry.reproduce(wanted, tmp_path / "new" / "folder")
+def test_a_reproduction_has_the_printed_form_is_json_and_draws_one_picture(tmp_path):
+    result = registry.reproduce("sensor/band", tmp_path / "new" / "folder")
     assert json.loads(json.dumps(result, allow_nan=False)) == result
-    assert list(result) == ["id", "source", "rows"] and result["id"] == wanted
+    assert list(result) == ["id", "source", "rows"] and result["id"] == "sensor/band" in registry.ids()
     for row in result["rows"]:
         assert list(row) == ["case", "ours", "reference"]
         assert row["reference"].keys() <= row["ours"].keys() and row["reference"]

@@ -1,7 +1,6 @@
 """A camera on a small world of its own, so that the sensors' tests do not depend on the whole scene."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from typing import Any
 
 import mujoco
@@ -9,10 +8,10 @@ import numpy as np
 import pytest
 
 from dockair.calibration import Camera, LedRing, Mounting
-from dockair.parameters import load_parameters
 from dockair.rotations import exp, quaternion_from_matrix
 from dockair.sim.as_built import AsBuilt
-from dockair.sim.camera.camera import CameraParameters, LedParameters, LightParameters, NearInfraredCamera
+from dockair.sim.camera.camera import CameraNoise, CameraSheets, NearInfraredCamera
+from dockair.sim.faults import Fault, Faults
 
 AS_BUILT = AsBuilt(
     camera=Camera(principal_point_px=(1020.7, 545.1), focal_length_m=0.01601),
@@ -33,8 +32,6 @@ class SmallWorld:
         spec.visual.headlight.active = 0
         spec.stat.extent = 40.0
         spec.visual.map.znear = 0.0025
-        sky = spec.add_texture(name="sky", type=mujoco.mjtTexture.mjTEXTURE_SKYBOX, width=8, height=8)
-        sky.builtin, sky.rgb1, sky.rgb2 = mujoco.mjtBuiltin.mjBUILTIN_FLAT, [0.2] * 3, [0.2] * 3
         spec.worldbody.add_light(
             type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL, dir=[0, 0, -1], ambient=[0.25] * 3, diffuse=[0.75] * 3
         )
@@ -71,18 +68,32 @@ class SmallWorld:
         self.put(name, np.array([-30.0, ASIDE_M, 0.0]), np.eye(3))
 
 
-@pytest.fixture
-def make_camera() -> Iterator[Callable[..., tuple[SmallWorld, NearInfraredCamera]]]:
-    """make_camera(sun_W=None, key=77, **camera's parameters) -> world, camera; drogue 8 m ahead of the lens."""
-    leds, light = load_parameters("leds", LedParameters), load_parameters("light", LightParameters)
+@pytest.fixture(params=[pytest.param("mujoco", marks=pytest.mark.gl), "analytic"])
+def make_camera(request: pytest.FixtureRequest) -> Iterator[Callable[..., tuple[SmallWorld, NearInfraredCamera]]]:
+    """make_camera(sun_W=None, seed=77, faults=(), overrides={}, **more of NearInfraredCamera) -> world, camera.
+
+    Once with each background. The drogue is 8 m ahead of the lens; the exposure is fixed.
+    """
     opened = []
 
     def build(
-        sun_W: np.ndarray | None = None, key: int = 77, **parameters: float
+        sun_W: np.ndarray | None = None,
+        seed: int = 77,
+        faults: tuple[Fault, ...] = (),
+        overrides: dict[str, dict[str, Any]] | None = None,
+        **more: Any,
     ) -> tuple[SmallWorld, NearInfraredCamera]:
         world = SmallWorld()
-        sheet = replace(load_parameters("camera", CameraParameters), **parameters)
-        camera = NearInfraredCamera(sheet, leds, light, world.as_built, key, world.model, sun_W)
+        options = {"automatic_exposure": False, "background": request.param, "altitude_m": np.inf} | more
+        camera = NearInfraredCamera(
+            CameraSheets.load(overrides=overrides),
+            world.as_built,
+            CameraNoise.of(seed),
+            world.model,
+            sun_direction_W=None if sun_W is None else sun_W / np.linalg.norm(sun_W),
+            faults=Faults(faults, 8),
+            **options,
+        )
         world.put_drogue(camera, np.array([8.0, 0.2, -0.1]))
         opened.append(camera)
         return world, camera

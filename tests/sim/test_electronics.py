@@ -1,6 +1,7 @@
-"""Photon transfer, the noise's laws and its addressing.
+"""The chain's laws against closed forms, the noise's against SciPy's, and its addressing.
 
 Statistical bounds are 4.5 standard errors, a false alarm in 1.5e5 for each; keys are fixed.
+Photon transfer is in `test_emva1288.py`.
 """
 
 from dataclasses import replace
@@ -8,51 +9,88 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy import stats
+from scipy.special import ndtri
 
-from dockair.messages import Window
+from dockair.errors import DockairError
 from dockair.parameters import load_parameters
-from dockair.sim.camera.electronics import digitise, latency_s, output_gain, readout_time_s
-from dockair.sim.camera.radiometry import CameraParameters
+from dockair.sim.camera.electronics import (
+    EXACT_BELOW_E,
+    dark_current_e_s,
+    digitise,
+    mix,
+    normal_from_bits,
+    output_black,
+    output_gain,
+)
+from dockair.sim.camera.fixed_pattern import FixedPattern
+from dockair.sim.camera.readout import readout_time_s
+from dockair.sim.camera.sheets import OUTPUTS_OF_BITS, SensorParameters
 
-CAMERA = load_parameters("camera", CameraParameters)
-COUNTING = replace(CAMERA, read_noise_e=0.0, conversion_gain_dn_e=1.0, black_level_dn=0.0, converter_bits=12)
-RAW = 10
+SENSOR = load_parameters("sensor", SensorParameters)
+EVEN = replace(
+    SENSOR, photo_response_nonuniformity=0.0, dark_signal_nonuniformity_e=0.0, column_pattern_e=0.0,
+    dark_current_e_s=0.0, parasitic_light_sensitivity=0.0,
+)  # fmt: skip
+#: One level an electron, 12 bits.
+FINE = replace(EVEN, converter_bits=12, outputs=4, conversion_gain_dn_e=0.25, black_level_dn=50.0)
+COUNTING = replace(FINE, read_noise_e=0.0, black_level_dn=0.0)
+FULL = (1088, 2048)
+EXPOSURE_S = 20e-6
+PATTERN = FixedPattern(SENSOR, 99, *FULL)
+NO_PATTERN = FixedPattern(EVEN, 99, *FULL)
+
+
+def _read(
+    image: np.ndarray, sensor: SensorParameters, key: int, frame: int = 0, start: tuple[int, int] = (0, 0), bits: int = 8
+) -> np.ndarray:
+    pattern = NO_PATTERN if sensor.photo_response_nonuniformity == 0.0 else PATTERN
+    return digitise(image, sensor, pattern, key, frame, start, EXPOSURE_S, bits)
 
 
 def _flat(electrons: float, shape: tuple[int, int] = (400, 500)) -> np.ndarray:
     return np.full(shape, electrons, dtype=np.float32)
 
 
-def test_photon_transfer_recovers_gain_and_read_noise_from_flat_fields() -> None:
-    """EMVA 1288: the variance of raw levels is a line in their mean, slope K, offset K^2 s^2 + 1/12.
+def _levels(electrons: float, sensor: SensorParameters, key: int, shape: tuple[int, int] = (400, 500)) -> np.ndarray:
+    return _read(_flat(electrons, shape), sensor, key, bits=sensor.converter_bits).astype(float)
 
-    Differences of two frames of one level. 2e5 pixels make a variance good to 0.32 %, the slope to 0.3 %.
-    """
-    means, variances = [], []
-    for i, electrons in enumerate(np.linspace(0.0, 8000.0, 9)):
-        a, b = (digitise(_flat(electrons), CAMERA, 7, 2 * i + j, (0, 0), RAW).astype(float) for j in (0, 1))
-        means.append(0.5 * (a + b).mean())
-        variances.append(0.5 * np.var(a - b))
-    slope = np.polyfit(np.array(means) - CAMERA.black_level_dn, variances, 1, w=1.0 / np.array(variances))[0]
-    dark_noise_e = np.sqrt(variances[0] - 1.0 / 12.0) / CAMERA.conversion_gain_dn_e
-    assert slope == pytest.approx(CAMERA.conversion_gain_dn_e, rel=0.02)
-    assert dark_noise_e == pytest.approx(CAMERA.read_noise_e, rel=0.02)
+
+def test_normal_numbers_are_the_quantiles_of_their_bits_to_5e_4_and_3e_5_in_distribution() -> None:
+    """All magnitudes of the 31 bits, from the smallest to all ones, both signs; against SciPy's quantile."""
+    magnitudes = np.unique(np.r_[np.arange(64), np.geomspace(64, 2**31 - 1, 4000).astype(np.int64)])
+    for sign in (0, 1):
+        bits = (magnitudes + (sign << 31)).astype(np.uint32)
+        z = np.array([normal_from_bits(b) for b in bits], dtype=float)
+        exact = (1.0 - 2.0 * sign) * -ndtri((magnitudes + 0.5) / 2.0**32)
+        assert np.abs(z - exact).max() < 5e-4
+        assert np.abs(stats.norm.cdf(z) - stats.norm.cdf(exact)).max() < 3e-5
+    assert 6.2 < np.abs(z).max() < 6.4
+
+
+def test_the_hash_gives_every_bit_to_half_of_consecutive_numbers_and_flips_half_for_a_flipped_bit() -> None:
+    x = np.arange(20000, dtype=np.uint32)
+    hashed = np.array([mix(i) for i in x], dtype=np.uint32)
+    bound = 4.5 * 0.5 / np.sqrt(x.size)
+    for bit in range(32):
+        assert ((hashed >> np.uint32(bit)) & 1).mean() == pytest.approx(0.5, abs=bound)
+    for bit in (0, 7, 20, 31):
+        flipped = np.array([mix(i ^ np.uint32(1 << bit)) for i in x[:2000]], dtype=np.uint32)
+        changed = np.bitwise_count(hashed[:2000] ^ flipped)
+        assert changed.mean() == pytest.approx(16.0, abs=4.5 * np.sqrt(8.0 / 2000))
 
 
 @pytest.mark.parametrize("electrons", [0.1, 0.7, 3.3, 12.9, 29.99, 30.01, 300.0])
-def test_shot_noise_has_the_mean_and_the_variance_of_its_poisson_law(electrons: float) -> None:
-    n = digitise(_flat(electrons), COUNTING, 11, 0, (0, 0), 12).astype(float)
-    mean_error = np.sqrt(electrons / n.size)
+def test_counted_electrons_have_the_mean_and_the_variance_of_their_poisson_law(electrons: float) -> None:
+    n = _levels(electrons, COUNTING, 11)
+    assert n.mean() == pytest.approx(electrons, abs=4.5 * np.sqrt(electrons / n.size))
     variance_error = np.sqrt((electrons + 2.0 * electrons**2) / n.size)
-    rounding = 1.0 / 12.0 if electrons > 30.0 else 0.0
-    assert n.mean() == pytest.approx(electrons, abs=4.5 * mean_error)
-    assert n.var() == pytest.approx(electrons + rounding, abs=4.5 * variance_error)
+    assert n.var() == pytest.approx(electrons, abs=4.5 * variance_error)
 
 
 @pytest.mark.parametrize("electrons", [0.2, 2.6, 17.3])
 def test_few_electrons_follow_the_exact_poisson_law(electrons: float) -> None:
     """Chi-squared of the counts against the law; refused below 1e-5."""
-    n = digitise(_flat(electrons), COUNTING, 13, 0, (0, 0), 12).ravel()
+    n = _levels(electrons, COUNTING, 13).ravel().astype(int)
     k = np.arange(n.max() + 1)
     expected = stats.poisson.pmf(k, electrons) * n.size
     kept = expected > 20.0
@@ -61,84 +99,217 @@ def test_few_electrons_follow_the_exact_poisson_law(electrons: float) -> None:
     assert stats.chisquare(observed, expected).pvalue > 1e-5
 
 
-def test_the_read_noise_is_normal_out_to_its_tails() -> None:
-    """Without shot noise: levels of a noise wide enough to be unrounded, by Kolmogorov and Smirnov at 1e-5."""
-    wide = replace(CAMERA, read_noise_e=300.0, conversion_gain_dn_e=1.0, black_level_dn=2000.0, converter_bits=12)
-    raw = digitise(_flat(0.0), wide, 17, 0, (0, 0), 12).ravel()
-    z = (raw + np.random.default_rng(0).uniform(-0.5, 0.5, raw.size) - 2000.0) / 300.0
-    assert stats.kstest(z, "norm").pvalue > 1e-5
-    beyond = int((np.abs(z) > 3.5).sum())
-    assert stats.binomtest(beyond, z.size, 2.0 * stats.norm.sf(3.5)).pvalue > 1e-5
+@pytest.mark.parametrize(("read_noise_e", "bound"), [(13.0, 5e-5), (EXACT_BELOW_E, 3e-4)])
+def test_the_law_that_joins_shot_and_read_noise_is_their_convolution_within_its_stated_bound(
+    read_noise_e: float, bound: float
+) -> None:
+    """Eq. (5) against the sum over the Poisson law, in distribution, where a pixel can be."""
+    z = np.linspace(-5.0, 5.0, 201)
+    for e in np.geomspace(0.1, 13000.0, 40):
+        v = e + read_noise_e**2
+        x = e + np.sqrt(v) * z + e / (6.0 * v) * (z**2 - 1.0)
+        n = np.arange(max(0, int(e - 9.0 * np.sqrt(e) - 9)), int(e + 9.0 * np.sqrt(e) + 25))
+        exact = stats.norm.cdf((x[:, None] - n) / read_noise_e) @ stats.poisson.pmf(n, e)
+        assert np.abs(exact - stats.norm.cdf(z)).max() < bound
 
 
-def test_a_window_reads_what_the_full_frame_reads_there() -> None:
-    image = np.random.default_rng(1).uniform(0.0, 400.0, (300, 400)).astype(np.float32)
-    full = digitise(image, CAMERA, 23, 5, (0, 0))
-    part = digitise(np.ascontiguousarray(image[40:90, 111:222]), CAMERA, 23, 5, (40, 111))
-    assert np.array_equal(part, full[40:90, 111:222])
+@pytest.mark.parametrize("electrons", [0.0, 40.0, 338.0, 2500.0])
+def test_shot_and_read_noise_together_have_the_exact_first_three_cumulants(electrons: float) -> None:
+    """Mean e, variance e + s^2 + 1/12, third cumulant e; the last to 4.5 sqrt(6/n) of the deviation cubed."""
+    m = _levels(electrons, FINE, 15, FULL) - 200.0
+    v = electrons + FINE.read_noise_e**2 + 1.0 / 12.0
+    assert m.mean() == pytest.approx(electrons, abs=4.5 * np.sqrt(v / m.size))
+    assert m.var() == pytest.approx(v, rel=4.5 * np.sqrt(2.0 / m.size))
+    third = ((m - m.mean()) ** 3).mean()
+    assert third == pytest.approx(electrons, abs=4.5 * np.sqrt(6.0 / m.size) * v**1.5)
+
+
+def test_the_read_noise_is_normal_out_to_5_standard_deviations() -> None:
+    """Without light, a noise so wide that levels are fine: Kolmogorov and Smirnov, and the tails counted, at 1e-5."""
+    wide = replace(FINE, read_noise_e=300.0, black_level_dn=500.0)
+    rng = np.random.default_rng(0)
+    raw = np.concatenate([_read(_flat(0.0, FULL), wide, 17, frame, bits=12).ravel() for frame in range(4)])
+    z = (raw + rng.uniform(-0.5, 0.5, raw.size) - 2000.0) / 300.0
+    assert stats.kstest(z[:500000], "norm").pvalue > 1e-5
+    for limit in (3.5, 4.5, 5.0):
+        beyond = int((np.abs(z) > limit).sum())
+        assert stats.binomtest(beyond, z.size, 2.0 * stats.norm.sf(limit)).pvalue > 1e-5
+
+
+@pytest.mark.parametrize("read_noise_e", [13.0, 2.0])
+@pytest.mark.parametrize("electrons", [1700.0, 1740.0, 1950.0, 2000.0, 2060.0, 2260.0, 2300.0, 1e8])
+def test_the_well_clips_shot_noise_and_not_read_noise(electrons: float, read_noise_e: float) -> None:
+    """Mean and variance of min(Poisson(e), 2000) + N(0, s^2), on both sides of where noises are drawn together."""
+    sensor = replace(FINE, full_well_e=2000.0, read_noise_e=read_noise_e)
+    m = _levels(electrons, sensor, 19, (600, 1000)) - 200.0
+    n = np.arange(0, 3500)
+    p = stats.poisson.pmf(n, electrons) if electrons < 1e6 else 1.0 * (n == 2000)
+    kept = np.minimum(n, 2000.0)
+    mean = (p * kept).sum() / p.sum()
+    variance = (p * (kept - mean) ** 2).sum() / p.sum() + read_noise_e**2 + 1.0 / 12.0
+    assert m.mean() == pytest.approx(mean, abs=4.5 * np.sqrt(variance / m.size))
+    kurtosis = ((m - m.mean()) ** 4).mean() / variance**2  # the clipped law's own
+    assert m.var() == pytest.approx(variance, rel=4.5 * np.sqrt((kurtosis - 1.0) / m.size))
+
+
+@pytest.mark.parametrize("read_noise_e", [13.0, 2.0])
+def test_every_window_reads_what_the_full_frame_reads_there(read_noise_e: float) -> None:
+    """70 first columns and all widths up to 70: whole vectors, remainders and both; dark, bright, near and over full well."""
+    sensor = replace(SENSOR, read_noise_e=read_noise_e)
+    rng = np.random.default_rng(1)
+    image = rng.choice(np.array([0.0, 3.0, 200.0, 13000.0, 13500.0, 1e8]), (40, 160)).astype(np.float32)
+    image *= rng.uniform(0.9, 1.1, image.shape).astype(np.float32)
+    full = _read(image, sensor, 23, 5, (500, 300), bits=10)
+    for column in range(71):
+        for width in range(1, 71):
+            row = (7 * column + width) % 39
+            part = image[row : row + 2, column : column + width]
+            read = _read(part, sensor, 23, 5, (500 + row, 300 + column), bits=10)
+            assert np.array_equal(read, full[row : row + 2, column : column + width])
+
+
+def test_a_pixel_does_not_see_its_neighbours_light() -> None:
+    """A row with and without a pixel at full well: the others read the same."""
+    image = np.random.default_rng(1).uniform(0.0, 400.0, (3, 300)).astype(np.float32)
+    lit = image.copy()
+    lit[1, 150:160] = 13500.0
+    differs = _read(image, SENSOR, 29, bits=10) != _read(lit, SENSOR, 29, bits=10)
+    assert differs[1, 150:160].all()
+    assert differs.sum() == 10
 
 
 def test_the_noise_repeats_with_key_and_frame_and_changes_with_either() -> None:
     image = _flat(300.0, (50, 50))
-    frame = digitise(image, CAMERA, 2**64 - 1, 3, (0, 0))
-    assert np.array_equal(frame, digitise(image, CAMERA, 2**64 - 1, 3, (0, 0)))
-    assert not np.array_equal(frame, digitise(image, CAMERA, 2**64 - 2, 3, (0, 0)))
-    assert not np.array_equal(frame, digitise(image, CAMERA, 2**64 - 1, 4, (0, 0)))
+    frame = _read(image, SENSOR, 2**64 - 1, 3)
+    assert np.array_equal(frame, _read(image, SENSOR, 2**64 - 1, 3))
+    assert not np.array_equal(frame, _read(image, SENSOR, 2**64 - 2, 3))
+    assert not np.array_equal(frame, _read(image, SENSOR, 2**64 - 1, 4))
 
 
-def test_noise_is_uncorrelated_between_neighbours_and_between_frames() -> None:
-    a, b = (digitise(_flat(300.0), CAMERA, 29, i, (0, 0), RAW).astype(float) for i in (0, 1))
-    limit = 4.5 / np.sqrt(a.size)
-    for x, y in ((a[:, 1:], a[:, :-1]), (a[1:], a[:-1]), (a, b), (a[1:, 1:], a[:-1, :-1])):
-        assert abs(np.corrcoef(x.ravel(), y.ravel())[0, 1]) < 1.05 * limit
+def test_noise_is_uncorrelated_between_neighbours_rows_and_frames() -> None:
+    """Correlations of shifted frames, and the largest of 124750 pairs of rows: below 6.5 of its standard errors, 1e-5."""
+    a, b = (_read(_flat(300.0, (500, 2000)), EVEN, 29, i, bits=10).astype(float) for i in (0, 1))
+    for x, y in ((a[:, 1:], a[:, :-1]), (a[1:], a[:-1]), (a, b), (a[1:, 1:], a[:-1, :-1]), (a[1:], b[:-1])):
+        assert abs(np.corrcoef(x.ravel(), y.ravel())[0, 1]) < 4.5 / np.sqrt(x.size)
+    rows = np.corrcoef(a) - np.eye(500)
+    assert np.abs(rows).max() < 6.5 / np.sqrt(2000)
+
+
+def test_means_of_rows_columns_and_frames_scatter_as_independent_pixels_do() -> None:
+    """Variance of 2048 columns' means over the pixels' variance is 1/rows to 4.5 sqrt(2/n); of rows and frames likewise."""
+    frames = np.array([_read(_flat(300.0, FULL), EVEN, 31, i, bits=10)[:, :].astype(np.float32) for i in range(4)])
+    v = float(frames[0].var())
+    for means, averaged in ((frames[0].mean(0), FULL[0]), (frames[0].mean(1), FULL[1])):
+        assert means.astype(float).var() == pytest.approx(v / averaged, rel=4.5 * np.sqrt(2.0 / means.size))
+    of_frames = frames.reshape(4, -1).mean(axis=1, dtype=float)
+    assert of_frames.max() - of_frames.min() < 2.0 * 4.5 * np.sqrt(v / (FULL[0] * FULL[1]))
+
+
+def test_prnu_scales_light_and_dark_offsets_do_not_depend_on_it() -> None:
+    """Averages of 32 frames against the truth maps: slopes 1, and 0 across, to 4.5 standard errors."""
+    sensor = replace(SENSOR, parasitic_light_sensitivity=0.0, conversion_gain_dn_e=0.25, converter_bits=12, outputs=4)
+    part, count, light = (slice(200, 300), slice(300, 700)), 32, 2000.0
+
+    def average_e(electrons: float) -> np.ndarray:
+        image = _flat(electrons, (100, 400))
+        frames = [_read(image, sensor, 37, i, (200, 300), bits=12).astype(float) for i in range(count)]
+        return np.mean(frames, axis=0) - output_black(sensor, 12)
+
+    dark, bright = average_e(0.0), average_e(light)
+    gain, offset = (m[part].astype(float) for m in (PATTERN.gain - 1.0, PATTERN.offset_e))
+    light_alone = bright - dark
+    for found, truth, slope in ((dark, offset, 1.0), (dark, gain, 0.0), (light_alone, gain, light), (light_alone, offset, 0.0)):
+        fit = stats.linregress(truth.ravel(), found.ravel())
+        assert fit.slope == pytest.approx(slope, abs=4.5 * fit.stderr)
+        assert fit.stderr < 0.02 * (dark.std() if found is dark else light_alone.std()) / truth.std()
+
+
+@pytest.mark.parametrize(("temperature_c", "factor"), [(25.0, 1.0), (31.3, 2.0), (18.7, 0.5), (43.9, 8.0)])
+def test_dark_current_doubles_every_6_3_k_and_makes_shot_noise(temperature_c: float, factor: float) -> None:
+    sensor = replace(FINE, temperature_c=temperature_c, dark_current_e_s=5e4)
+    electrons = 5e4 * factor * 2e-3
+    assert dark_current_e_s(sensor) == pytest.approx(5e4 * factor, rel=1e-12)
+    raw = digitise(_flat(0.0), sensor, NO_PATTERN, 41, 0, (0, 0), 2e-3, 12).astype(float) - 200.0
+    v = electrons + sensor.read_noise_e**2 + 1.0 / 12.0
+    assert raw.mean() == pytest.approx(electrons, abs=4.5 * np.sqrt(v / raw.size))
+    assert raw.var() == pytest.approx(v, rel=4.5 * np.sqrt(2.0 / raw.size))
+
+
+def test_parasitic_light_adds_to_each_row_in_proportion_to_its_wait() -> None:
+    """P w/t of the light: 0.01 x (32 us + row x 2.7 us)/20 us; a mean of a row is good to 1.4 e- of up to 3000."""
+    sensor = replace(EVEN, parasitic_light_sensitivity=0.01)
+    image = _flat(2000.0, FULL)
+    levels = _read(image, sensor, 43, bits=10).astype(float)
+    rows = np.array([0, 1, 100, 543, 1087])
+    found = (levels[rows].mean(axis=1) - sensor.black_level_dn) / sensor.conversion_gain_dn_e
+    wait_s = np.array([readout_time_s(int(row), sensor) for row in rows])
+    expected = 2000.0 * (1.0 + 0.01 * wait_s / EXPOSURE_S)
+    error = np.sqrt((expected + 169.0 + 1.0 / (12.0 * 0.075**2)) / FULL[1])
+    assert np.all(np.abs(found - expected) < 4.5 * error)
+    assert found[-1] > found[0] + 2500.0
 
 
 def test_a_full_well_reads_full_scale_and_no_more_light_adds_to_it() -> None:
-    quiet = replace(CAMERA, read_noise_e=0.0)
-    at, over = (digitise(_flat(e, (20, 20)), quiet, 1, 0, (0, 0)) for e in (20000.0, 1e7))
-    assert np.all(at == 255)
+    at, over = (_read(_flat(e, (20, 20)), SENSOR, 1) for e in (20000.0, 1e9))
+    assert np.all(at >= 253)
     assert np.array_equal(at, over)
-    below = digitise(_flat(0.9 * CAMERA.full_well_e, (20, 20)), quiet, 1, 0, (0, 0))
+    below = _read(_flat(0.9 * SENSOR.full_well_e, (20, 20)), EVEN, 1)
     assert below.max() < 240
 
 
 def test_the_full_well_clips_before_the_gain() -> None:
-    half_gain = replace(CAMERA, read_noise_e=0.0, conversion_gain_dn_e=0.0375)
-    raw = digitise(_flat(1e6, (20, 20)), half_gain, 1, 0, (0, 0), RAW)
+    half_gain = replace(EVEN, read_noise_e=0.0, conversion_gain_dn_e=0.0375)
+    raw = _read(_flat(1e6, (20, 20)), half_gain, 1, bits=10)
     assert np.all(raw == int(13500 * 0.0375 + 10.5))
 
 
 def test_the_dark_is_not_cut_off() -> None:
-    raw = digitise(_flat(0.0), CAMERA, 31, 0, (0, 0), RAW)
+    raw = _read(_flat(0.0), SENSOR, 31, bits=10)
     assert raw.min() > 0
-    assert raw.mean() == pytest.approx(CAMERA.black_level_dn, abs=0.02)
+    truth = SENSOR.black_level_dn + SENSOR.conversion_gain_dn_e * PATTERN.offset_e[:400, :500].mean()
+    assert raw.mean() == pytest.approx(truth, abs=4.5 * 1.02 / np.sqrt(raw.size))
 
 
-def test_the_output_is_the_converters_upper_eight_bits() -> None:
-    image = np.linspace(0.0, 13000.0, 10000, dtype=np.float32).reshape(100, 100)
-    raw = digitise(image, CAMERA, 37, 0, (0, 0), RAW)
-    assert np.array_equal(digitise(image, CAMERA, 37, 0, (0, 0)), raw >> 2)
-    assert output_gain(CAMERA) == CAMERA.conversion_gain_dn_e / 4.0
+@pytest.mark.parametrize("sensor", [SENSOR, replace(SENSOR, converter_bits=12, outputs=4)], ids=["10 bit", "12 bit"])
+def test_the_output_is_the_converters_upper_eight_bits(sensor: SensorParameters) -> None:
+    image = np.linspace(0.0, 14500.0, 10000, dtype=np.float32).reshape(100, 100)
+    raw = _read(image, sensor, 37, bits=sensor.converter_bits)
+    assert raw.dtype == np.uint16 and raw.max() == 2**sensor.converter_bits - 1
+    output = _read(image, sensor, 37)
+    assert output.dtype == np.uint8
+    assert np.array_equal(output, raw >> (sensor.converter_bits - 8))
 
 
-def test_a_full_frame_is_read_in_2_96_ms_and_a_window_in_proportion_to_its_rows() -> None:
-    """129/48 MHz x (1088 + 12) = 2.956 ms: 338 frames per second."""
-    assert readout_time_s(1088, CAMERA) == pytest.approx(129.0 / 48e6 * 1100.0, rel=1e-12)
-    assert 1.0 / readout_time_s(1088, CAMERA) == pytest.approx(338.0, abs=0.5)
-    per_row = (readout_time_s(600, CAMERA) - readout_time_s(100, CAMERA)) / 500.0
-    assert per_row == pytest.approx(129.0 / 48e6, rel=1e-9)
-    assert readout_time_s(500, replace(CAMERA, outputs=4)) > 3.9 * readout_time_s(500, CAMERA)
+def test_twelve_bits_have_four_times_the_levels_of_ten_and_the_output_the_same() -> None:
+    twelve = replace(SENSOR, converter_bits=12, outputs=4)
+    assert output_gain(twelve, 12) == 4.0 * output_gain(SENSOR, 10) == 4.0 * SENSOR.conversion_gain_dn_e
+    assert output_gain(twelve) == output_gain(SENSOR) == SENSOR.conversion_gain_dn_e / 4.0
+    assert output_black(twelve, 12) == 4.0 * SENSOR.black_level_dn
 
 
-def test_latency_counts_rows_and_not_columns() -> None:
-    narrow, wide, tall = Window(0, 300, 0, 10), Window(0, 300, 0, 2048), Window(0, 600, 0, 10)
-    assert latency_s(narrow, CAMERA) == latency_s(wide, CAMERA) < latency_s(tall, CAMERA)
-    assert latency_s(Window(0, 1088, 0, 2048), CAMERA) == pytest.approx(10e-3, abs=1e-4)
+@pytest.mark.parametrize(("bits", "outputs"), [(12, 16), (12, 8), (10, 3), (10, 1)])
+def test_outputs_that_cannot_read_so_many_bits_are_refused_with_those_that_can(bits: int, outputs: int) -> None:
+    with pytest.raises(DockairError, match=f"sensor.outputs.* {bits} bits, got {outputs}; exists") as refusal:
+        replace(SENSOR, converter_bits=bits, outputs=outputs)
+    assert refusal.value.exists == tuple(str(n) for n in OUTPUTS_OF_BITS[bits])
 
 
-def test_latency_counts_from_the_middle_of_the_exposure() -> None:
-    window = Window(0, 300, 0, 10)
-    longer = replace(CAMERA, exposure_s=CAMERA.exposure_s + 400e-6)
-    assert latency_s(window, longer) - latency_s(window, CAMERA) == pytest.approx(200e-6, rel=1e-9)
-    after_exposure = readout_time_s(300, CAMERA) + CAMERA.transfer_s
-    assert latency_s(window, CAMERA) - after_exposure == pytest.approx(0.5 * CAMERA.exposure_s, rel=1e-9)
+def test_a_scenario_that_asks_for_twelve_bits_alone_is_refused() -> None:
+    with pytest.raises(DockairError, match="sensor.outputs.*got 16; exists: 2, 4"):
+        load_parameters("sensor", SensorParameters, {"converter_bits": 12})
+    assert load_parameters("sensor", SensorParameters, {"converter_bits": 12, "outputs": 4}).outputs == 4
+
+
+def test_a_converter_of_eleven_bits_is_refused() -> None:
+    with pytest.raises(DockairError, match="sensor.converter_bits.*10, 12"):
+        replace(SENSOR, converter_bits=11)
+    with pytest.raises(DockairError, match="parameters.sensor.converter_bits"):
+        load_parameters("sensor", SensorParameters, {"converter_bits": 14})
+
+
+def test_bits_that_nothing_reads_and_pixels_outside_the_sensor_are_refused() -> None:
+    with pytest.raises(DockairError, match="digitise.bits.*got 12; exists: 8, 10"):
+        _read(_flat(1.0, (3, 3)), SENSOR, 1, bits=12)
+    for start in ((1086, 0), (0, 2046), (-1, 0)):
+        with pytest.raises(DockairError, match=r"digitise.start.*3 x 3.*1088 x 2048"):
+            _read(_flat(1.0, (3, 3)), SENSOR, 1, start=start)

@@ -120,6 +120,7 @@ def test_the_floor_of_the_measured_curve_is_the_bias_instability_itself() -> Non
     """No fit: T = 10 s leaves 380 intervals of 1.89 T an axis, 2 % in deviation over three axes; bound 5 of these."""
     p = _without(_without(GRADES["mti"], "walk"), "noise")
     p = replace(p, gyro_bias_correlation_s=10.0, accelerometer_bias_correlation_s=10.0)
+    p = replace(p, gyro_quantum_rad_s=1e-12)  # without noise to carry it, a drift below the quantum would not be seen
     taus = _whole_steps(np.geomspace(2.0, 100.0, 40), SLOW_RATE)
     for sensors, variances in _allan_variances(p, SLOW_RATE, taus).items():
         deviation = np.sqrt(variances.mean(0))

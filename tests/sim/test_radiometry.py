@@ -265,6 +265,12 @@ def test_the_band_pass_costs_45_percent_of_led_light_and_86_percent_of_the_suns(
     assert NARROW.white_e_s / RESPONSE.white_e_s == pytest.approx(0.137, abs=0.001)
 
 
+def test_beyond_its_last_tabulated_wavelength_the_sensor_sees_nothing() -> None:
+    cut = replace(SENSOR, wavelength_m=SENSOR.wavelength_m[:4], quantum_efficiency=SENSOR.quantum_efficiency[:4])
+    inside, outside = detection(LENS, LONG_PASS, cut, np.array([900e-9, 901e-9]))
+    assert inside > 0.0 and outside == 0.0
+
+
 # --- sunlight
 
 

@@ -1,0 +1,104 @@
+"""Glints: the Sun mirrored by the scene's real surfaces, wherever it and the camera both see the place.
+
+    e = S a A cos t / r^2 t_exp                                                                                  (1)
+
+with A in m^2/sr of [lobes, eq 4] (reflectance included), S a the electrons per second of all sunlight through the lens,
+t the angle off its axis and r the range. Mirror points come from `round_mirrors` and `curved_mirrors`, flat faces
+facet by facet. A glint looks like an LED: nothing but its place tells them apart. Streaks on tubes are rows of points,
+flashes of large faces are points a tile.
+
+Not modelled: second reflections, shadows inside a patch (its middle is seen or not), Sun through cloud gaps, shading
+between facets. Highlights darker than `faintest_radiance` are left to the surfaces' grey values.
+Sources: as of `lobes`. Nothing here is random.
+"""
+
+import math
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from dockair.rotations import Array
+from dockair.sim.camera.curved_mirrors import ellipsoid_spots, rim_spots
+from dockair.sim.camera.lobes import ROW, SPOT, facet_rows, spot_rows
+from dockair.sim.camera.mirrors import METAL, Mirrors, finishes
+from dockair.sim.camera.occlusion import hidden, is_clear
+from dockair.sim.camera.round_mirrors import round_spots
+from dockair.sim.camera.sheets import LightParameters, SurfaceParameters
+
+_MOST = 1024  # glints before any is found hidden
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Glints:
+    """Bright patches that both the Sun and the camera see."""
+
+    p_W: Array  #: (n, 3) their middles [m]
+    area_m2_sr: Array  #: (n,) A of Eq. (1): intensity over the Sun's irradiance, reflectance included
+    size_m: Array  #: (n,) side of a square that is as wide: size^2/12 is the mean variance along the surface
+
+
+def find_glints(
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    mirrors: Mirrors,
+    p_WC: Array,
+    s_W: Array,
+    surfaces: SurfaceParameters,
+    light: LightParameters,
+    ahead_W: Array | None = None,
+) -> Glints:
+    """Return the glints in the scene.
+
+    Args:
+        model: the one `mirrors` is of.
+        data: its poses, up to date; not changed.
+        mirrors: of `Mirrors.of`.
+        p_WC: (3,) the lens [m].
+        s_W: (3,) unit vector toward the Sun.
+        surfaces: reflectances, roughness, limits.
+        light: the Sun's angular radius.
+        ahead_W: (3,) the camera's axis, to leave out what lies behind the lens; None for all around.
+    """
+    rows = _rows(data, mirrors, np.asarray(p_WC, dtype=float), np.asarray(s_W, dtype=float), surfaces, light)
+    if ahead_W is not None:
+        rows = rows[(rows[:, :3] - p_WC) @ ahead_W > 0.0]
+    starts = rows[:, :3] + rows[:, 8:9] * rows[:, 3:6]
+    seen = np.flatnonzero(~hidden(model, data, p_WC, starts, 0.0))
+    kept = [i for i in seen if is_clear(model, data, starts[i], s_W, np.inf)]
+    return Glints(p_W=rows[kept, :3], area_m2_sr=rows[kept, 6], size_m=rows[kept, 7])
+
+
+def torus_W(data: mujoco.MjData, mirrors: Mirrors) -> tuple[tuple[float, ...], tuple[float, ...], float, float]:
+    """The rim in W, as `rim_spots` takes it."""
+    rim = mirrors.rim
+    assert rim is not None
+    axis = data.xmat[rim.body, ::3]
+    centre = data.xpos[rim.body] + rim.centre_x_m * axis
+    return tuple(map(float, centre)), tuple(map(float, axis)), rim.radius_m, rim.tube_radius_m
+
+
+def _rows(
+    data: mujoco.MjData, mirrors: Mirrors, p_WC: Array, s_W: Array, surfaces: SurfaceParameters, light: LightParameters
+) -> Array:
+    """(n, ROW) glints, hidden ones among them."""
+    eye, sun = tuple(map(float, p_WC)), s_W[None]
+    xpos, xmat = data.geom_xpos, data.geom_xmat
+    finish, variance = finishes(surfaces), 0.25 * light.sun_angular_radius_rad**2
+    limits = (
+        math.cos(surfaces.grazing_rad),
+        surfaces.faintest_glint_m2_sr,
+        surfaces.faintest_radiance,
+        surfaces.patch_step_rad,
+    )
+    balls, tubes = mirrors.balls, mirrors.tubes
+    spots = np.empty((len(balls.geom) + len(tubes.geom) + 2, SPOT))
+    n = round_spots(balls, tubes, xpos, xmat, sun, 0.0, eye, spots)
+    n += ellipsoid_spots(balls, xpos, xmat, sun, 0.0, eye, spots[n:])
+    if mirrors.rim is not None:
+        n += rim_spots(torus_W(data, mirrors), float(METAL), mirrors.rim.skin_m, sun, 0.0, eye, spots[n:])
+    rows = np.empty((_MOST, ROW))
+    count = spot_rows(spots[:n], sun, 0.0, variance, eye, finish, limits, rows, 0)
+    direction = tuple(map(float, s_W))
+    count = facet_rows(mirrors.facets, xpos, xmat, direction, variance, eye, finish, limits, rows, count)
+    return rows[:count]

@@ -1,0 +1,93 @@
+"""LEDs mirrored by what stands near them: basket, coupling, probe.
+
+    I_ref = (I(psi)/d1^2) A,    I(psi) = I_0 max(cos^m psi, side light)                                          (1)
+
+A in m^2/sr of [lobes, eq 4] with the LED at the distance d1 of the mirror point, psi off the LED's axis. For d1 and d
+large against a sphere's radius it is I R r^2/(4 d1^2). The LEDs shine aft, on the probe and on the receiver; what they
+send sideways and forward, to the basket and the coupling, is `led_side_light`.
+
+Not modelled: flat faces, hose, tanker and receiver's skin as mirrors; reflections of reflections; the LED's size.
+Sources: as of `lobes`.
+"""
+
+import math
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from dockair.rotations import Array
+from dockair.sim.camera.curved_mirrors import ellipsoid_spots, rim_spots
+from dockair.sim.camera.glints import torus_W
+from dockair.sim.camera.lobes import ROW, SPOT, spot_rows
+from dockair.sim.camera.mirrors import METAL, Mirrors, finishes
+from dockair.sim.camera.occlusion import hidden, is_clear
+from dockair.sim.camera.round_mirrors import round_spots
+from dockair.sim.camera.sheets import SurfaceParameters
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class LedReflections:
+    """Mirror images of LEDs that both the LED and the camera see."""
+
+    p_W: Array  #: (n, 3) where they are mirrored [m]
+    intensity_w_sr: Array  #: (n,) toward the lens
+    led: NDArray[np.intp]  #: (n,) which LED
+
+
+def find_led_reflections(
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    mirrors: Mirrors,
+    p_WC: Array,
+    leds_W: Array,
+    axis_W: Array,
+    intensity_w_sr: Array,
+    pattern_exponent: float,
+    surfaces: SurfaceParameters,
+) -> LedReflections:
+    """Return the reflections that are bright enough, Eq. (1).
+
+    Args:
+        model: the one `mirrors` is of.
+        data: its poses, up to date; not changed.
+        mirrors: of `Mirrors.of`.
+        p_WC: (3,) the lens [m].
+        leds_W: (m, 3) [m].
+        axis_W: (3,) unit vector along which they shine.
+        intensity_w_sr: (m,) on the axis.
+        pattern_exponent: m of Eq. (1).
+        surfaces: reflectances, side light, limits.
+    """
+    rows = _rows(data, mirrors, np.asarray(p_WC, dtype=float), np.asarray(leds_W, dtype=float), surfaces)
+    led = rows[:, 9].astype(np.intp)
+    ray = rows[:, :3] - leds_W[led]
+    d1 = np.linalg.norm(ray, axis=1)
+    pattern = np.maximum(np.maximum(ray @ axis_W / d1, 0.0) ** pattern_exponent, surfaces.led_side_light)
+    intensity = np.asarray(intensity_w_sr)[led] * pattern * rows[:, 6] / d1**2
+    bright = np.flatnonzero(intensity > surfaces.faintest_reflection * np.max(intensity_w_sr, initial=0.0))
+    starts = rows[:, :3] + rows[:, 8:9] * rows[:, 3:6]
+    seen = bright[~hidden(model, data, p_WC, starts[bright], 0.0)]
+    kept = [i for i in seen if _is_lit(model, data, starts[i], leds_W[led[i]], surfaces.led_seat_m)]
+    return LedReflections(p_W=rows[kept, :3], intensity_w_sr=intensity[kept], led=led[kept])
+
+
+def _is_lit(model: mujoco.MjModel, data: mujoco.MjData, start: Array, led_W: Array, seat_m: float) -> bool:
+    ray = led_W - start
+    distance = float(np.linalg.norm(ray))
+    return is_clear(model, data, start, ray / distance, distance - seat_m)
+
+
+def _rows(data: mujoco.MjData, mirrors: Mirrors, p_WC: Array, leds_W: Array, surfaces: SurfaceParameters) -> Array:
+    """(n, ROW) reflections, faint and hidden ones among them."""
+    eye, balls, tubes = tuple(map(float, p_WC)), mirrors.near_balls, mirrors.near_tubes
+    xpos, xmat = data.geom_xpos, data.geom_xmat
+    spots = np.empty((len(leds_W) * (len(balls.geom) + len(tubes.geom) + 2), SPOT))
+    n = round_spots(balls, tubes, xpos, xmat, leds_W, 1.0, eye, spots)
+    n += ellipsoid_spots(balls, xpos, xmat, leds_W, 1.0, eye, spots[n:])
+    if mirrors.rim is not None:
+        n += rim_spots(torus_W(data, mirrors), float(METAL), mirrors.rim.skin_m, leds_W, 1.0, eye, spots[n:])
+    limits = (math.cos(surfaces.grazing_rad), 0.0, 0.0, math.inf)
+    rows = np.empty((n, ROW))
+    return rows[: spot_rows(spots[:n], leds_W, 1.0, 0.0, eye, finishes(surfaces), limits, rows, 0)]

@@ -1,0 +1,198 @@
+"""Mirror points of lights on spheres and tubes: the angles are equal in one plane.
+
+On a circle of radius r seen from its centre, light at distance ds in direction 0, eye at dc in direction g, the mirror
+point stands at the angle x where both incidences agree:
+
+    i(x, r/ds) = i(g - x, r/dc),    i(x, q) = atan2(sin x, cos x - q)      one root, as i grows with x             (1)
+
+A sphere is such a circle in the plane of its centre, light and eye. A tube is one in projection along its axis, and
+along the axis the ray goes straight on: at shares l_s : l_c of the projected legs,
+
+    z = (z_s l_c + z_c l_s)/(l_s + l_c),    Sun: z = z_c + l_c (s.a)/|s - s.a a|                                  (2)
+
+A tube that ends before that is taken at its end. Everything here is in W. Source: law of reflection.
+"""
+
+import math
+
+from numba import njit
+from numpy.typing import NDArray
+
+from dockair.rotations import Array
+from dockair.sim.camera.mirrors import Balls, Tubes
+
+_NEWTON_STEPS, _CLOSE = 30, 1e-13
+_EVERYWHERE = 1e9  # [m], for surfaces without edges
+_SKIN_M = 1e-3  # a ray that starts on a surface starts this far off it
+
+Vector = tuple[float, float, float]
+
+
+@njit(cache=True)
+def round_spots(
+    balls: Balls,
+    tubes: Tubes,
+    xpos: Array,
+    xmat: Array,
+    lights: Array,
+    point: float,
+    eye: Vector,
+    spots: Array,
+) -> int:
+    """Fill rows of `lobes.SPOT` columns with the mirror points; return how many.
+
+    Args:
+        balls: ellipsoids among them are left out.
+        tubes: of `Mirrors`.
+        xpos: (ngeom, 3) of the geoms [m].
+        xmat: (ngeom, 9).
+        lights: (m, 3) directions (unit vectors) or places [m].
+        point: 0 for directions, 1 for places.
+        eye: the lens [m].
+        spots: (at least m (balls + tubes), SPOT), written.
+    """
+    count = 0
+    for j in range(len(lights)):
+        toward = (lights[j, 0], lights[j, 1], lights[j, 2])
+        for i in range(len(balls.geom)):
+            g, axes = balls.geom[i], balls.axes[i]
+            if not axes[0] == axes[1] == axes[2]:
+                continue
+            z = (xmat[g, 2], xmat[g, 5], xmat[g, 8])
+            centre = _add((xpos[g, 0], xpos[g, 1], xpos[g, 2]), balls.at_z[i], z)
+            found, n = _on_sphere(centre, axes[0], toward, point, eye)
+            if found and balls.side[i] * _dot(n, z) >= 0.0:
+                t1, t2 = _frame(n)
+                c = 1.0 / axes[0]
+                _write(spots[count], _add(centre, axes[0], n), n, t1, t2, (c, c), (_EVERYWHERE, _EVERYWHERE))
+                spots[count, 19], spots[count, 21] = balls.material[i], j
+                count += 1
+        for i in range(len(tubes.geom)):
+            g, radius, half = tubes.geom[i], tubes.radius[i], tubes.half_length[i]
+            axis = (xmat[g, 2], xmat[g, 5], xmat[g, 8])
+            centre = (xpos[g, 0], xpos[g, 1], xpos[g, 2])
+            found, n, x = _on_tube(centre, axis, radius, half, toward, point, eye)
+            if found:
+                p = _add(_add(centre, x, axis), radius, n)
+                _write(spots[count], p, n, axis, _cross(axis, n), (0.0, 1.0 / radius), (half, _EVERYWHERE))
+                spots[count, 15], spots[count, 16] = -half - x, half - x
+                spots[count, 19], spots[count, 21] = tubes.material[i], j
+                count += 1
+    return count
+
+
+@njit(cache=True)
+def _write(
+    row: NDArray[float],
+    p: Vector,
+    n: Vector,
+    t1: Vector,
+    t2: Vector,
+    curvature: tuple[float, float],
+    half: tuple[float, float],
+) -> None:
+    for k in range(3):
+        row[k], row[3 + k], row[6 + k], row[9 + k] = p[k], n[k], t1[k], t2[k]
+    row[12], row[13], row[14] = curvature[0], 0.0, curvature[1]
+    row[15], row[16], row[17], row[18] = -half[0], half[0], -half[1], half[1]
+    row[20] = _SKIN_M
+
+
+@njit(cache=True)
+def _dot(a: Vector, b: Vector) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@njit(cache=True)
+def _cross(a: Vector, b: Vector) -> Vector:
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@njit(cache=True)
+def _add(a: Vector, k: float, b: Vector) -> Vector:
+    return a[0] + k * b[0], a[1] + k * b[1], a[2] + k * b[2]
+
+
+@njit(cache=True)
+def _unit(a: Vector) -> tuple[Vector, float]:
+    length = math.sqrt(_dot(a, a))
+    k = 1.0 / max(length, 1e-300)
+    return (k * a[0], k * a[1], k * a[2]), length
+
+
+@njit(cache=True)
+def _frame(n: Vector) -> tuple[Vector, Vector]:
+    """Unit tangents with t2 = n x t1."""
+    helper = (1.0, 0.0, 0.0) if abs(n[0]) < 0.7 else (0.0, 1.0, 0.0)
+    t1, _ = _unit(_cross(n, helper))
+    return t1, _cross(n, t1)
+
+
+@njit(cache=True)
+def _incidence(x: float, q: float) -> float:
+    return math.atan2(math.sin(x), math.cos(x) - q)
+
+
+@njit(cache=True)
+def _mirror_angle(q_s: float, q_c: float, gamma: float) -> float:
+    """The root of Eq. (1), by Newton's method kept in [0, gamma]; q are radii over distances."""
+    x = gamma * (1.0 - q_s) / (2.0 - q_s - q_c)
+    for _ in range(_NEWTON_STEPS):
+        y = gamma - x
+        cos_x, cos_y = math.cos(x), math.cos(y)
+        slope = (1.0 - q_s * cos_x) / (1.0 + q_s * q_s - 2.0 * q_s * cos_x)
+        slope += (1.0 - q_c * cos_y) / (1.0 + q_c * q_c - 2.0 * q_c * cos_y)
+        step = (_incidence(x, q_s) - _incidence(y, q_c)) / slope
+        x = min(max(x - step, 0.0), gamma)
+        if abs(step) < _CLOSE:
+            break
+    return x
+
+
+@njit(cache=True)
+def _circle_normal(
+    to_light: Vector, point: float, to_eye: Vector, radius: float, spare: Vector
+) -> tuple[bool, Vector, float]:
+    """Whether both stand outside, the normal at the mirror point, and the length of `to_light`.
+
+    `spare` is a second axis of the plane for when light and eye stand in one direction.
+    """
+    e, ds = _unit(to_light)
+    f, dc = _unit(to_eye)
+    if ds < 1e-9 or point * radius >= ds or radius >= dc:
+        return False, e, ds
+    cos_gamma = _dot(e, f)
+    g, sin_gamma = _unit(_add(f, -cos_gamma, e))
+    if sin_gamma < 1e-12:
+        g = spare
+    x = _mirror_angle(point * radius / ds, radius / dc, math.atan2(sin_gamma, cos_gamma))
+    cos_x = math.cos(x)
+    return True, _add((cos_x * e[0], cos_x * e[1], cos_x * e[2]), math.sin(x), g), ds
+
+
+@njit(cache=True)
+def _on_sphere(centre: Vector, radius: float, toward: Vector, point: float, eye: Vector) -> tuple[bool, Vector]:
+    to_light = _add(toward, -point, centre)
+    spare, _ = _frame(_unit(to_light)[0])
+    found, n, _ = _circle_normal(to_light, point, _add(eye, -1.0, centre), radius, spare)
+    return found, n
+
+
+@njit(cache=True)
+def _on_tube(
+    centre: Vector, axis: Vector, radius: float, half: float, toward: Vector, point: float, eye: Vector
+) -> tuple[bool, Vector, float]:
+    """Normal and place along the axis, Eq. (2)."""
+    to_light, to_eye = _add(toward, -point, centre), _add(eye, -1.0, centre)
+    z_s, z_c = _dot(to_light, axis), _dot(to_eye, axis)
+    flat_s, flat_c = _add(to_light, -z_s, axis), _add(to_eye, -z_c, axis)
+    found, n, ds = _circle_normal(flat_s, point, flat_c, radius, _cross(axis, _unit(flat_s)[0]))
+    if not found:
+        return False, n, 0.0
+    l_c = _unit(_add(flat_c, -radius, n))[1]
+    if point == 0.0:
+        z = z_c + l_c * z_s / ds
+    else:
+        l_s = _unit(_add(flat_s, -radius, n))[1]
+        z = (z_s * l_c + z_c * l_s) / (l_s + l_c)
+    return True, n, min(max(z, -half), half)

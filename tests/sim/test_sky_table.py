@@ -1,0 +1,84 @@
+"""The table of directions: right all round, complete whatever is asked first, and the same in every window."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from dockair.sim.camera.sky_table import DirectionTable, directions_from_nodes
+
+TILES = 4
+
+
+def _smooth(d: np.ndarray) -> np.ndarray:
+    return 2.0 + d[:, 0] + 0.5 * d[:, 1] - 0.25 * d[:, 2] + 0.3 * d[:, 0] * d[:, 2]
+
+
+def _wanted(R: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    d = np.stack(np.broadcast_arrays(1.0, -x[None, :], -y[:, None]), axis=-1) @ R.T
+    return _smooth((d / np.linalg.norm(d, axis=-1, keepdims=True)).reshape(-1, 3)).reshape(len(y), len(x))
+
+
+def _axes(rows: int, columns: int, step: float) -> tuple[np.ndarray, np.ndarray]:
+    return (np.arange(columns) - 0.5 * columns) * step, (np.arange(rows) - 0.5 * rows) * step
+
+
+LOOKS = [
+    *(Rotation.from_euler("zyx", angles, degrees=True).as_matrix() for angles in ((0, 0, 0), (90, 0, 0), (180, 0, 0))),
+    *(
+        Rotation.from_euler("zyx", angles, degrees=True).as_matrix()
+        for angles in ((0, 90, 0), (0, -90, 0), (178, 3, 45))
+    ),
+    *Rotation.random(10, random_state=3).as_matrix(),
+]
+
+
+@pytest.mark.parametrize("R", LOOKS)
+@pytest.mark.parametrize("step", [1e-3, 2e-2])
+def test_a_smooth_function_comes_back_from_every_side(R: np.ndarray, step: float) -> None:
+    """To a quarter of what lies between two nodes, where a fold of the map crosses a cell; a tile left out is off by 1."""
+    x, y = _axes(60, 90, step)
+    out = np.full((60, 90), np.nan, dtype=np.float32)
+    DirectionTable(_smooth, TILES).fill(out, R, x, y)
+    assert np.abs(out - _wanted(R, x, y)).max() < 4e-3
+
+
+def test_only_what_is_looked_at_is_computed() -> None:
+    asked = []
+
+    def counted(d: np.ndarray) -> np.ndarray:
+        asked.append(d)
+        return _smooth(d)
+
+    table = DirectionTable(counted, 12)
+    out = np.empty((20, 20), dtype=np.float32)
+    table.fill(out, np.eye(3), *_axes(20, 20, 1e-3))
+    first = len(asked)
+    assert first < 20
+    assert min(d[:, 0].min() for d in asked) > 0.5
+    table.fill(out, np.eye(3), *_axes(20, 20, 1e-3))
+    assert len(asked) == first
+
+
+@pytest.mark.parametrize("start", range(0, 33, 3))
+def test_a_window_is_the_full_pictures_bit_for_bit(start: int) -> None:
+    """Every width from 1 to 40, from a table that no other picture has touched."""
+    R = Rotation.from_euler("zyx", (10, 4, 15), degrees=True).as_matrix()
+    x, y = _axes(50, 80, 2e-3)
+    full = np.empty((50, 80), dtype=np.float32)
+    DirectionTable(_smooth, TILES).fill(full, R, x, y)
+    fresh = DirectionTable(_smooth, TILES)
+    for width in range(1, 41):
+        part = np.empty((7, width), dtype=np.float32)
+        fresh.fill(part, R, x[start : start + width], y[start : start + 7])
+        assert np.array_equal(part, full[start : start + 7, start : start + width])
+
+
+def test_directions_of_nodes_are_unit_vectors_in_their_place() -> None:
+    i, j = np.meshgrid(np.arange(9), np.arange(9), indexing="ij")
+    d = directions_from_nodes(i.ravel(), j.ravel(), 10).reshape(9, 9, 3)
+    assert np.linalg.norm(d, axis=-1) == pytest.approx(np.ones((9, 9)), abs=1e-15)
+    assert d[4, 4] == pytest.approx([1, 0, 0])  # ahead
+    assert d[0, 4] == pytest.approx([0, 0, 1])  # up
+    assert d[4, 0] == pytest.approx([0, 1, 0])  # left
+    for corner in (d[0, 0], d[0, 8], d[8, 0], d[8, 8]):
+        assert corner == pytest.approx([-1, 0, 0])
