@@ -6,6 +6,7 @@ benchmarks, never tests: they belong to the machine that printed them.
 
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import mujoco
@@ -58,11 +59,9 @@ def _camera_figures(camera: NearInfraredCamera, world: World, name: str) -> dict
     full = Window(0, 1088, 0, 2048)
     figures = {}
     for what, window in (("full frame", full), ("400 rows", _ROWS), ("300 x 300", _SMALL)):
-        figures[f"{name}: expose, {what}"] = _least(lambda w=window: camera.expose(world.data, 0.0, 0, w))
-        figures[f"{name}: without electronics, {what}"] = _least(
-            lambda w=window: camera.expected_electrons(world.data, w)
-        )
-        figures[f"{name}: background, {what}"] = _least(lambda w=window: camera.background_electrons(world.data, w))
+        figures[f"{name}: expose, {what}"] = _least(partial(camera.expose, world.data, 0.0, 0, window))
+        figures[f"{name}: without electronics, {what}"] = _least(partial(camera.expected_electrons, world.data, window))
+        figures[f"{name}: background, {what}"] = _least(partial(camera.background_electrons, world.data, window))
     return figures
 
 

@@ -1,16 +1,13 @@
 """Looks at the machine before it flies: Python, links, off-screen OpenGL, cores, memory, disk, packages.
 
-OpenGL is tried in a process of its own, for two reasons: a missing library ends in an exception far from its cause
-(`'NoneType' object has no attribute 'eglQueryString'`, an import error, a type error), which becomes one line here;
-and a context made in this process would not survive a fork.
+Without OpenGL the camera draws its background itself, and only pictures for people are missing. Whether there is any
+is tried in a process of its own (`dockair.sim.opengl`); however it fails becomes one line here.
 """
 
 import os
 import platform
 import shutil
-import subprocess
 import sys
-from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from importlib import metadata
 from importlib.resources import files
@@ -18,27 +15,15 @@ from pathlib import Path
 from typing import Any
 
 from dockair.errors import MachineError
+from dockair.sim.opengl import APT_PACKAGES, RENDER_SCRIPT, TIMEOUT_S, kind_of_context, try_drawing
 
-APT_PACKAGES = "libegl1 libgl1-mesa-dri libopengl0"
 PYTHON_AT_LEAST = (3, 11)
 MEMORY_AT_LEAST_GB = 1.0  # a flight with its recording stays below this
 DISK_AT_LEAST_GB = 0.5  # a default flight writes up to 150 MB
-RENDER_TIMEOUT_S = 120.0
+RENDER_TIMEOUT_S = TIMEOUT_S
 LINKED = ("sim", "nav", "scenarios", "assets")
 
-#: Run by a fresh interpreter; prints who renders.
-_RENDER = """
-import mujoco
-model = mujoco.MjModel.from_xml_string('<mujoco><worldbody><geom size="1"/></worldbody></mujoco>')
-renderer = mujoco.Renderer(model, 16, 16)
-data = mujoco.MjData(model)
-mujoco.mj_forward(model, data)
-renderer.update_scene(data)
-assert renderer.render().shape == (16, 16, 3)
-from OpenGL.GL import GL_RENDERER, glGetString
-print(glGetString(GL_RENDERER).decode())
-renderer.close()
-"""
+_RENDER = RENDER_SCRIPT
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +44,8 @@ def examine(folder: Path) -> list[Check]:
     Args:
         folder: where flights would be written.
     """
-    return [_python(), _links(), _rendering(), _cores(), _memory(), _disk(folder), _packages()]
+    rendering = _rendering()
+    return [_python(), _links(), rendering, _camera(rendering), _cores(), _memory(), _disk(folder), _packages()]
 
 
 def require_rendering() -> None:
@@ -98,30 +84,26 @@ def _links() -> Check:
 
 
 def _opengl() -> str:
-    return _render_environment(os.environ).get("MUJOCO_GL", "window-system")
-
-
-def _render_environment(environment: Mapping[str, str]) -> dict[str, str]:
-    """Return the environment with EGL where nobody chose otherwise, as the camera does."""
-    default = {"MUJOCO_GL": "egl"} if sys.platform.startswith("linux") else {}
-    return default | dict(environment)
+    return kind_of_context() or "window-system"
 
 
 def _rendering() -> Check:
-    name, environment = f"off-screen OpenGL ({_opengl()})", _render_environment(os.environ)
+    name, kind = f"off-screen OpenGL ({_opengl()})", kind_of_context()
     remedy = f"type: sudo apt-get install -y {APT_PACKAGES}"
-    if environment.get("MUJOCO_GL", "egl") != "egl":
-        remedy = f"MUJOCO_GL is {environment['MUJOCO_GL']}: unset it, or set it to egl"
-    try:
-        run = subprocess.run(
-            [sys.executable, "-c", _RENDER], env=environment, capture_output=True, text=True, timeout=RENDER_TIMEOUT_S
-        )
-    except subprocess.TimeoutExpired:
-        return Check(name, False, f"no picture within {RENDER_TIMEOUT_S:.0f} s", remedy)
-    if run.returncode == 0:
-        return Check(name, True, run.stdout.strip())
-    said = (run.stderr.strip().splitlines() or [f"ended with status {run.returncode}"])[-1]
-    return Check(name, False, "none", remedy, detail=said)
+    if kind not in ("", "egl"):
+        remedy = "unset MUJOCO_GL, or set it to egl"
+    trial = try_drawing(_RENDER, RENDER_TIMEOUT_S)
+    if trial.renderer:
+        return Check(name, True, trial.renderer, needed=False)
+    return Check(name, False, trial.reason, remedy, needed=False, detail=trial.said)
+
+
+def _camera(rendering: Check) -> Check:
+    """Which background the camera takes by itself."""
+    if rendering.ok:
+        renderer = rendering.found.split(" (")[0]
+        return Check("camera", True, f"MuJoCo off-screen ({_opengl().upper()}, {renderer})")
+    return Check("camera", True, f"analytic background, no OpenGL: {rendering.found}")
 
 
 def _cores() -> Check:

@@ -21,7 +21,10 @@ REMEDY = f"install {APT_PACKAGES} (Debian, Ubuntu: apt-get install)"
 BACKENDS = ("auto", "mujoco", "analytic")
 TIMEOUT_S = 120.0
 _NO_OPENGL = ("disable", "disabled", "off", "false", "0")  # what MuJoCo takes for none
-_NEEDED = {"egl": ("libEGL.so.1", "libOpenGL.so.0"), "osmesa": ("libOSMesa.so.8",)}
+_NEEDED = {  # of each group one
+    "egl": (("libEGL.so.1", "libEGL.so"), ("libOpenGL.so.0", "libOpenGL.so", "libGL.so.1", "libGL.so")),
+    "osmesa": (("libOSMesa.so.8", "libOSMesa.so.6", "libOSMesa.so"),),
+}
 
 #: Run by a fresh interpreter; prints who renders.
 RENDER_SCRIPT = """
@@ -106,12 +109,16 @@ def let_mujoco_be_imported() -> None:
 
     To be called before the first import of mujoco; does nothing after it.
     """
-    libraries = _NEEDED.get(os.environ.get("MUJOCO_GL", "").lower().strip(), ())
     if "mujoco" in sys.modules or not sys.platform.startswith("linux"):
         return
-    for library in libraries:
-        try:
-            ctypes.CDLL(library)
-        except OSError:
-            os.environ["MUJOCO_GL"] = _NO_OPENGL[1]
-            return
+    groups = _NEEDED.get(os.environ.get("MUJOCO_GL", "").lower().strip(), ())
+    if not all(any(map(_loads, group)) for group in groups):
+        os.environ["MUJOCO_GL"] = _NO_OPENGL[1]
+
+
+def _loads(library: str) -> bool:
+    try:
+        ctypes.CDLL(library)
+    except OSError:
+        return False
+    return True

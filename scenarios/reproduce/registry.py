@@ -12,16 +12,23 @@ from pathlib import Path
 from typing import Any
 
 from dockair.errors import DockairError
-from dockair.scenarios.reproduce import sensor_band
+from dockair.scenarios.reproduce import contact_sheet, sensor_band
 
 Reproduction = Callable[[Path | None], dict[str, Any]]
 
-_REPRODUCTIONS: dict[str, Reproduction] = {sensor_band.ID: sensor_band.reproduce}
+_REPRODUCTIONS: dict[str, tuple[str, Reproduction]] = {
+    module.ID: (module.TITLE, module.reproduce) for module in (contact_sheet, sensor_band)
+}
 
 
 def ids() -> tuple[str, ...]:
     """Return the ids, sorted."""
     return tuple(sorted(_REPRODUCTIONS))
+
+
+def titles() -> dict[str, str]:
+    """Return what each id shows."""
+    return {wanted: _REPRODUCTIONS[wanted][0] for wanted in ids()}
 
 
 def reproduce(wanted: str, out: Path | None = None) -> dict[str, Any]:
@@ -34,4 +41,4 @@ def reproduce(wanted: str, out: Path | None = None) -> dict[str, Any]:
         raise DockairError("reproduce", expected="the id of a reproduction", got=wanted, exists=ids())
     if out is not None:
         out.mkdir(parents=True, exist_ok=True)
-    return _REPRODUCTIONS[wanted](out)
+    return _REPRODUCTIONS[wanted][1](out)

@@ -33,6 +33,7 @@ from dockair.sim.camera.sheets import (
 )
 
 ID = "sensor/band"
+TITLE = "solar spectrum, filter, lens, quantum efficiency and the LEDs' line; tables 4 to 6"
 _SOURCE = "[Yoon 2018, tables 4-6, figs 1 and 27]; ASTM G173-03"
 _STEP_M = 0.1e-9
 _SIZE_IN, _DPI = (9.0, 8.0), 110
@@ -51,7 +52,7 @@ def reproduce(out: Path | None) -> dict[str, Any]:
     rows = [*_sunlight(), *(_row(case, ours, printed, table) for table, case, ours in tables)]
     if out is not None:
         _draw(out / "sensor_band.png")
-    return {"id": ID, "source": _SOURCE, "rows": rows}
+    return {"id": ID, "source": _SOURCE, "rows": rows, "pictures": [] if out is None else ["sensor_band.png"]}
 
 
 def _row(case: str, ours: dict[str, float], printed: dict[tuple[str, str], float], table: str) -> _Row:

@@ -24,7 +24,7 @@ from dockair.parameters import load_parameters
 from dockair.rotations import Array
 from dockair.sim.as_built import AsBuilt
 from dockair.sim.camera import sheets as sheet
-from dockair.sim.camera.background import Background, Lighting, available_backend
+from dockair.sim.camera.background import Background
 from dockair.sim.camera.coarse_grid import CoarseGrid
 from dockair.sim.camera.dirt import Dirt
 from dockair.sim.camera.electronics import digitise, output_gain
@@ -156,9 +156,7 @@ class NearInfraredCamera:
             sun_W = np.array(sun_direction_W, dtype=float)
             margin = _EDGE_SIGMAS * self._spread.edge_sigma_px()
             self._sun = SunView(model, camera, self._sky, sun_W, sheets.light.sun_angular_radius_rad, margin)
-        backend = available_backend(background)
-        lighting = _lighting(self._sky, sheets.sky, weather, self._sun)
-        self._background = Background(model, camera, sheets.background, self._sky, backend, lighting)
+        self._background = Background(model, camera, sheets.background, self._sky, background)
         self._sources = PointSources(model, sheets, as_built, self._response, self._sun, self._extinction_1_m)
         _check_stuck_exposures(self._faults, sheets.exposure)
         self._pattern = FixedPattern(sheets.sensor, noise.fixed_pattern, camera.height_px, camera.width_px)
@@ -267,16 +265,14 @@ class NearInfraredCamera:
     ) -> NDArray[np.float32]:
         """Return (rows, columns) expected electrons of sky and scene alone, with stray light and dirt if given."""
         exposure_s = self.exposure_s() if exposure_s is None else exposure_s
-        pose = self.pose(data)
         return self._background.electrons(
             data,
-            pose,
+            self.pose(data),
             window,
             self._response.white_e_s * exposure_s,
             stray=stray,
             dirt=None if dirt is None else dirt.grid,
             extinction_1_m=self._extinction_1_m,
-            airlight=self._sky.airlight(pose[0][:, 0]),
         )
 
     def _sun_in_view(self, data: mujoco.MjData, pose: tuple[Array, Array]) -> tuple[Array, float]:
@@ -343,16 +339,6 @@ class NearInfraredCamera:
         if not inside:
             raise DockairError("camera.window", expected=f"a window inside {full}", got=window)
         return window
-
-
-def _lighting(sky: Sky, parameters: sheet.SkyParameters, weather: Weather, sun: SunView | None) -> Lighting:
-    """The light on the scene; without a Sun to be seen it comes from overhead, at night from nowhere in particular."""
-    overhead = np.array([0.0, 0.0, 1.0])
-    if weather.night:
-        return Lighting(toward_W=overhead, ambient=parameters.night, direct=0.0)
-    if sun is None:
-        return Lighting(toward_W=overhead, ambient=sky.ambient, direct=1.0)
-    return Lighting(toward_W=sun.direction_W, ambient=sky.ambient, direct=sun.beam)
 
 
 def _check_stuck_exposures(faults: Faults, exposure: sheet.ExposureParameters) -> None:

@@ -18,9 +18,9 @@ Both lobes are Henyey-Greenstein's, P(c; g) = (1 - g^2)/(1 + g^2 - 2 g c)^(3/2),
     diffuse   mu_0 (T - exp(-t_0)(1 + F t_0)),  not below 0,    T = 1/(1 + 3/4 (1 - g) tau)                       (7)
 
 with c the cosine of the angle from the Sun, mu and mu_0 the cosines of incidence of sight and Sun, F the forward half
-of the refracted lobe and T the two-stream transmittance of a layer that absorbs nothing. Half of the diffracted lobe lies
-within the same angle as of the Airy pattern, 1.7/x. Radiances are relative: 1 is a white Lambertian surface in normal
-sunlight. Beam, aureole, lobe and diffuse light together bring T mu_0 to a level surface, to an eighth.
+of the refracted lobe and T the two-stream transmittance of a layer that absorbs nothing. Half of the diffracted light
+is within the same angle as in the Airy pattern, 1.7/x. Radiances are relative: 1 is a white Lambertian surface in
+normal sunlight. Beam, aureole, lobe and diffuse light together bring T mu_0 to a level surface, to an eighth.
 
 Not modelled: ice (halos, mock suns), rainbow and corona's rings, absorption, light that wanders sideways from one part
 of the layer to another (each ray meets a layer that is as thick everywhere as where it crosses), cloud sides, drift.
@@ -42,7 +42,7 @@ from dockair.rotations import Array
 _OCTAVES = 12  # 4096:1; the footprint ends the sum earlier
 _FINEST = 2.0  # lattice over footprint at which an octave has faded out, from twice that on
 _THICKEST = 4.0  # standard deviations that the threshold keeps away from an endless one (cover 0 or 1)
-_AIRY_HALF = 1.6747  # z of Eq. (3)
+_AIRY_HALF = 1.6802  # z of Eq. (3)
 _DIFFRACTED = 0.5  # share of the extinction: geometric optics' paradox
 _TURN = math.cos(0.65), math.sin(0.65)  # octave against octave, so that their lattices do not line up
 

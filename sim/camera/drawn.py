@@ -2,7 +2,7 @@
 
 Only solids are drawn; the sky comes from elsewhere. Colour carries two things at once: red is the solid's grey
 
-    red = rho (ambient + direct max(0, n . s)) / (ambient + direct),      blue = 1 where there is a solid, else 0     (1)
+    red = rho (ambient + direct max(0, n . s)) / (ambient + direct),     blue = 1 where there is a solid, else 0  (1)
 
 because the light's ambient part is (ambient, 0, 1), its direct part (direct, 0, 0), red over their sum, and a solid's
 colour (rho, 0, 1).
@@ -163,7 +163,7 @@ def _all(geoms: list[Any], name: str, shape: tuple[int, ...]) -> NDArray[np.floa
     step = getattr(geoms[1], name).ctypes.data - first if len(geoms) > 1 else 4 * math.prod(shape)
     if getattr(geoms[-1], name).ctypes.data != first + step * (len(geoms) - 1):
         raise RuntimeError("the geoms of a scene are not evenly spaced")
-    memory = (ctypes.c_char * (step * (len(geoms) - 1) + 4 * math.prod(shape))).from_address(first)
+    memory: Any = (ctypes.c_char * (step * (len(geoms) - 1) + 4 * math.prod(shape))).from_address(first)
     strides = (step, *(4 * math.prod(shape[i + 1 :]) for i in range(len(shape))))
     return np.ndarray((len(geoms), *shape), dtype=np.float32, buffer=memory, strides=strides)
 

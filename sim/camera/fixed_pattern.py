@@ -9,7 +9,7 @@ how large the rest is. Entries are bytes of 1/29 standard deviation, quantiles o
 
 Not modelled: defective pixels (a fault, not a pattern), gradients over the sensor, offsets that grow with temperature
 or exposure (0.0025 e- of dark current in 20 us leave nothing to vary).
-Sources: EMVA 1288 release 4.0, section 8 (PRNU, DSNU and their column parts); hash: Steele, Lea & Flood 2014 (SplitMix64).
+Sources: EMVA 1288 release 4.0 (PRNU, DSNU and their column parts); hash: Steele, Lea & Flood 2014 (SplitMix64).
 """
 
 import numpy as np

@@ -61,8 +61,8 @@ class SensorParameters:
         """Refuse what the sensor cannot do, however the values came together."""
         allowed = OUTPUTS_OF_BITS.get(self.converter_bits)
         if allowed is None:
-            exist = [str(bits) for bits in OUTPUTS_OF_BITS]
-            raise DockairError("sensor.converter_bits", expected="a converter's depth", got=self.converter_bits, exists=exist)
+            where, exist = "sensor.converter_bits", [str(bits) for bits in OUTPUTS_OF_BITS]
+            raise DockairError(where, expected="a converter's depth", got=self.converter_bits, exists=exist)
         if self.outputs not in allowed:
             expected = f"a number of outputs that reads {self.converter_bits} bits"
             raise DockairError("sensor.outputs", expected=expected, got=self.outputs, exists=[str(n) for n in allowed])

@@ -123,7 +123,7 @@ class Sky:
     @property
     def diffuse_share(self) -> float:
         """Share of the light on a surface that faces the Sun which does not come from the Sun's direction."""
-        direct = float(self.beam(self._sun[None])[0])
+        direct = float(self.beam(self._sun[None])[0])  # 0 at night
         return self.ambient / (self.ambient + direct)
 
     def radiance(self, directions_W: Array) -> Array:
@@ -242,6 +242,8 @@ class Sky:
 
     def _ambient(self) -> float:
         """Mean radiance over a Fibonacci sphere; the aureole counts as direct light."""
+        if self._weather.night:
+            return self._p.night
         k = np.arange(_AMBIENT_DIRECTIONS) + 0.5
         z = 1.0 - 2.0 * k / _AMBIENT_DIRECTIONS
         turn = math.pi * (1.0 + math.sqrt(5.0)) * k

@@ -5,7 +5,8 @@ The sphere is unfolded onto a square by way of the octahedron (x is the directio
     p = (y, z)/(|x| + |y| + |z|);     x < 0:  p <- (sgn p_y (1 - |p_z|), sgn p_z (1 - |p_y|))                    (1)
 
 Nodes stand on an even grid of p, 2/n rad apart straight ahead and up to 2.3 times that elsewhere, with rows of them on
-p_y = 0 and p_z = 0, where the map has a kink; between them the value is bilinear. Tiles of nodes are computed when a picture first needs them, and their values do not depend on when.
+p_y = 0 and p_z = 0, where the map has a kink; between them the value is bilinear. Tiles of nodes are computed when a
+picture first needs them, and their values do not depend on when.
 
 A block's value is a function of R and its own x and y alone. Source: Praun & Hoppe 2003 (octahedral maps).
 """

@@ -88,7 +88,7 @@ class SunView:
         rays = self._rays_W(R_WC, _BLOCK_PX * first[0] + centres, _BLOCK_PX * first[1] + centres)
         clear = clear_directions(self._model, data, p_WC, rays).reshape(count, count)
         start = _BLOCK_PX * first[0], _BLOCK_PX * first[1]
-        fine = np.arange(_BLOCK_PX * count)
+        fine = np.arange(float(_BLOCK_PX * count))
         dimmed = self._sky.beam(self._rays_W(R_WC, start[0] + fine, start[1] + fine)).reshape(len(fine), len(fine))
         return np.asarray(dimmed * np.kron(clear, np.ones((_BLOCK_PX, _BLOCK_PX)))), start
 

@@ -27,7 +27,7 @@ from dockair.rotations import Array
 from dockair.sim.camera.solids import BALL, BOX, CAPSULE, CYLINDER, Haze, Lighting, Solids, depth_limits_m
 
 _MOST_EDGES = 190  # pairs of 20 points: a box's corners and its edges' cuts
-_PARALLEL = 1e-24  # squared sine below which a ray runs along a tube
+_ALONG = 1e-300  # least squared component across a tube, of a ray that runs along it
 _ON_SIDE = 1.0 - 1e-9  # part of a tube's length that is surely its side
 
 Triple = tuple[float, float, float]
@@ -94,7 +94,7 @@ def _trace(
     """Draw every solid; `centres` (n, 3) and `axes` (n, 3, 3) in C, `nearest` (rows, columns) depths so far."""
     kinds, half_sizes, reflectances = solids
     ambient, direct, extinction, air = shade
-    edges = np.empty((_MOST_EDGES, 4))
+    edges, depth_row = np.empty((_MOST_EDGES, 4)), np.empty(x.shape[0])
     for g in range(kinds.shape[0]):
         kind, h, M, c = kinds[g], half_sizes[g], axes[g], centres[g]
         count = _edges_of_box(edges, c, M, h, kind == CAPSULE, near)
@@ -105,6 +105,7 @@ def _trace(
             continue
         # To the solid's own axes, in units of its size: a unit ball, a tube of radius 1, a cube of half side 1
         unit = (h[0], h[0], h[0]) if kind in (CAPSULE, CYLINDER) else (h[0], h[1], h[2])
+        half = h[2] / h[0]
         o = _to_unit(-c[0], -c[1], -c[2], M, unit)
         sun = _to_unit(sun_C[0], sun_C[1], sun_C[2], M, (1.0, 1.0, 1.0))
         across = _to_unit(0.0, -1.0, 0.0, M, unit)
@@ -112,22 +113,30 @@ def _trace(
             left, right = _crossed(edges, count, y[i])
             column, column_stop = _between(left, right, x)
             ahead = _to_unit(1.0, 0.0, -y[i], M, unit)
+            depths, tangents = depth_row[column:column_stop], x[column:column_stop]
+            if kind == BALL:
+                _hit_ball(o, ahead, across, tangents, depths)
+            elif kind == BOX:
+                _hit_box(o, ahead, across, tangents, depths)
+            elif kind == CAPSULE:
+                _hit_capsule(o, ahead, across, half, tangents, depths)
+            else:
+                _hit_cylinder(o, ahead, across, half, tangents, depths)
             for j in range(column, column_stop):
-                d = (ahead[0] + x[j] * across[0], ahead[1] + x[j] * across[1], ahead[2] + x[j] * across[2])
-                if kind == BALL:
-                    t = _hit_ball(o, d)
-                elif kind == BOX:
-                    t = _hit_box(o, d)
-                else:
-                    t = _hit_tube(o, d, h[2] / h[0], kind == CAPSULE)
-                if near <= t < nearest[i, j]:
-                    nearest[i, j] = t
-                    p = (o[0] + t * d[0], o[1] + t * d[1], o[2] + t * d[2])
-                    radiance = reflectances[g] * (ambient + direct * max(0.0, _cosine(kind, p, unit, h[2] / h[0], sun)))
-                    if extinction > 0.0:
-                        clear = math.exp(-extinction * t * math.sqrt(1.0 + x[j] * x[j] + y[i] * y[i]))
-                        radiance = radiance * clear + air * (1.0 - clear)
-                    out[i, j] = radiance
+                t = depth_row[j]
+                if not near <= t < nearest[i, j]:  # NaN is a miss
+                    continue
+                nearest[i, j] = t
+                p = (
+                    o[0] + t * (ahead[0] + x[j] * across[0]),
+                    o[1] + t * (ahead[1] + x[j] * across[1]),
+                    o[2] + t * (ahead[2] + x[j] * across[2]),
+                )
+                radiance = reflectances[g] * (ambient + direct * max(0.0, _cosine(kind, p, unit, half, sun)))
+                if extinction > 0.0:
+                    clear = math.exp(-extinction * t * math.sqrt(1.0 + x[j] * x[j] + y[i] * y[i]))
+                    radiance = radiance * clear + air * (1.0 - clear)
+                out[i, j] = radiance
 
 
 @njit(cache=True)
@@ -147,40 +156,39 @@ def _edges_of_box(edges: Array, c: Array, M: Array, h: Array, capped: bool, near
     Of a box that reaches behind the near plane they join all corners of the part before it, pair by pair.
     """
     corners, picture = np.empty((8, 3)), np.empty((20, 2))
-    length = h[2] + h[0] if capped else h[2]
-    behind = 0
-    for k in range(8):
-        a, b, e = h[0] * (2 * (k & 1) - 1), h[1] * ((k & 2) - 1), length * ((k & 4) / 2 - 1)
-        for axis in range(3):
-            corners[k, axis] = c[axis] + M[axis, 0] * a + M[axis, 1] * b + M[axis, 2] * e
-        behind += corners[k, 0] < near
-    if behind == 8:
-        return 0
-    points = 0
+    behind = _corners_of_box(corners, c, M, h, h[2] + h[0] if capped else h[2], near)
+    points, count = 0, 0
     for k in range(8):
         if corners[k, 0] >= near:
             picture[points] = -corners[k, 1:] / corners[k, 0]
             points += 1
-    count = 0
     for a in range(8):
-        for bit in (1, 2, 4):
-            b = a | bit
-            if a & bit:
-                continue
-            if behind == 0:
+        for b in (a | 1, a | 2, a | 4):
+            if behind == 0 and b != a:
                 edges[count, :2], edges[count, 2:] = picture[a], picture[b]
                 count += 1
             elif (corners[a, 0] < near) != (corners[b, 0] < near):
                 part = (near - corners[a, 0]) / (corners[b, 0] - corners[a, 0])
                 picture[points] = -(corners[a, 1:] + part * (corners[b, 1:] - corners[a, 1:])) / near
                 points += 1
-    if behind == 0:
-        return count
-    for a in range(points):
-        for b in range(a):
-            edges[count, :2], edges[count, 2:] = picture[a], picture[b]
-            count += 1
+    if behind > 0:
+        for a in range(points):
+            for b in range(a):
+                edges[count, :2], edges[count, 2:] = picture[a], picture[b]
+                count += 1
     return count
+
+
+@njit(cache=True)
+def _corners_of_box(corners: Array, c: Array, M: Array, h: Array, length: float, near: float) -> int:
+    """Fill (8, 3) corners in C, number k having bit 0, 1, 2 set on its far sides; return how many lie behind `near`."""
+    behind = 0
+    for k in range(8):
+        a, b, e = h[0] * (2 * (k & 1) - 1), h[1] * ((k & 2) - 1), length * ((k & 4) / 2 - 1)
+        for axis in range(3):
+            corners[k, axis] = c[axis] + M[axis, 0] * a + M[axis, 1] * b + M[axis, 2] * e
+        behind += corners[k, 0] < near
+    return behind
 
 
 @njit(cache=True)
@@ -213,55 +221,63 @@ def _between(low: float, high: float, tangents: Array) -> tuple[int, int]:
     return max(0, math.floor(max(first, 0.0)) - 1), min(n, math.ceil(min(last, n + 0.0)) + 2)
 
 
-@njit(cache=True)
-def _hit_ball(o: Triple, d: Triple) -> float:
-    """Depth of the entry into the unit ball, Eq. (1); infinity for a miss."""
-    a = d[0] * d[0] + d[1] * d[1] + d[2] * d[2]
-    b = o[0] * d[0] + o[1] * d[1] + o[2] * d[2]
-    under = b * b - a * (o[0] * o[0] + o[1] * o[1] + o[2] * o[2] - 1.0)
-    return (-b - math.sqrt(under)) / a if under > 0.0 else math.inf
+# The next four fill the depths at which one row of rays, d = ahead + x across, enters a solid of unit size; NaN or no
+# depth before the lens is a miss. They have no branches, so that the compiler can take several rays at once.
 
 
-@njit(cache=True)
-def _hit_tube(o: Triple, d: Triple, half: float, capped: bool) -> float:
-    """The same for a tube of radius 1 along z, Eq. (2): a capsule where `capped` by balls, else a cylinder."""
-    a = d[0] * d[0] + d[1] * d[1]
-    b = o[0] * d[0] + o[1] * d[1]
+@njit(cache=True, error_model="numpy")
+def _hit_ball(o: Triple, ahead: Triple, across: Triple, x: Array, depths: Array) -> None:
+    """Eq. (1)."""
+    c = o[0] * o[0] + o[1] * o[1] + o[2] * o[2] - 1.0
+    for j in range(x.shape[0]):
+        dx, dy, dz = ahead[0] + x[j] * across[0], ahead[1] + x[j] * across[1], ahead[2] + x[j] * across[2]
+        a = dx * dx + dy * dy + dz * dz
+        b = o[0] * dx + o[1] * dy + o[2] * dz
+        depths[j] = (-b - math.sqrt(b * b - a * c)) / a
+
+
+@njit(cache=True, error_model="numpy")
+def _hit_capsule(o: Triple, ahead: Triple, across: Triple, half: float, x: Array, depths: Array) -> None:
+    """Eq. (2); a ray that enters the endless tube beyond one of its ends may hit that end's ball."""
     c = o[0] * o[0] + o[1] * o[1] - 1.0
-    under = b * b - a * c
-    along = a <= _PARALLEL * d[2] * d[2]
-    if c > 0.0 and (along or under <= 0.0):
-        return math.inf
-    if along:
-        z, enters = (-math.inf if d[2] > 0.0 else math.inf), -math.inf
-    else:
-        enters = (-b - math.sqrt(under)) / a
-        z = o[2] + enters * d[2]
-    if -half <= z <= half:
-        return enters
-    end = half if z > half else -half
-    if capped:
-        return _hit_ball((o[0], o[1], o[2] - end), d)
-    if d[2] * end >= 0.0:  # the tube is entered beyond this end and left farther away from it
-        return math.inf
-    t = (end - o[2]) / d[2]
-    px, py = o[0] + t * d[0], o[1] + t * d[1]
-    return t if px * px + py * py <= 1.0 else math.inf
+    for j in range(x.shape[0]):
+        dx, dy, dz = ahead[0] + x[j] * across[0], ahead[1] + x[j] * across[1], ahead[2] + x[j] * across[2]
+        a = max(dx * dx + dy * dy, _ALONG)
+        b = o[0] * dx + o[1] * dy
+        side = (-b - math.sqrt(b * b - a * c)) / a
+        z = o[2] + side * dz
+        from_end = o[2] - math.copysign(half, z)
+        a += dz * dz
+        b += from_end * dz
+        end = (-b - math.sqrt(b * b - a * (c + from_end * from_end))) / a
+        depths[j] = side if abs(z) <= half else end
 
 
-@njit(cache=True)
-def _hit_box(o: Triple, d: Triple) -> float:
-    """The same for the cube of half side 1, Eq. (3)."""
-    enters, leaves = -math.inf, math.inf
-    for k in range(3):
-        if d[k] == 0.0:
-            if abs(o[k]) > 1.0:
-                return math.inf
-            continue
-        side = -1.0 if d[k] > 0.0 else 1.0
-        enters = max(enters, (side - o[k]) / d[k])
-        leaves = min(leaves, (-side - o[k]) / d[k])
-    return enters if enters <= leaves else math.inf
+@njit(cache=True, error_model="numpy")
+def _hit_cylinder(o: Triple, ahead: Triple, across: Triple, half: float, x: Array, depths: Array) -> None:
+    """Eq. (2); a ray that enters the endless tube beyond one of its ends may come in through that end."""
+    c = o[0] * o[0] + o[1] * o[1] - 1.0
+    for j in range(x.shape[0]):
+        dx, dy, dz = ahead[0] + x[j] * across[0], ahead[1] + x[j] * across[1], ahead[2] + x[j] * across[2]
+        a = max(dx * dx + dy * dy, _ALONG)
+        b = o[0] * dx + o[1] * dy
+        side = (-b - math.sqrt(b * b - a * c)) / a
+        z = o[2] + side * dz
+        end = (math.copysign(half, z) - o[2]) / dz
+        px, py = o[0] + end * dx, o[1] + end * dy
+        depths[j] = side if abs(z) <= half else (end if dz * z < 0.0 and px * px + py * py <= 1.0 else math.nan)
+
+
+@njit(cache=True, error_model="numpy")
+def _hit_box(o: Triple, ahead: Triple, across: Triple, x: Array, depths: Array) -> None:
+    """Eq. (3)."""
+    for j in range(x.shape[0]):
+        dx, dy, dz = ahead[0] + x[j] * across[0], ahead[1] + x[j] * across[1], ahead[2] + x[j] * across[2]
+        ax, ay, az = (-1.0 - o[0]) / dx, (-1.0 - o[1]) / dy, (-1.0 - o[2]) / dz
+        bx, by, bz = (1.0 - o[0]) / dx, (1.0 - o[1]) / dy, (1.0 - o[2]) / dz
+        enters = max(min(ax, bx), min(ay, by), min(az, bz))
+        leaves = min(max(ax, bx), max(ay, by), max(az, bz))
+        depths[j] = enters if enters <= leaves else math.nan
 
 
 @njit(cache=True)

@@ -54,9 +54,7 @@ def _circle(n: int) -> Array:
 def _strip(lower: NDArray[np.int64], upper: NDArray[np.int64]) -> NDArray[np.int64]:
     """Triangles of a closed band between two rings of vertices, seen from outside counter-clockwise."""
     next_lower, next_upper = np.roll(lower, -1), np.roll(upper, -1)
-    return np.vstack(
-        [np.column_stack([lower, next_lower, next_upper]), np.column_stack([lower, next_upper, upper])]
-    )
+    return np.vstack([np.column_stack([lower, next_lower, next_upper]), np.column_stack([lower, next_upper, upper])])
 
 
 def _ball(n: int) -> _Mesh:
@@ -93,7 +91,9 @@ def _tube(n: int) -> _Mesh:
 
 
 def _cube() -> _Mesh:
-    vertices, normals, triangles = [], [], []
+    vertices: list[Array] = []
+    normals: list[Array] = []
+    triangles: list[list[int]] = []
     for axis in range(3):
         for side in (-1.0, 1.0):
             normal = side * np.eye(3)[axis]

@@ -2,18 +2,45 @@
 
 import json
 import os
+import sys
 from pathlib import Path
 
 import pytest
 
 from dockair.errors import MachineError
 from dockair.scenarios import doctor
+from dockair.sim.opengl import Trial, kind_of_context
 
 
-def test_on_this_machine_nothing_needed_is_missing_but_perhaps_opengl(tmp_path):
+def test_this_machine_is_fit_with_opengl_or_without(monkeypatch, tmp_path):
+    """And looking for OpenGL twice would cost a second."""
+    runs = []
+    draw = doctor.try_drawing
+    monkeypatch.setattr(doctor, "try_drawing", lambda *arguments: runs.append(arguments) or draw(*arguments))
     checks = doctor.examine(tmp_path)
-    missing = {check.name for check in checks if not check.ok and check.needed}
-    assert {name for name in missing if not name.startswith("off-screen OpenGL")} == set()
+    assert doctor.is_fit(checks), [check for check in checks if not check.ok]
+    assert len(runs) == 1
+
+
+@pytest.mark.parametrize(
+    ("trial", "camera"),
+    [
+        (Trial("llvmpipe (LLVM 15.0.6, 256 bits)"), "MuJoCo off-screen (EGL, llvmpipe)"),
+        (Trial("", "no picture through egl"), "analytic background, no OpenGL: no picture through egl"),
+    ],
+)
+def test_the_camera_line_says_which_background_will_run(monkeypatch, tmp_path, trial, camera):
+    monkeypatch.setenv("MUJOCO_GL", "egl")
+    monkeypatch.setattr(doctor, "try_drawing", lambda *_: trial)
+    checks = doctor.examine(tmp_path)
+    assert {check.name: check.found for check in checks}["camera"] == camera
+    assert doctor.is_fit(checks)
+
+
+def test_opengl_that_was_switched_off_is_no_reason_to_install_packages(monkeypatch):
+    monkeypatch.setenv("MUJOCO_GL", "disabled")
+    check = doctor._rendering()
+    assert (check.found, check.remedy) == ("MUJOCO_GL is disabled", "unset MUJOCO_GL, or set it to egl")
 
 
 @pytest.mark.gl
@@ -59,15 +86,15 @@ def test_a_renderer_that_hangs_is_given_up(monkeypatch):
 def test_another_backend_that_was_chosen_is_named_instead_of_packages(monkeypatch):
     monkeypatch.setenv("MUJOCO_GL", "osmesa")
     monkeypatch.setattr(doctor, "_RENDER", "raise ImportError('no OSMesa')")
-    assert doctor._rendering().remedy == "MUJOCO_GL is osmesa: unset it, or set it to egl"
+    assert doctor._rendering().remedy == "unset MUJOCO_GL, or set it to egl"
 
 
 @pytest.mark.parametrize(
     ("environment", "chosen"), [({}, "egl"), ({"DISPLAY": ":0"}, "egl"), ({"MUJOCO_GL": "glfw"}, "glfw")]
 )
 def test_egl_is_chosen_on_linux_where_nobody_chose(monkeypatch, environment, chosen):
-    monkeypatch.setattr(doctor.sys, "platform", "linux")
-    assert doctor._render_environment(environment)["MUJOCO_GL"] == chosen
+    monkeypatch.setattr(sys, "platform", "linux")
+    assert kind_of_context(environment) == chosen
 
 
 def test_a_machine_is_fit_when_only_what_is_not_needed_is_missing():

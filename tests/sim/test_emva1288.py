@@ -121,7 +121,9 @@ def test_the_standards_own_package_gives_back_the_same_figures(
 def _emva_camera(sensor: SensorParameters, exposure_s: float) -> tuple[Camera, np.ndarray]:
     """The package's camera with our sensor's figures, and the radiance that makes 1e6 electrons a second."""
     height, width = 200, 250
-    quantum_efficiency = Qe(qe=np.full((height, width, 1), 0.5), wavelength=np.array([850.0]), width=width, height=height)
+    quantum_efficiency = Qe(
+        qe=np.full((height, width, 1), 0.5), wavelength=np.array([850.0]), width=width, height=height
+    )
     gain, black = (f(sensor, sensor.converter_bits) for f in (output_gain, output_black))
     camera = Camera(
         f_number=8, pixel_area=5.5**2, bit_depth=sensor.converter_bits, width=width, height=height,
@@ -137,7 +139,7 @@ def _emva_camera(sensor: SensorParameters, exposure_s: float) -> tuple[Camera, n
 
 @pytest.mark.parametrize("sensor", [TEN, TWELVE], ids=["10 bit", "12 bit"])
 def test_our_camera_and_the_packages_agree_on_mean_and_variance_against_exposure(sensor: SensorParameters) -> None:
-    """Without a pattern, at 45 degC and 1000 e-/s, to 4.5 standard errors of both: 16 comparisons, 1e-4 of a false alarm.
+    """Without a pattern, at 45 degC and 1000 e-/s, to 4.5 standard errors: 30 comparisons, 2e-4 of a false alarm.
 
     The package adds half a level of uniform noise before it rounds: its variance has 1/12 too much, taken off here.
     Where the well or the converter clips, the package clips the read noise as well: not compared.

@@ -101,7 +101,7 @@ def test_light_that_changes_20_fold_is_followed_within_5_frames(factor: float) -
 @pytest.mark.parametrize("delay", [1, 2, 4])
 @pytest.mark.parametrize("light", [0.06, 1.0, 1.3])
 def test_frames_that_arrive_late_do_not_make_it_swing(delay: int, light: float) -> None:
-    """From far below and far above: the exposure changes in one direction, passes the target by no more than the dead band, and rests."""
+    """It rests, from far below and far above; from below it never passes the target by more than the dead band."""
     for start_s in (EXPOSURE.shortest_s, EXPOSURE.longest_s):
         control = ExposureControl(replace(EXPOSURE, exposure_s=start_s), SENSOR)
         rate = light * MATCHED_E_S * RING
@@ -114,13 +114,11 @@ def test_frames_that_arrive_late_do_not_make_it_swing(delay: int, light: float) 
 
 
 def test_the_peaks_of_leds_of_a_2_to_1_bin_are_between_30_and_85_percent_of_full_scale() -> None:
-    """Rings drawn from the bin, blobs of 0.7 px anywhere within their pixels: both ends in 93 of 100 frames, none clips.
-
-    400 frames: 95 % are expected; 93 % is 1.8 standard errors less, of this seed.
-    """
+    """Rings drawn from the bin, blobs of 0.7 px anywhere within their pixels: the brightest and the faintest in
+    nine of ten frames at least, and none clips. 0.95 are expected; rings differ more than frames: 25 of 10 frames."""
     rng = np.random.default_rng(1)
     inside, clipped = [], 0
-    for ring in range(40):
+    for ring in range(25):
         control = ExposureControl(EXPOSURE, SENSOR)
         intensities = rng.uniform(2.0 / 3.0, 4.0 / 3.0, 8)
         for i in range(14):
@@ -133,7 +131,7 @@ def test_the_peaks_of_leds_of_a_2_to_1_bin_are_between_30_and_85_percent_of_full
                 peaks = np.array(blocks) * exposure_s / SENSOR.full_well_e
                 inside.append(peaks.min() > 0.30 and peaks.max() < 0.85)
                 clipped += int(pixels.max() == 255)
-    assert np.mean(inside) > 0.93
+    assert np.mean(inside) > 0.9
     assert clipped == 0
 
 
@@ -150,16 +148,15 @@ def test_a_suns_disc_drives_it_to_its_shortest_and_darkness_to_its_longest_each_
     assert _run(control, 0.0 * RING, 10, first=10)[3:] == [EXPOSURE.longest_s] * 7
 
 
-def test_fewer_clipped_pixels_than_are_metered_change_nothing() -> None:
+def test_fewer_clipped_pixels_than_are_metered_do_not_count_as_clipping_and_one_more_does() -> None:
+    """With three of four taken up, the brightest pixel of the LEDs is metered instead of the fourth."""
     control = ExposureControl(EXPOSURE, SENSOR)
-    rate = MATCHED_E_S * RING
-    rested = _run(control, rate, 10)[-1]
+    rate = 0.2 * MATCHED_E_S * RING
+    rested_s = _run(control, rate, 10)[-1]
     rate[5, 5 : 5 + EXPOSURE.metered_pixel - 1] = 1e12
-    rate[~(RING > 0.2) & (rate < 1e12)] = 0.0
-    next_s = control.step(_grab(rate, rested, 10), rested)
-    assert next_s < 2.0 * rested  # the faintest of the metered LED pixels sets it, not the clipped ones
+    assert 0.6 * rested_s < control.step(_grab(rate, rested_s, 10), rested_s) <= rested_s
     rate[5, 5 + EXPOSURE.metered_pixel - 1] = 1e12
-    assert control.step(_grab(rate, rested, 11), rested) == pytest.approx(EXPOSURE.shortest_s)
+    assert control.step(_grab(rate, rested_s, 11), rested_s) == EXPOSURE.clipped_factor * rested_s
 
 
 def test_control_that_is_off_holds_the_sheets_exposure() -> None:

@@ -36,7 +36,11 @@ def test_pixels_gains_are_normal_as_far_as_the_bytes_reach() -> None:
     """By Kolmogorov and Smirnov at 1e-5, the steps filled by uniform numbers."""
     rng = np.random.default_rng(0)
     for steps in (PATTERN.gain_map, PATTERN.offset_map):
-        z = (steps.ravel() + rng.uniform(-0.5, 0.5, steps.size)) * PATTERN.gain_step / SENSOR.photo_response_nonuniformity
+        z = (
+            (steps.ravel() + rng.uniform(-0.5, 0.5, steps.size))
+            * PATTERN.gain_step
+            / SENSOR.photo_response_nonuniformity
+        )
         assert stats.kstest(z, "norm").pvalue > 1e-5
         assert 4.2 < np.abs(z).max() < 4.4
 
@@ -65,6 +69,9 @@ def test_another_key_is_another_sensor_and_the_same_key_the_same() -> None:
 
 def test_an_even_sensor_has_no_pattern() -> None:
     even = FixedPattern(
-        replace(SENSOR, photo_response_nonuniformity=0.0, dark_signal_nonuniformity_e=0.0, column_pattern_e=0.0), 3, 9, 9
+        replace(SENSOR, photo_response_nonuniformity=0.0, dark_signal_nonuniformity_e=0.0, column_pattern_e=0.0),
+        3,
+        9,
+        9,
     )
     assert np.all(even.gain == 1.0) and np.all(even.offset_e == 0.0)

@@ -30,6 +30,7 @@ RESPONSE = Responses(
 STRAIGHT = Camera()
 BENT = Camera(distortion=(-0.25, 0.08, 1e-3, -5e-4, 0.0))
 WIDE = Camera(width_px=8192, height_px=8192, principal_point_px=(4095.5, 4095.5))
+MIDDLE = Window(3400, 4800, 3400, 4800)  # of WIDE: everything that is added pixel by pixel
 NONE = np.zeros(2)
 ALONE = {"veiling_glare": 0.0, "halo_share": NONE, "spike_share": 0.0, "ghost_share": np.zeros(6)}
 SIGMA_PX = 0.7
@@ -72,9 +73,9 @@ def test_what_enters_the_lens_is_accounted_for() -> None:
     assert min(glare.shares.values()) > 0.0
     sun_C = _toward((4700.0, 3700.0), WIDE)
     entered = FLUX_E_S * EXPOSURE_S * sun_C[0] / LENS.transmittance
-    total = _plane_sum(_stray(glare, sun_C, WIDE)) + _on_pixels(glare, sun_C, WIDE.full_window).sum(dtype=float)
+    total = _plane_sum(_stray(glare, sun_C, WIDE)) + _on_pixels(glare, sun_C, MIDDLE).sum(dtype=float)
     assert total / entered + glare.shares["lost"] == pytest.approx(1.0, abs=5e-4)
-    stray = _plane_sum(_stray(glare, sun_C, WIDE)) + _on_pixels(glare, sun_C, WIDE.full_window, False).sum(dtype=float)
+    stray = _plane_sum(_stray(glare, sun_C, WIDE)) + _on_pixels(glare, sun_C, MIDDLE, False).sum(dtype=float)
     told = 1.0 - glare.shares["lost"] - glare.shares["disc"]
     assert stray / entered == pytest.approx(told, rel=0.01)  # 0.7 % of it lies beyond even this sensor
 
@@ -103,7 +104,7 @@ def test_each_part_alone_puts_its_own_share_on_the_sensor() -> None:
     entered = FLUX_E_S * EXPOSURE_S * sun_C[0] / LENS.transmittance
     base = ALONE | {"iris_blades": 0}
     wing = _plane_sum(_stray(_glare(WIDE, **base), sun_C, WIDE))
-    wing += _on_pixels(_glare(WIDE, **base), sun_C, WIDE.full_window, False).sum(dtype=float)
+    wing += _on_pixels(_glare(WIDE, **base), sun_C, MIDDLE, False).sum(dtype=float)
     for changes, name in (
         ({"veiling_glare": 0.01}, "veil"),
         ({"halo_share": PARAMETERS.halo_share}, "halo"),
@@ -112,7 +113,7 @@ def test_each_part_alone_puts_its_own_share_on_the_sensor() -> None:
     ):
         glare = _glare(WIDE, **(base | changes))
         light = _plane_sum(_stray(glare, sun_C, WIDE))
-        light += _on_pixels(glare, sun_C, WIDE.full_window, False).sum(dtype=float)
+        light += _on_pixels(glare, sun_C, MIDDLE, False).sum(dtype=float)
         beside = 0.0 if name in ("spikes", "halo") else wing
         # the halo's tail beyond 4096 px is 2.4 % of it
         assert (light - beside) / entered == pytest.approx(glare.shares[name], rel=0.03 if name == "halo" else 0.01)
@@ -131,8 +132,8 @@ def test_the_veil_is_the_glare_indexs_share_of_the_flux_on_every_pixel_alike() -
 @pytest.mark.parametrize("camera", [STRAIGHT, BENT])
 def test_stray_light_is_continuous_as_the_sun_leaves_the_picture(camera: Camera) -> None:
     glare = _glare(camera)
-    inside, outside = (_stray(glare, _toward((u, 400.0), camera), camera) for u in (2046.99, 2047.01))
-    assert np.abs(outside / inside - 1.0).max() < 5e-3
+    inside, outside = (_stray(glare, _toward((u, 400.0), camera), camera)[:, :230] for u in (2046.99, 2047.01))
+    assert np.abs(outside / inside - 1.0).max() < 3e-3
     # and far beyond it, where the lens's polynomial is not to be trusted: no jump from step to step
     angles = np.deg2rad(np.linspace(15.0, 60.0, 181))
     level = [_stray(glare, np.array([np.cos(a), -np.sin(a), 0.01]), camera)[60, 20] for a in angles]
@@ -169,10 +170,10 @@ def test_it_is_proportional_to_the_visible_part_and_to_the_exposure(visible: flo
     glare, sun_C = _glare(), _toward((700.0, 400.0))
     grid = glare.stray(sun_C, visible, exposure_s, STRAIGHT.full_window)
     assert grid is not None
-    assert grid.values == pytest.approx(0.25 * _stray(glare, sun_C), rel=1e-5)
+    assert np.allclose(grid.values, 0.25 * _stray(glare, sun_C), rtol=1e-5)
     image = np.zeros((1088, 2048), dtype=np.float32)
     glare.add_fine(image, (0, 0), sun_C, visible, exposure_s)
-    assert image == pytest.approx(0.25 * _on_pixels(glare, sun_C, STRAIGHT.full_window, False), rel=1e-5)
+    assert np.allclose(image, 0.25 * _on_pixels(glare, sun_C, STRAIGHT.full_window, False), rtol=1e-5, atol=0.0)
     assert glare.compact_ghosts(sun_C, visible, exposure_s).electrons == pytest.approx(
         0.25 * glare.compact_ghosts(sun_C, 1.0, EXPOSURE_S).electrons
     )
@@ -240,7 +241,7 @@ def test_dirt_raises_veil_and_halo_and_nothing_else() -> None:
     )
     r = np.hypot(u - 700.0, v - 400.0)
     law = halo.densities(r[r > 120.0]).sum(axis=0) + PARAMETERS.veiling_glare / (2048 * 1088)
-    assert more[r > 120.0] == pytest.approx(2.0 * law * FLUX_E_S * EXPOSURE_S * sun_C[0], rel=0.01)
+    assert np.allclose(more[r > 120.0], 2.0 * law * FLUX_E_S * EXPOSURE_S * sun_C[0], rtol=2e-3)
 
 
 def test_all_is_centred_where_the_lens_images_the_sun() -> None:
@@ -263,7 +264,7 @@ def test_all_is_centred_where_the_lens_images_the_sun() -> None:
 @pytest.mark.parametrize("place", [(1200.0, 500.0), (2090.0, 300.0)])
 def test_a_window_is_the_full_frames_crop_bit_for_bit(camera: Camera, place: tuple[float, float]) -> None:
     glare = _glare(camera)
-    sun_C = _toward((1200.0, 500.0), camera) if place[0] < 2048 else _toward((2040.0, 300.0), camera)
+    sun_C = _toward(place, camera)
     full = camera.full_window
     grid, image = glare.stray(sun_C, 1.0, EXPOSURE_S, full), _on_pixels(glare, sun_C, full)
     assert grid is not None

@@ -35,7 +35,7 @@ LOOKS = [
 @pytest.mark.parametrize("R", LOOKS)
 @pytest.mark.parametrize("step", [1e-3, 2e-2])
 def test_a_smooth_function_comes_back_from_every_side(R: np.ndarray, step: float) -> None:
-    """To a quarter of what lies between two nodes, where a fold of the map crosses a cell; a tile left out is off by 1."""
+    """To a quarter of the step between nodes, where a fold of the map crosses a cell; a tile left out is off by 1."""
     x, y = _axes(60, 90, step)
     out = np.full((60, 90), np.nan, dtype=np.float32)
     DirectionTable(_smooth, TILES).fill(out, R, x, y)

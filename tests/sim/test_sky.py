@@ -1,0 +1,257 @@
+"""The sky: published radiances, the horizon's place, cloud gaps that look like LEDs, haze, night; bits that repeat."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.ndimage import label
+from scipy.spatial.transform import Rotation
+
+from dockair.errors import DockairError
+from dockair.parameters import load_parameters
+from dockair.sim.camera.sheets import SkyParameters
+from dockair.sim.camera.sky import Sky, Weather
+
+SHEET = load_parameters("sky", SkyParameters)
+BARE = replace(SHEET, deck_cover=0.0, ground_contrast=0.0, aerosol_optical_depth=0.0)  # nothing random is left
+ALTITUDE_M = 6000.0
+FOCAL_PX = 16e-3 / 5.5e-6
+X, Y = ((2.0 * np.arange(n) + 0.5 - 0.5 * (2 * n - 1)) / FOCAL_PX for n in (1024, 544))  # blocks of 2 x 2 pixels
+WHITE_E = 250.0  # f/8, 20 us
+FULL_SCALE_E = 13_500.0
+
+
+def _toward(elevation_deg: float, azimuth_deg: float = 0.0) -> np.ndarray:
+    """Unit vector; azimuth to the left."""
+    a, e = math.radians(azimuth_deg), math.radians(elevation_deg)
+    return np.array([math.cos(e) * math.cos(a), math.cos(e) * math.sin(a), math.sin(e)])
+
+
+def _sky(
+    weather: Weather | None = None, sun: np.ndarray | None = None, sheet: SkyParameters = SHEET, key: int = 7
+) -> Sky:
+    return Sky(sheet, weather or Weather(), sun, ALTITUDE_M, key)
+
+
+def _picture(sky: Sky, R: np.ndarray | None = None, x: np.ndarray = X, y: np.ndarray = Y) -> np.ndarray:
+    out = np.full((len(y), len(x)), np.nan, dtype=np.float32)
+    sky.fill(out, np.eye(3) if R is None else R, x, y)
+    return out
+
+
+def _directions(n: int, seed: int) -> np.ndarray:
+    d = np.random.default_rng(seed).standard_normal((n, 3))
+    return d / np.linalg.norm(d, axis=1, keepdims=True)
+
+
+def test_zenith_and_horizon_across_from_the_sun_are_the_sheets() -> None:
+    zenith, horizon = _sky(sun=_toward(0.0, 90.0), sheet=BARE).radiance(np.array([_toward(90.0), _toward(0.0)]))
+    assert zenith == pytest.approx(SHEET.zenith, rel=1e-4)
+    assert horizon == pytest.approx(SHEET.horizon, rel=5e-3)
+
+
+def test_along_the_horizon_the_radiance_is_the_cie_clear_skys() -> None:
+    """ISO 15469, type 12: 1 + 10 (exp(-3 X) - exp(-3 pi/2)) + 0.45 cos^2 X, coefficients written out here."""
+    angle = np.radians([5.0, 30.0, 60.0, 90.0, 120.0, 180.0])
+    sky = _sky(sun=_toward(0.0), sheet=BARE)
+    got = sky.radiance(np.array([_toward(0.0, a) for a in np.degrees(angle)]))
+    wanted = 1.0 + 10.0 * (np.exp(-3.0 * angle) - math.exp(-1.5 * math.pi)) + 0.45 * np.cos(angle) ** 2
+    assert got / got[3] == pytest.approx(wanted, rel=1e-6)
+
+
+def test_clear_sky_at_850_nm_is_dark_overhead_and_no_brighter_at_the_horizon_than_was_ever_measured() -> None:
+    """W/m^2/sr/nm, of 0.286 for white: 0.01-0.03 away from the Sun; 0.38 is the highest published."""
+    high, low = 0.286 * _sky(sun=_toward(0.0, 90.0)).radiance(np.array([_toward(75.0), _toward(1.0)]))
+    assert 0.01 < high < 0.03
+    assert high < low < 0.38
+
+
+def test_the_ground_begins_at_the_dip_of_the_horizon() -> None:
+    """cos dip = R/(R + h): 2.486 degrees at 6 km. Black ground, clear air: light above, none below."""
+    dip = math.degrees(math.acos(6.371e6 / (6.371e6 + ALTITUDE_M)))
+    black = replace(BARE, ground_reflectance=0.0)
+    edge = _sky(sun=_toward(45.0), sheet=black).radiance(np.array([_toward(-dip + 0.002), _toward(-dip - 0.002)]))
+    assert edge[0] > 0.3
+    assert edge[1] == 0.0
+
+
+def test_the_ground_is_lambertian() -> None:
+    """0.25 sin 30 degrees, whichever way down."""
+    below = _sky(sun=_toward(30.0), sheet=BARE).radiance(np.array([_toward(-90.0), _toward(-20.0, 100.0)]))
+    assert below == pytest.approx([0.125, 0.125], rel=1e-12)
+
+
+def test_a_closed_deck_under_a_high_sun_is_white_by_what_it_reflects() -> None:
+    """Of 20 optical depths 1 - 1/(1 + 0.75 0.14 20) = 0.68 on average, and nothing beyond white."""
+    closed = replace(BARE, deck_cover=1.0)
+    down = np.array([_toward(-60.0 - 30.0 * u, 360.0 * v) for u, v in np.random.default_rng(1).random((4000, 2))])
+    seen = _sky(sheet=closed).radiance(down)
+    assert seen.mean() == pytest.approx(0.68, abs=0.05)
+    assert 0.2 < seen.min() < seen.max() < 1.0
+
+
+@pytest.mark.parametrize("yaw_pitch_roll_deg", [(0.0, 0.0, 0.0), (6.0, -4.0, 0.0), (-5.0, 3.0, 40.0)])
+def test_the_aureole_stands_where_the_pinhole_puts_the_sun(yaw_pitch_roll_deg: tuple[float, float, float]) -> None:
+    """To the table's spacing there, 1.2 mrad."""
+    R_WC = Rotation.from_euler("ZYX", np.add(yaw_pitch_roll_deg, (20.0, -50.0, 0.0)), degrees=True).as_matrix()
+    s_C = R_WC.T @ _toward(50.0, 20.0)
+    u, v = (int(np.abs(axis + s / s_C[0]).argmin()) for axis, s in ((X, s_C[1]), (Y, s_C[2])))
+    x, y = X[u - 40 : u + 50], Y[v - 50 : v + 40]
+    picture = _picture(_sky(sun=_toward(50.0, 20.0)), R_WC, x, y)
+    row, column = np.unravel_index(picture.argmax(), picture.shape)
+    assert [x[column], y[row]] == pytest.approx([-s_C[1] / s_C[0], -s_C[2] / s_C[0]], abs=1.2e-3)
+
+
+def test_between_nodes_the_picture_is_the_radiance() -> None:
+    """Clear sky without texture, away from the horizon's edge: to the table's error, below a thousandth."""
+    sky, R = _sky(sun=_toward(20.0, 30.0), sheet=BARE), Rotation.from_euler("Y", -15.0, degrees=True).as_matrix()
+    d = np.stack(np.broadcast_arrays(1.0, -X[None, ::16], -Y[::16, None]), axis=-1) @ R.T
+    wanted = sky.radiance(d.reshape(-1, 3)).reshape(34, 64)
+    assert _picture(sky, R, X[::16], Y[::16]) == pytest.approx(wanted, rel=1e-3)
+
+
+@pytest.mark.parametrize("start", [(0, 0), (3, 5), (131, 257), (200, 1), (394, 874)])
+def test_a_window_is_the_full_pictures_bit_for_bit(start: tuple[int, int]) -> None:
+    """With broken cloud, camera turned; the windows' sky has seen nothing before."""
+    weather, sun = Weather(cloud_cover=0.6), _toward(8.0)
+    R = Rotation.from_euler("ZYX", (3.0, -2.0, 25.0), degrees=True).as_matrix()
+    full, fresh = _picture(_sky(weather, sun), R), _sky(weather, sun)
+    for rows, columns in ((150, 150), (1, 1), (17, 33)):
+        y, x = slice(start[0], start[0] + rows), slice(start[1], start[1] + columns)
+        assert np.array_equal(_picture(fresh, R, X[x], Y[y]), full[y, x])
+
+
+def test_the_key_settles_the_clouds_and_nothing_else_does() -> None:
+    weather, sun = Weather(cloud_cover=0.5), _toward(10.0)
+    first, same, other = (_picture(_sky(weather, sun, key=key), x=X[400:500], y=Y[:100]) for key in (1, 1, 2))
+    assert np.array_equal(first, same)
+    assert (first != other).mean() > 0.9
+
+
+def _compact_blobs(picture: np.ndarray, level_e: float) -> int:
+    """Count 8-connected spots of 3 to 60 px above a level in electrons."""
+    labels, count = label(WHITE_E * picture > level_e, structure=np.ones((3, 3)))
+    area_px = 4 * np.bincount(labels.ravel(), minlength=count + 1)[1:]
+    return int(((area_px >= 3) & (area_px <= 60)).sum())
+
+
+def test_a_low_sun_behind_broken_cloud_makes_blobs_like_leds() -> None:
+    """The whole field, toward the Sun at 5 degrees: above 60 % of full scale at f/8 and 20 us; a clear sky has none."""
+    sun = _toward(5.0, 2.0)
+    for key in (3, 4, 5):
+        assert _compact_blobs(_picture(_sky(Weather(cloud_cover=0.6), sun, key=key)), 0.6 * FULL_SCALE_E) >= 5
+    clear = _picture(_sky(Weather(), sun))
+    assert WHITE_E * clear.max() < 0.1 * FULL_SCALE_E
+
+
+def test_closed_thick_cloud_has_neither_blobs_nor_beam() -> None:
+    sun = _toward(5.0, 2.0)
+    sky = _sky(Weather(cloud_cover=1.0, cloud_optical_depth=30.0), sun)
+    assert _picture(sky).max() < 0.5
+    assert sky.beam(sun[None])[0] < 1e-6
+
+
+def test_without_cloud_and_haze_the_beam_is_whole_above_the_horizon() -> None:
+    d = _directions(2000, 11)
+    above = d[:, 2] > -math.sin(math.acos(6.371e6 / (6.371e6 + ALTITUDE_M)))
+    assert np.array_equal(_sky().beam(d), above.astype(float))
+
+
+def test_gaps_let_the_whole_beam_through_and_cloud_takes_its_depth() -> None:
+    """Overhead: the share of gaps is 1 - cover; where there is cloud, -ln beam has the mean optical depth.
+
+    Mean of 60 skies, each with one look straight up: gaps 1 sigma = 0.065; depths 0.75 of their mean by (2).
+    """
+    up = np.array([_toward(90.0, 0.0)])
+    beams = np.array([_sky(Weather(cloud_cover=0.5, cloud_optical_depth=2.0), key=k).beam(up)[0] for k in range(60)])
+    assert (beams == 1.0).mean() == pytest.approx(0.5, abs=0.26)
+    assert -np.log(beams[beams < 1.0]).mean() == pytest.approx(2.0, rel=0.6)
+
+
+def test_where_the_sun_stands_in_a_gap_the_disc_is_bright_and_the_glow_is_low() -> None:
+    """Beam and picture are of one cloud: whole beam, no aureole; part of the beam, glow far above the clear sky.
+
+    Within a degree of the Sun 10 times white is what the lobes make of the thinnest cloud in question, tau = 0.36.
+    """
+    sun, beam, radiance = _toward(12.0), np.empty(0), np.empty(0)
+    near = np.array([_toward(12.0 + a, b) for a, b in np.random.default_rng(2).uniform(-0.7, 0.7, (300, 2))])
+    for key in range(20):
+        sky = _sky(Weather(cloud_cover=0.5, cloud_optical_depth=3.0), sun, key=key)
+        beam, radiance = np.append(beam, sky.beam(near)), np.append(radiance, sky.radiance(near))
+    gap, veil = beam == 1.0, (beam > 0.1) & (beam < 0.7)
+    assert min(gap.sum(), veil.sum()) > 50
+    assert radiance[gap].max() < 5.0
+    assert radiance[veil].min() > 10.0
+
+
+def test_the_deck_and_the_ground_hold_structure_of_every_size_that_a_picture_resolves() -> None:
+    """Root mean square difference in the lower third, normalised by its mean, at 2, 8, 30 and 100 px."""
+    lower = _picture(_sky(sun=_toward(40.0, 120.0)))[400:]
+    mean = lower.mean()
+    across = [np.sqrt(np.mean((lower[:, lag:] - lower[:, :-lag]) ** 2)) / mean for lag in (1, 4, 15, 50)]
+    assert across[0] > 0.05
+    assert np.all(np.diff(across) > 0.02)
+
+
+def test_haze_dims_the_beam_by_koschmieders_law() -> None:
+    """Overhead, 10 km of visibility against 100 km: exp(-(3.912/10 - 3.912/100) 0.5 km)."""
+    through = _sky(Weather(visibility_m=10e3)).beam(np.array([_toward(90.0)]))[0]
+    assert through == pytest.approx(math.exp(-(0.3912 - 0.03912) * 0.5), rel=1e-4)
+
+
+def test_in_fog_there_is_nothing_but_fog() -> None:
+    sun = _toward(30.0, 20.0)
+    fog = _sky(Weather(visibility_m=50.0, cloud_cover=0.5), sun)
+    picture = _picture(fog)
+    assert np.ptp(picture) < 1e-6
+    assert picture[0, 0] == pytest.approx(fog.airlight(_toward(0.0)), rel=1e-6)
+    assert 0.02 < picture[0, 0] < 0.5
+    assert fog.beam(sun[None])[0] < 1e-30
+
+
+def test_contrast_below_the_horizon_fades_with_visibility() -> None:
+    spread = [
+        float(_picture(_sky(Weather(visibility_m=v), _toward(40.0, 120.0)), x=X[::8], y=Y[400::8]).std())
+        for v in (100e3, 30e3, 10e3, 3e3, 1e3)
+    ]
+    assert np.all(np.diff(spread) < 0.0)
+    assert spread[-1] < 1e-2 * spread[0]
+
+
+def test_far_objects_fade_into_the_horizon_behind_them() -> None:
+    for weather in (Weather(), Weather(visibility_m=20e3), Weather(visibility_m=2e3)):
+        sky = _sky(weather, _toward(35.0, 60.0), BARE)
+        assert sky.airlight(_toward(0.0)) == pytest.approx(sky.radiance(_toward(0.0)[None])[0], rel=0.01)
+
+
+def test_at_night_all_is_dark() -> None:
+    night = _sky(Weather(night=True, cloud_cover=0.5), _toward(10.0))
+    assert np.all(_picture(night) == np.float32(SHEET.night))
+    assert night.beam(_directions(20, 3)).max() == 0.0
+    assert night.airlight(_toward(0.0)) == night.ambient == SHEET.night
+
+
+def test_the_light_in_the_shade_is_the_mean_radiance_all_round() -> None:
+    """Against 20 000 random directions; the standard error of their mean is 0.004."""
+    sky = _sky(sun=_toward(40.0, 30.0))
+    assert sky.ambient == pytest.approx(sky.radiance(_directions(20_000, 5)).mean(), abs=0.02)
+
+
+def test_cloud_before_the_sun_makes_all_light_diffuse() -> None:
+    sun = _toward(40.0, 30.0)
+    shares = [
+        _sky(Weather(cloud_cover=c, cloud_optical_depth=20.0), sun).diffuse_share if c else _sky(sun=sun).diffuse_share
+        for c in (0.0, 1.0)
+    ]
+    assert 0.1 < shares[0] < 0.3
+    assert shares[1] > 0.999
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [("cloud_cover", 1.2), ("cloud_cover", -0.1), ("cloud_optical_depth", -1.0), ("visibility_m", 0.0)],
+)
+def test_impossible_weather_is_refused_by_name(key: str, value: float) -> None:
+    with pytest.raises(DockairError, match=key):
+        Weather(**{key: value})
