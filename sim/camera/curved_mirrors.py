@@ -17,7 +17,6 @@ Source: do Carmo, Differential Geometry of Curves and Surfaces, section 3-3 (cur
 import math
 
 from numba import njit
-from numpy.typing import NDArray
 
 from dockair.rotations import Array
 from dockair.sim.camera.mirrors import Balls
@@ -75,7 +74,7 @@ def rim_spots(
 
 @njit(cache=True)
 def _write(
-    row: NDArray[float], p: Vector, n: Vector, t1: Vector, t2: Vector, c: Vector
+    row: Array, p: Vector, n: Vector, t1: Vector, t2: Vector, c: Vector
 ) -> None:
     for k in range(3):
         row[k], row[3 + k], row[6 + k], row[9 + k], row[12 + k] = p[k], n[k], t1[k], t2[k], c[k]

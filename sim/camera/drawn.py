@@ -82,6 +82,8 @@ class DrawnSolids:
             MachineError: no off-screen OpenGL here.
         """
         R_WC, p_WC = pose
+        if len(self._solids.geoms) == 0:
+            return
         if self._canvas is None:
             self._open()
         half = 0.5 / self._scale
@@ -108,7 +110,7 @@ class DrawnSolids:
         self._canvas = Canvas(meshes, columns, rows, "camera")
         s = self._solids
         most = len(s.geoms) + 2 * int((s.kinds == CAPSULE).sum())
-        self._scene = mujoco.MjvScene(meshes, max(most, 1))
+        self._scene = mujoco.MjvScene(meshes, most)
         for flag in ("SHADOW", "REFLECTION", "SKYBOX", "HAZE", "FOG"):
             self._scene.flags[getattr(mujoco.mjtRndFlag, f"mjRND_{flag}")] = 0
         nothing, upright = np.zeros(3), np.eye(3).ravel()
@@ -119,7 +121,7 @@ class DrawnSolids:
         self._places, self._turns, self._colours = (
             _all(self._geoms, name, shape) for name, shape in (("pos", (3,)), ("mat", (3, 3)), ("rgba", (4,)))
         )
-        self._meshes = np.full(most, -1, dtype=np.int64)
+        self._meshes = np.full(most, -1)
         self._set_light()
 
     def _set_light(self) -> None:

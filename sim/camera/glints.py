@@ -92,8 +92,9 @@ def _rows(
         surfaces.patch_step_rad,
     )
     balls, tubes = mirrors.balls, mirrors.tubes
-    spots = np.empty((len(balls.geom) + len(tubes.geom) + 2, SPOT))
-    n = round_spots(balls, tubes, xpos, xmat, sun, 0.0, eye, spots)
+    wanted = np.ones((1, len(balls.geom) + len(tubes.geom)), dtype=np.bool_)
+    spots = np.empty((wanted.size + 2, SPOT))
+    n = round_spots(balls, tubes, xpos, xmat, sun, 0.0, wanted, eye, spots)
     n += ellipsoid_spots(balls, xpos, xmat, sun, 0.0, eye, spots[n:])
     if mirrors.rim is not None:
         n += rim_spots(torus_W(data, mirrors), float(METAL), mirrors.rim.skin_m, sun, 0.0, eye, spots[n:])

@@ -2,9 +2,13 @@
 
     I_ref = (I(psi)/d1^2) A,    I(psi) = I_0 max(cos^m psi, side light)                                          (1)
 
-A in m^2/sr of [lobes, eq 4] with the LED at the distance d1 of the mirror point, psi off the LED's axis. For d1 and d
-large against a sphere's radius it is I R r^2/(4 d1^2). The LEDs shine aft, on the probe and on the receiver; what they
-send sideways and forward, to the basket and the coupling, is `led_side_light`.
+A in m^2/sr of [lobes, eq 4] with the LED at the distance d1 of the mirror point, psi off the LED's axis. The LEDs shine
+aft, on the probe; what they send sideways and forward, to the basket and the coupling, is `led_side_light`.
+
+Most pairs of LED and mirror are too faint whatever their mirror point, and are not looked at: with R at most the
+material's share, c the angle between ray and tube, which a straight line from LED to lens makes smallest,
+
+    sphere  A < R r^2/4 (d, d1 >> r only makes it less),    tube  A < R r d1/(2 sin c)                            (2)
 
 Not modelled: flat faces, hose, tanker and receiver's skin as mirrors; reflections of reflections; the LED's size.
 Sources: as of `lobes`.
@@ -25,6 +29,8 @@ from dockair.sim.camera.mirrors import METAL, Mirrors, finishes
 from dockair.sim.camera.occlusion import hidden, is_clear
 from dockair.sim.camera.round_mirrors import round_spots
 from dockair.sim.camera.sheets import SurfaceParameters
+
+_CLOSEST_M = 1e-3  # to a surface, in the bound (2)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -60,17 +66,45 @@ def find_led_reflections(
         pattern_exponent: m of Eq. (1).
         surfaces: reflectances, side light, limits.
     """
-    rows = _rows(data, mirrors, np.asarray(p_WC, dtype=float), np.asarray(leds_W, dtype=float), surfaces)
+    p_WC, leds_W = np.asarray(p_WC, dtype=float), np.asarray(leds_W, dtype=float)
+    limit = surfaces.faintest_reflection * float(np.max(intensity_w_sr, initial=0.0))
+    wanted = _bound(data, mirrors, p_WC, leds_W, axis_W, surfaces) * np.asarray(intensity_w_sr)[:, None] >= limit
+    rows = _rows(data, mirrors, p_WC, leds_W, wanted, surfaces)
     led = rows[:, 9].astype(np.intp)
     ray = rows[:, :3] - leds_W[led]
     d1 = np.linalg.norm(ray, axis=1)
     pattern = np.maximum(np.maximum(ray @ axis_W / d1, 0.0) ** pattern_exponent, surfaces.led_side_light)
     intensity = np.asarray(intensity_w_sr)[led] * pattern * rows[:, 6] / d1**2
-    bright = np.flatnonzero(intensity > surfaces.faintest_reflection * np.max(intensity_w_sr, initial=0.0))
+    bright = np.flatnonzero((intensity > 0.0) & (intensity >= limit))
     starts = rows[:, :3] + rows[:, 8:9] * rows[:, 3:6]
     seen = bright[~hidden(model, data, p_WC, starts[bright], 0.0)]
     kept = [i for i in seen if _is_lit(model, data, starts[i], leds_W[led[i]], surfaces.led_seat_m)]
     return LedReflections(p_W=rows[kept, :3], intensity_w_sr=intensity[kept], led=led[kept])
+
+
+def _bound(
+    data: mujoco.MjData, mirrors: Mirrors, p_WC: Array, leds_W: Array, axis_W: Array, surfaces: SurfaceParameters
+) -> Array:
+    """(m, balls + tubes) what A I(psi)/(I_0 d1^2) cannot exceed, Eqs. (1) and (2)."""
+    balls, tubes = mirrors.near_balls, mirrors.near_tubes
+    share = finishes(surfaces)[:, 2]
+    z_b, z_t = data.geom_xmat[balls.geom, 2::3], data.geom_xmat[tubes.geom, 2::3]
+    ball = data.geom_xpos[balls.geom] + balls.at_z[:, None] * z_b - leds_W[:, None]
+    tube = data.geom_xpos[tubes.geom] - leds_W[:, None]
+    radius = balls.axes.max(axis=1)
+    d_ball = np.maximum(np.linalg.norm(ball, axis=2) - radius, _CLOSEST_M)
+    along = np.einsum("mnk,nk->mn", tube, z_t)
+    beyond = np.maximum(np.abs(along) - tubes.half_length, 0.0)
+    flat2 = np.maximum((tube**2).sum(axis=2) - along**2, 0.0)
+    d_tube = np.maximum(np.sqrt(flat2 + beyond**2) - tubes.radius, _CLOSEST_M)
+    sight = p_WC - leds_W
+    cos_c = sight @ z_t.T / np.linalg.norm(sight, axis=1)[:, None]
+    sin_c = np.sqrt(np.maximum(1.0 - cos_c**2, _CLOSEST_M**2))
+    side = surfaces.led_side_light
+    on_ball = np.where(ball @ axis_W + radius > 0.0, 1.0, side) * share[balls.material] * radius**2 / (4.0 * d_ball**2)
+    reach = tubes.half_length + tubes.radius
+    on_tube = np.where(tube @ axis_W + reach > 0.0, 1.0, side) * share[tubes.material] * tubes.radius
+    return np.hstack([on_ball, on_tube / (2.0 * sin_c * d_tube)])
 
 
 def _is_lit(model: mujoco.MjModel, data: mujoco.MjData, start: Array, led_W: Array, seat_m: float) -> bool:
@@ -79,12 +113,19 @@ def _is_lit(model: mujoco.MjModel, data: mujoco.MjData, start: Array, led_W: Arr
     return is_clear(model, data, start, ray / distance, distance - seat_m)
 
 
-def _rows(data: mujoco.MjData, mirrors: Mirrors, p_WC: Array, leds_W: Array, surfaces: SurfaceParameters) -> Array:
+def _rows(
+    data: mujoco.MjData,
+    mirrors: Mirrors,
+    p_WC: Array,
+    leds_W: Array,
+    wanted: NDArray[np.bool_],
+    surfaces: SurfaceParameters,
+) -> Array:
     """(n, ROW) reflections, faint and hidden ones among them."""
     eye, balls, tubes = tuple(map(float, p_WC)), mirrors.near_balls, mirrors.near_tubes
     xpos, xmat = data.geom_xpos, data.geom_xmat
-    spots = np.empty((len(leds_W) * (len(balls.geom) + len(tubes.geom) + 2), SPOT))
-    n = round_spots(balls, tubes, xpos, xmat, leds_W, 1.0, eye, spots)
+    spots = np.empty((wanted.size + 2 * len(leds_W), SPOT))
+    n = round_spots(balls, tubes, xpos, xmat, leds_W, 1.0, wanted, eye, spots)
     n += ellipsoid_spots(balls, xpos, xmat, leds_W, 1.0, eye, spots[n:])
     if mirrors.rim is not None:
         n += rim_spots(torus_W(data, mirrors), float(METAL), mirrors.rim.skin_m, leds_W, 1.0, eye, spots[n:])

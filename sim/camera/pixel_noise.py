@@ -221,8 +221,8 @@ def _row_exact(
             u1 = mix(np.uint32(more ^ np.uint32(0x9E3779B9))) / 4294967296.0
             n = np.float32(poisson_from_uniforms(float(e), bits / 4294967296.0, u1, cdf, guide))
         else:
-            z = normal_from_bits(bits)  # rounding adds 1/12 to the variance
-            n = np.float32(np.rint(e + np.sqrt(e - 1.0 / 12.0) * z + (z * z - 1.0) / 6.0))
+            z = normal_from_bits(bits)  # rounding adds 1/12 to the variance, the skew's term 1/18
+            n = np.float32(np.rint(e + np.sqrt(e - 5.0 / 36.0) * z + (z * z - 1.0) / 6.0))
         m = fma(chain.read_noise_e, normal_from_bits(more), min(n, chain.full_well_e))
         out[i] = _level(m, offset[i], column[i], chain)
 

@@ -15,6 +15,7 @@ A tube that ends before that is taken at its end. Everything here is in W. Sourc
 
 import math
 
+import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
@@ -36,6 +37,7 @@ def round_spots(
     xmat: Array,
     lights: Array,
     point: float,
+    wanted: NDArray[np.bool_],
     eye: Vector,
     spots: Array,
 ) -> int:
@@ -48,6 +50,7 @@ def round_spots(
         xmat: (ngeom, 9).
         lights: (m, 3) directions (unit vectors) or places [m].
         point: 0 for directions, 1 for places.
+        wanted: (m, balls + tubes) which pairs to look at.
         eye: the lens [m].
         spots: (at least m (balls + tubes), SPOT), written.
     """
@@ -56,7 +59,7 @@ def round_spots(
         toward = (lights[j, 0], lights[j, 1], lights[j, 2])
         for i in range(len(balls.geom)):
             g, axes = balls.geom[i], balls.axes[i]
-            if not axes[0] == axes[1] == axes[2]:
+            if not wanted[j, i] or not axes[0] == axes[1] == axes[2]:
                 continue
             z = (xmat[g, 2], xmat[g, 5], xmat[g, 8])
             centre = _add((xpos[g, 0], xpos[g, 1], xpos[g, 2]), balls.at_z[i], z)
@@ -68,6 +71,8 @@ def round_spots(
                 spots[count, 19], spots[count, 21] = balls.material[i], j
                 count += 1
         for i in range(len(tubes.geom)):
+            if not wanted[j, len(balls.geom) + i]:
+                continue
             g, radius, half = tubes.geom[i], tubes.radius[i], tubes.half_length[i]
             axis = (xmat[g, 2], xmat[g, 5], xmat[g, 8])
             centre = (xpos[g, 0], xpos[g, 1], xpos[g, 2])
@@ -83,7 +88,7 @@ def round_spots(
 
 @njit(cache=True)
 def _write(
-    row: NDArray[float],
+    row: Array,
     p: Vector,
     n: Vector,
     t1: Vector,

@@ -34,7 +34,7 @@ class DirectionTable:
             tiles: a side, each of 64 x 64 nodes.
         """
         self._function, self._tiles = function, tiles
-        self._values: NDArray[np.float32] = np.empty((tiles * _TILE, tiles * _TILE), dtype=np.float32)
+        self._values: NDArray[np.float32] = np.zeros((tiles * _TILE, tiles * _TILE), dtype=np.float32)
         self._is_known = np.zeros((tiles, tiles), dtype=np.bool_)
 
     def fill(self, out: NDArray[np.float32], R_WC: Array, x: Array, y: Array) -> None:

@@ -16,7 +16,7 @@ from dockair.sim.faults import Fault, Faults
 AS_BUILT = AsBuilt(
     camera=Camera(principal_point_px=(1020.7, 545.1), focal_length_m=0.01601),
     ring_positions_D=LedRing().positions_D + 1e-3 * np.sin(np.arange(24.0)).reshape(8, 3),
-    led_intensity_w_sr=0.02 * (1.0 + 0.3 * np.cos(np.arange(8.0))),
+    led_intensity_w_sr=0.015 * (1.0 + 0.3 * np.cos(np.arange(8.0))),
     mounting=Mounting(
         R_BC=exp(np.array([0.002, -0.001, -0.05])), p_BC=np.array([3.3, -0.45, 0.75]), p_BP=np.array([6.0, -0.9, 0.6])
     ),
@@ -68,9 +68,15 @@ class SmallWorld:
         self.put(name, np.array([-30.0, ASIDE_M, 0.0]), np.eye(3))
 
 
+@pytest.fixture
+def small_world() -> SmallWorld:
+    """A world without a camera."""
+    return SmallWorld()
+
+
 @pytest.fixture(params=[pytest.param("mujoco", marks=pytest.mark.gl), "analytic"])
 def make_camera(request: pytest.FixtureRequest) -> Iterator[Callable[..., tuple[SmallWorld, NearInfraredCamera]]]:
-    """make_camera(sun_W=None, seed=77, faults=(), overrides={}, **more of NearInfraredCamera) -> world, camera.
+    """make_camera(sun_W=None, seed=77, faults=(), overrides={}, hub=True, **more of NearInfraredCamera) -> world, camera.
 
     Once with each background. The drogue is 8 m ahead of the lens; the exposure is fixed.
     """
@@ -81,10 +87,13 @@ def make_camera(request: pytest.FixtureRequest) -> Iterator[Callable[..., tuple[
         seed: int = 77,
         faults: tuple[Fault, ...] = (),
         overrides: dict[str, dict[str, Any]] | None = None,
+        hub: bool = True,
         **more: Any,
     ) -> tuple[SmallWorld, NearInfraredCamera]:
         world = SmallWorld()
-        options = {"automatic_exposure": False, "background": request.param, "altitude_m": np.inf} | more
+        if not hub:  # LEDs alone
+            world.model.geom("basket_hub").rgba[3] = 0.0
+        options = {"automatic_exposure": False, "background": request.param, "altitude_m": 6000.0} | more
         camera = NearInfraredCamera(
             CameraSheets.load(overrides=overrides),
             world.as_built,

@@ -141,6 +141,17 @@ def test_stray_light_is_continuous_as_the_sun_leaves_the_picture(camera: Camera)
     assert np.abs(np.diff(falls)).max() < 0.1
 
 
+def test_beyond_a_distorted_field_the_suns_image_moves_on_as_a_pinholes() -> None:
+    """Told by the ghost that stands at a quarter of the Sun's distance from the centre, on the other side."""
+    glare = _glare(BENT, veiling_decay_rad=1.0)
+    places = [
+        glare.compact_ghosts(np.array([np.cos(a), -np.sin(a), 0.0]), 1.0, EXPOSURE_S).pixels[0]
+        for a in np.deg2rad([35.0, 45.0])
+    ]
+    way = 0.25 * BENT.focal_length_px * (np.tan(np.deg2rad(45.0)) - np.tan(np.deg2rad(35.0)))
+    assert places[0] - places[1] == pytest.approx([way, 0.0], abs=0.1)
+
+
 def test_outside_the_field_the_hood_cuts_it_to_1_over_e_in_its_angle() -> None:
     glare = _glare(**(ALONE | {"veiling_glare": 0.01, "iris_blades": 0}))
     edge = np.arctan((2047.0 - 1023.5) / STRAIGHT.focal_length_px)

@@ -255,9 +255,10 @@ def test_every_key_of_the_sheet_changes_what_its_name_says_and_nothing_else() ->
     n = 300
     swing = np.sin(0.3 * np.arange(n))[:, None]
     motion = (swing * [9.0, 0.1, -0.2], np.zeros((n, 3)), swing * [250.0, 1.0, 2.0])  # x beyond the ranges
-    usual = _imu(SHEET).record(n, *motion)
+    fine = replace(SHEET, gyro_quantum_rad_s=1e-10)
+    usual = _imu(fine).record(n, *motion)
     for f in fields(ImuParameters):
-        other = _imu(replace(SHEET, **{f.name: 0.9 * getattr(SHEET, f.name)})).record(n, *motion)
+        other = _imu(replace(fine, **{f.name: 0.9 * getattr(fine, f.name)})).record(n, *motion)
         changed = [not np.array_equal(a, b) for a, b in zip(usual, other, strict=True)]
         assert changed == [f.name.startswith(word) for word in ("time_stamp", "gyro", "accelerometer")], f.name
 

@@ -93,6 +93,27 @@ def test_far_out_a_spike_falls_as_the_inverse_square() -> None:
     assert near / far == pytest.approx(4.0, rel=1e-3)
 
 
+@pytest.mark.parametrize(
+    ("blades", "angle_rad", "fan"), [(6, 0.2, 0.0), (5, 0.7, 0.01), (4, np.pi / 4, 0.1), (3, 0.0, 0.03)]
+)
+def test_every_node_has_the_sum_of_all_spikes_and_none_is_passed_over(
+    blades: int, angle_rad: float, fan: float
+) -> None:
+    """The kernel walks along each spike; here Eqs. (2) and (3) are taken at all nodes."""
+    iris = _iris(blades, angle_rad)
+    first, shape = nodes_around(Window(0, 1088, 0, 2048))
+    values = np.zeros(shape, dtype=np.float32)
+    Spikes(iris, 0.0125, SUN_PX, fan).add_to_grid(values, first, (703.3, 402.7), 1e9)
+    v, u = 8.0 * np.indices(shape) - np.array([402.7, 703.3])[:, None, None]
+    law = np.zeros(shape)
+    for x, y in iris.spikes:
+        s, t = np.maximum(u * x + v * y, 0.0), v * x - u * y
+        z = np.sqrt(7.0 * (SUN_PX**2 / 4.0 + (fan * s) ** 2))
+        across = 15.0 / 16.0 / z * np.maximum(1.0 - (t / z) ** 2, 0.0) ** 2
+        law += 0.0125e9 / len(iris.spikes) * s / SUN_PX**2 * (1.0 + (s / SUN_PX) ** 2) ** -1.5 * across
+    assert np.allclose(values, law, rtol=1e-5, atol=1e-7 * law.max())
+
+
 @pytest.mark.parametrize("blades", [4, 5, 6])
 def test_the_spikes_light_on_a_wide_plane_is_their_share(blades: int) -> None:
     iris, half = _iris(blades), 600

@@ -42,6 +42,26 @@ def test_a_smooth_function_comes_back_from_every_side(R: np.ndarray, step: float
     assert np.abs(out - _wanted(R, x, y)).max() < 4e-3
 
 
+@pytest.mark.parametrize("seed", range(8))
+def test_no_tile_that_a_picture_reads_is_left_out(seed: int) -> None:
+    """Pictures 5 tiles wide from a fresh table each; what is left out reads 0."""
+    x, y = _axes(60, 90, 6e-3)
+    for R in Rotation.random(8, random_state=seed).as_matrix():
+        out = np.empty((60, 90), dtype=np.float32)
+        DirectionTable(_smooth, 24).fill(out, R, x, y)
+        assert np.abs(out - _wanted(R, x, y)).max() < 1e-3
+
+
+def test_a_corner_of_the_square_that_only_slips_into_the_picture_is_there() -> None:
+    """Straight aft the square's four corners meet; one of them shows in a triangle at the lower edge."""
+    R = Rotation.from_euler("ZYX", (180, 0, 45), degrees=True).as_matrix()
+    step = 6e-3
+    x, y = (np.arange(90) - 45.5) * step, (np.arange(60) - 56.6) * step
+    out = np.empty((60, 90), dtype=np.float32)
+    DirectionTable(_smooth, 12).fill(out, R, x, y)
+    assert np.abs(out - _wanted(R, x, y)).max() < 2e-3
+
+
 def test_only_what_is_looked_at_is_computed() -> None:
     asked = []
 
