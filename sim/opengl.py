@@ -93,7 +93,7 @@ def available_backend(wanted: str = "auto") -> str:
         DockairError: not one of the three.
     """
     if wanted not in BACKENDS:
-        raise DockairError("camera.backend", expected="one of the backgrounds", got=wanted, exists=BACKENDS)
+        raise DockairError("camera.background", expected="one of the ways to draw it", got=wanted, exists=BACKENDS)
     if wanted != "auto":
         return wanted
     return "mujoco" if _trial().renderer else "analytic"

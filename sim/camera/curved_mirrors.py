@@ -73,9 +73,7 @@ def rim_spots(
 
 
 @njit(cache=True)
-def _write(
-    row: Array, p: Vector, n: Vector, t1: Vector, t2: Vector, c: Vector
-) -> None:
+def _write(row: Array, p: Vector, n: Vector, t1: Vector, t2: Vector, c: Vector) -> None:
     for k in range(3):
         row[k], row[3 + k], row[6 + k], row[9 + k], row[12 + k] = p[k], n[k], t1[k], t2[k], c[k]
     row[15], row[16], row[17], row[18] = -_EVERYWHERE, _EVERYWHERE, -_EVERYWHERE, _EVERYWHERE

@@ -21,7 +21,7 @@ import numpy as np
 from dockair.rotations import Array
 from dockair.sim.camera.curved_mirrors import ellipsoid_spots, rim_spots
 from dockair.sim.camera.lobes import ROW, SPOT, facet_rows, spot_rows
-from dockair.sim.camera.mirrors import METAL, Mirrors, finishes
+from dockair.sim.camera.mirrors import METAL, Mirrors, finishes, vector
 from dockair.sim.camera.occlusion import hidden, is_clear
 from dockair.sim.camera.round_mirrors import round_spots
 from dockair.sim.camera.sheets import LightParameters, SurfaceParameters
@@ -69,20 +69,11 @@ def find_glints(
     return Glints(p_W=rows[kept, :3], area_m2_sr=rows[kept, 6], size_m=rows[kept, 7])
 
 
-def torus_W(data: mujoco.MjData, mirrors: Mirrors) -> tuple[tuple[float, ...], tuple[float, ...], float, float]:
-    """The rim in W, as `rim_spots` takes it."""
-    rim = mirrors.rim
-    assert rim is not None
-    axis = data.xmat[rim.body, ::3]
-    centre = data.xpos[rim.body] + rim.centre_x_m * axis
-    return tuple(map(float, centre)), tuple(map(float, axis)), rim.radius_m, rim.tube_radius_m
-
-
 def _rows(
     data: mujoco.MjData, mirrors: Mirrors, p_WC: Array, s_W: Array, surfaces: SurfaceParameters, light: LightParameters
 ) -> Array:
     """(n, ROW) glints, hidden ones among them."""
-    eye, sun = tuple(map(float, p_WC)), s_W[None]
+    eye, sun = vector(p_WC), s_W[None]
     xpos, xmat = data.geom_xpos, data.geom_xmat
     finish, variance = finishes(surfaces), 0.25 * light.sun_angular_radius_rad**2
     limits = (
@@ -97,9 +88,8 @@ def _rows(
     n = round_spots(balls, tubes, xpos, xmat, sun, 0.0, wanted, eye, spots)
     n += ellipsoid_spots(balls, xpos, xmat, sun, 0.0, eye, spots[n:])
     if mirrors.rim is not None:
-        n += rim_spots(torus_W(data, mirrors), float(METAL), mirrors.rim.skin_m, sun, 0.0, eye, spots[n:])
+        n += rim_spots(mirrors.rim.torus_W(data), float(METAL), mirrors.rim.skin_m, sun, 0.0, eye, spots[n:])
     rows = np.empty((_MOST, ROW))
     count = spot_rows(spots[:n], sun, 0.0, variance, eye, finish, limits, rows, 0)
-    direction = tuple(map(float, s_W))
-    count = facet_rows(mirrors.facets, xpos, xmat, direction, variance, eye, finish, limits, rows, count)
+    count = facet_rows(mirrors.facets, xpos, xmat, vector(s_W), variance, eye, finish, limits, rows, count)
     return rows[:count]

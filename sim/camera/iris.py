@@ -132,8 +132,8 @@ def _add(
             middle = near * (x / y if steep else y / x) + (centre[0] if steep else centre[1])
             reach = half / abs(major)
             origin = first[1] if steep else first[0]
-            low = max(int(math.floor((middle - reach) / spacing)) - origin, 0)
-            high = min(int(math.ceil((middle + reach) / spacing)) - origin + 1, n if steep else m)
+            low = max(int(math.ceil((middle - reach) / spacing)) - origin, 0)
+            high = min(int(math.floor((middle + reach) / spacing)) - origin + 1, n if steep else m)
             for other in range(low, high):
                 i, j = (k, other) if steep else (other, k)
                 du, dv = spacing * (first[1] + j) - centre[0], spacing * (first[0] + i) - centre[1]

@@ -23,9 +23,8 @@ from numpy.typing import NDArray
 
 from dockair.rotations import Array
 from dockair.sim.camera.curved_mirrors import ellipsoid_spots, rim_spots
-from dockair.sim.camera.glints import torus_W
 from dockair.sim.camera.lobes import ROW, SPOT, spot_rows
-from dockair.sim.camera.mirrors import METAL, Mirrors, finishes
+from dockair.sim.camera.mirrors import METAL, Mirrors, finishes, vector
 from dockair.sim.camera.occlusion import hidden, is_clear
 from dockair.sim.camera.round_mirrors import round_spots
 from dockair.sim.camera.sheets import SurfaceParameters
@@ -102,7 +101,7 @@ def _bound(
     sin_c = np.sqrt(np.maximum(1.0 - cos_c**2, _CLOSEST_M**2))
     side = surfaces.led_side_light
     on_ball = np.where(ball @ axis_W + radius > 0.0, 1.0, side) * share[balls.material] * radius**2 / (4.0 * d_ball**2)
-    reach = tubes.half_length + tubes.radius
+    reach = tubes.half_length * np.abs(z_t @ axis_W) + tubes.radius
     on_tube = np.where(tube @ axis_W + reach > 0.0, 1.0, side) * share[tubes.material] * tubes.radius
     return np.hstack([on_ball, on_tube / (2.0 * sin_c * d_tube)])
 
@@ -122,13 +121,13 @@ def _rows(
     surfaces: SurfaceParameters,
 ) -> Array:
     """(n, ROW) reflections, faint and hidden ones among them."""
-    eye, balls, tubes = tuple(map(float, p_WC)), mirrors.near_balls, mirrors.near_tubes
+    eye, balls, tubes = vector(p_WC), mirrors.near_balls, mirrors.near_tubes
     xpos, xmat = data.geom_xpos, data.geom_xmat
     spots = np.empty((wanted.size + 2 * len(leds_W), SPOT))
     n = round_spots(balls, tubes, xpos, xmat, leds_W, 1.0, wanted, eye, spots)
     n += ellipsoid_spots(balls, xpos, xmat, leds_W, 1.0, eye, spots[n:])
     if mirrors.rim is not None:
-        n += rim_spots(torus_W(data, mirrors), float(METAL), mirrors.rim.skin_m, leds_W, 1.0, eye, spots[n:])
+        n += rim_spots(mirrors.rim.torus_W(data), float(METAL), mirrors.rim.skin_m, leds_W, 1.0, eye, spots[n:])
     limits = (math.cos(surfaces.grazing_rad), 0.0, 0.0, math.inf)
     rows = np.empty((n, ROW))
     return rows[: spot_rows(spots[:n], leds_W, 1.0, 0.0, eye, finishes(surfaces), limits, rows, 0)]

@@ -225,9 +225,7 @@ def _strip(low: float, high: float, mean: float, sd: float) -> tuple[float, floa
 
 
 @njit(cache=True)
-def _lobe(
-    spot: Spot, box: Box, light: Light, eye: Vector, finish: Array, cos_grazing: float
-) -> Lobe:
+def _lobe(spot: Spot, box: Box, light: Light, eye: Vector, finish: Array, cos_grazing: float) -> Lobe:
     """Eqs. (2) to (4).
 
     The radiance is the patch's middle's, over a white Lambertian surface's in normal sunlight.

@@ -36,6 +36,9 @@ _THINNEST_M = 0.02  # faces narrower than this are edges
 _SKIN_M = 1e-3  # a ray that starts on a surface starts this far off it
 
 _G = mujoco.mjtGeom
+Vector = tuple[float, float, float]
+#: A tile's frame, half sides and curvature, as in `Facets`.
+Tile = tuple[Array, tuple[float, float], Vector]
 
 
 class Balls(NamedTuple):
@@ -77,6 +80,12 @@ class Rim:
     tube_radius_m: float
     skin_m: float  #: how far the straight pieces that are drawn stick out of the torus, and a ray's skin
 
+    def torus_W(self, data: mujoco.MjData) -> tuple[Vector, Vector, float, float]:
+        """Centre, axis and the two radii in W, as `curved_mirrors` takes them."""
+        axis = data.xmat[self.body, ::3]
+        centre = data.xpos[self.body] + self.centre_x_m * axis
+        return vector(centre), vector(axis), self.radius_m, self.tube_radius_m
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Mirrors:
@@ -94,7 +103,6 @@ class Mirrors:
         """Collect what is drawn."""
         rim = rim_of(model)
         balls, tubes, facets = [], [], []
-        near: list[bool] = []
         for i in range(model.ngeom):
             name = model.geom(i).name
             drawn = VISIBLE_GROUPS[model.geom_group[i]] and model.geom_rgba[i, 3] > 0.0
@@ -135,6 +143,11 @@ def finishes(surfaces: SurfaceParameters) -> Array:
     )
 
 
+def vector(a: Array) -> Vector:
+    """Three numbers as the kernels take them."""
+    return float(a[0]), float(a[1]), float(a[2])
+
+
 def rim_of(model: mujoco.MjModel) -> Rim | None:
     """Return the torus through the capsules that draw the rim; None where the scene has none."""
     pieces = [i for i in range(model.ngeom) if model.geom(i).name.startswith(RIM_GEOMS)]
@@ -170,7 +183,7 @@ def _tubes(model: mujoco.MjModel, i: int) -> list[tuple[float, float]]:
     return []
 
 
-def _facets(model: mujoco.MjModel, i: int) -> list[tuple[Array, tuple[float, float], tuple[float, float, float]]]:
+def _facets(model: mujoco.MjModel, i: int) -> list[Tile]:
     """Frame, half sides and curvature of each tile of geom i."""
     kind, size = model.geom_type[i], np.array(model.geom_size[i])
     if kind == _G.mjGEOM_BOX:
@@ -188,7 +201,7 @@ def _is_flat(axes: Array) -> bool:
     return bool(axes.max() > _FLAT_RATIO * axes.min())
 
 
-def _face(half: Array, axis: int, side: float) -> list[tuple[Array, tuple[float, float], tuple[float, float, float]]]:
+def _face(half: Array, axis: int, side: float) -> list[Tile]:
     """The face of a box across one axis, in tiles."""
     one, two = (axis + 1) % 3, (axis + 2) % 3
     if min(half[one], half[two]) < 0.5 * _THINNEST_M:
@@ -197,7 +210,7 @@ def _face(half: Array, axis: int, side: float) -> list[tuple[Array, tuple[float,
     sides = half[one] / counts[0], half[two] / counts[1]
     frame = np.zeros((4, 3))
     frame[0, axis], frame[1, axis], frame[2, one], frame[3, two] = side * half[axis], side, 1.0, 1.0
-    tiles = []
+    tiles: list[Tile] = []
     for j in range(counts[0]):
         for k in range(counts[1]):
             placed = frame.copy()
@@ -206,12 +219,12 @@ def _face(half: Array, axis: int, side: float) -> list[tuple[Array, tuple[float,
     return tiles
 
 
-def _ellipsoid_tiles(axes: Array) -> list[tuple[Array, tuple[float, float], tuple[float, float, float]]]:
+def _ellipsoid_tiles(axes: Array) -> list[Tile]:
     """An ellipsoid cut along its longest axis, and around it."""
     order = np.argsort(-axes)
     longest, across, thin = (np.eye(3)[k] * axes[k] for k in order)
     step_b, step_a = np.pi / _TILES_ALONG, 2.0 * np.pi / _TILES_AROUND
-    tiles = []
+    tiles: list[Tile] = []
     for b in (np.arange(_TILES_ALONG) + 0.5) * step_b - 0.5 * np.pi:
         for a in (np.arange(_TILES_AROUND) + 0.5) * step_a:
             around = np.cos(a) * thin + np.sin(a) * across
@@ -239,9 +252,7 @@ def _tube_table(rows: list[tuple[int, int, float, float]]) -> Tubes:
     return Tubes(_index(geom), _index(material), _real(radius), _real(half_length))
 
 
-def _facet_table(
-    rows: list[tuple[int, int, Array, tuple[float, float], tuple[float, float, float]]],
-) -> Facets:
+def _facet_table(rows: list[tuple[int, int, Array, tuple[float, float], Vector]]) -> Facets:
     geom, material, frame, half, curvature = zip(*rows, strict=True) if rows else ((),) * 5
     return Facets(
         _index(geom),

@@ -57,16 +57,13 @@ def test_the_diffracted_lobe_is_as_wide_as_the_airy_pattern() -> None:
 
 @pytest.mark.parametrize("depth", [0.05, 0.5, 2.0, 6.0])
 def test_the_aureole_has_the_energy_that_diffraction_took_from_the_beam(depth: float) -> None:
-    """Int L dOmega/pi = exp(-tau/2) - exp(-tau), less than 3 % of it beyond 90 degrees; spread by every scattering.
-
-    The mean cosine after m scatterings is that of one to the power m (counted within 90 degrees: 0.01 more).
-    """
-    _, cosine, solid = _downward(1.0)
-    tau = np.full(len(cosine), depth)
-    light = WATER.aureole(tau, np.ones(len(cosine)), cosine) * solid / math.pi
-    assert light.sum() == pytest.approx(math.exp(-0.5 * depth) - math.exp(-depth), rel=0.03)
+    """Int L dOmega/pi over the sphere is exp(-tau/2) - exp(-tau); the mean cosine after m scatterings is g_d^m."""
+    near = 0.5 * (NODE + 1.0)
+    cosine, solid = np.cos(math.pi * near**3), 3.0 * math.pi**2 * near**2 * np.sin(math.pi * near**3) * WEIGHT
+    light = WATER.aureole(np.full(400, depth), np.ones(400), cosine) * solid / math.pi
     orders = 0.5 * depth / (1.0 - math.exp(-0.5 * depth))
-    assert light @ cosine / light.sum() == pytest.approx(WATER.lobes[0] ** orders, abs=0.011)
+    assert light.sum() == pytest.approx(math.exp(-0.5 * depth) - math.exp(-depth), rel=1e-4)
+    assert light @ cosine / light.sum() == pytest.approx(WATER.lobes[0] ** orders, rel=1e-6)
 
 
 @pytest.mark.parametrize("mu_0", [1.0, 0.87, 0.5, 0.17])

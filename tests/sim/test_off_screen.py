@@ -3,11 +3,12 @@
 import sys
 
 import mujoco
+import numpy as np
 import pytest
 
 from dockair.errors import MachineError
 from dockair.sim import off_screen
-from dockair.sim.off_screen import gl_context, open_renderer
+from dockair.sim.off_screen import Canvas, gl_context, open_renderer
 
 MODEL = mujoco.MjModel.from_xml_string("<mujoco><visual><quality offsamples='4'/></visual></mujoco>")
 FONT = 50
@@ -59,3 +60,32 @@ def test_the_renderer_has_no_multisampling_and_the_model_keeps_its_own() -> None
     finally:
         renderer.free()
         context.free()
+
+
+@pytest.mark.gl
+def test_a_canvas_reads_colours_and_depths_from_the_bottom_row_up() -> None:
+    """A ball in the lower half of the view, 4 m away; depth is 0 at the near plane, 1 at the far one."""
+    model = mujoco.MjModel.from_xml_string(
+        "<mujoco><worldbody><geom size='0.2' pos='4 0 -0.8' rgba='1 1 1 1'/></worldbody></mujoco>"
+    )
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    view = mujoco.MjvCamera()
+    view.azimuth, view.elevation, view.distance, view.lookat[:] = 0.0, 0.0, 4.0, (4.0, 0.0, 0.0)
+    scene = mujoco.MjvScene(model, 10)
+    everything = mujoco.mjtCatBit.mjCAT_ALL.value
+    mujoco.mjv_updateScene(model, data, mujoco.MjvOption(), None, view, everything, scene)
+    scene.flags[mujoco.mjtRndFlag.mjRND_SKYBOX] = 0
+    colours, depths = np.empty((60, 80, 3), dtype=np.uint8), np.empty((60, 80), dtype=np.float32)
+    canvas = Canvas(model, 100, 90, "camera")
+    canvas.render(scene, colours, depths)
+    canvas.close()
+    canvas.close()  # twice is once
+    shown = colours[..., 0] > 30
+    rows, columns = np.nonzero(shown)
+    assert rows.size > 10 and rows.max() < 30
+    assert columns.mean() == pytest.approx(39.5, abs=1.0)
+    near, far = scene.camera[0].frustum_near, scene.camera[0].frustum_far
+    metres = near * far / (far - depths * (far - near))
+    assert metres[shown].min() == pytest.approx(3.8, abs=0.02)
+    assert np.all(depths[~shown & (np.roll(shown, 1, axis=0) == 0)] > 0.999)

@@ -254,7 +254,7 @@ def test_a_smear_widens_a_blob_by_the_variance_of_its_line(smear: tuple[float, f
 
 
 @pytest.mark.parametrize(
-    "f_number,smear", [(8.0, (0.3, 0.4)), (8.0, (6.0, -2.5)), (2.8, (2.0, 1.0)), (2.8, (0.1, 0.0))]
+    "f_number,smear", [(8.0, (0.3, 0.4)), (8.0, (6.0, -2.5)), (8.0, (14.0, 0.0)), (2.8, (2.0, 1.0)), (2.8, (0.1, 0.0))]
 )
 def test_a_smeared_blob_is_the_mean_of_the_blob_along_its_way(f_number: float, smear: tuple[float, float]) -> None:
     spread = _spread(f_number)

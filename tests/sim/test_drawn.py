@@ -1,0 +1,155 @@
+"""Solids by OpenGL: its meshes, its outlines and shades against the same solids by rays, what it leaves out."""
+
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+
+from dockair.errors import MachineError
+from dockair.rotations import exp
+from dockair.sim import off_screen
+from dockair.sim.camera.drawn import DrawnSolids
+from dockair.sim.camera.solids import Haze, Lighting
+from dockair.sim.camera.traced import TracedSolids
+from dockair.sim.camera.unit_meshes import BALLS, CUBE, ENDS, SLICES, TUBES, unit_meshes
+
+AT_ORIGIN = (np.eye(3), np.zeros(3))
+BLOCKS_PER_TANGENT = 500.0
+X, Y = np.arange(-200, 201) / BLOCKS_PER_TANGENT, np.arange(-120, 121) / BLOCKS_PER_TANGENT
+SKY = -1.0
+GEOM = mujoco.mjtGeom
+SUNLIT = Lighting(toward_W=np.array([-0.6, 0.48, 0.64]), ambient=0.25, direct=0.75)
+
+
+def _scene(*geoms: dict[str, Any]) -> tuple[mujoco.MjModel, mujoco.MjData]:
+    """Clipped at 0.1 m and 2 km."""
+    spec = mujoco.MjSpec()
+    spec.stat.extent, spec.visual.map.znear, spec.visual.map.zfar = 20.0, 0.005, 100.0
+    for geom in geoms:
+        spec.worldbody.add_geom(**({"rgba": [0.8, 0.8, 0.8, 1.0]} | geom))
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    return model, data
+
+
+def _both(model: mujoco.MjModel, data: mujoco.MjData, haze: Haze | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """Drawn and traced."""
+    pictures = []
+    drawn = DrawnSolids(model, SUNLIT, BLOCKS_PER_TANGENT, (len(Y), len(X)))
+    for way in (drawn, TracedSolids(model, SUNLIT)):
+        pictures.append(np.full((len(Y), len(X)), SKY, dtype=np.float32))
+        way.draw(pictures[-1], data, AT_ORIGIN, X, Y, haze or Haze())
+        way.close()
+    return pictures[0], pictures[1]
+
+
+def _volume(model: mujoco.MjModel, mesh: int) -> float:
+    first, count = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
+    face, faces = model.mesh_faceadr[mesh], model.mesh_facenum[mesh]
+    corners = model.mesh_vert[first : first + count][model.mesh_face[face : face + faces]].astype(float)
+    return float(np.einsum("fi,fi->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6.0)
+
+
+@pytest.mark.parametrize("level", range(len(SLICES)))
+def test_meshes_enclose_the_volume_of_their_bodies_and_face_outward(level: int) -> None:
+    """Signed volume of the closed ones; a polygon's mean radius being right, it falls short by (pi/n)^2/6 or so."""
+    model = unit_meshes()
+    small = (np.pi / SLICES[level]) ** 2
+    assert _volume(model, TUBES + level) == pytest.approx(2.0 * np.pi, rel=small)
+    assert _volume(model, BALLS + level) == pytest.approx(4.0 / 3.0 * np.pi, rel=2.0 * small)
+    assert _volume(model, ENDS + level) == pytest.approx(2.0 / 3.0 * np.pi, rel=2.0 * small)
+    assert _volume(model, CUBE) == pytest.approx(8.0, rel=1e-6)
+
+
+@pytest.mark.gl
+@pytest.mark.parametrize("radius_blocks", [1.9, 3.0, 20.0, 40.0, 100.0])
+@pytest.mark.parametrize("kind", [GEOM.mjGEOM_SPHERE, GEOM.mjGEOM_CAPSULE, GEOM.mjGEOM_CYLINDER])
+def test_outlines_are_off_by_a_third_of_a_block_at_most_in_the_mean(kind: mujoco.mjtGeom, radius_blocks: float) -> None:
+    """Blocks that only one of the two ways shows, over the outline's length; a quarter from the polygon's corners."""
+    radius = 10.0 * radius_blocks / BLOCKS_PER_TANGENT
+    model, data = _scene(
+        {"type": kind, "pos": [10.0, 0.13, 0.07], "size": [radius, radius, 0.0], "quat": [0.9, 0.3, 0.1, 0.2]}
+    )
+    drawn, traced = _both(model, data)
+    outline = 2.0 * np.pi * radius_blocks + (4.0 * radius_blocks if kind != GEOM.mjGEOM_SPHERE else 0.0)
+    assert (traced != SKY).sum() > 5
+    assert ((drawn != SKY) != (traced != SKY)).sum() < outline / 3.0 + 2.0
+
+
+@pytest.mark.gl
+@pytest.mark.parametrize(
+    ("kind", "size", "most"),
+    [
+        (GEOM.mjGEOM_SPHERE, [1.2, 0.0, 0.0], 0.97),
+        (GEOM.mjGEOM_ELLIPSOID, [1.5, 0.4, 0.9], 0.9),
+        (GEOM.mjGEOM_CAPSULE, [0.7, 0.9, 0.0], 0.97),
+        (GEOM.mjGEOM_CYLINDER, [0.7, 0.9, 0.0], 0.97),
+        (GEOM.mjGEOM_BOX, [0.7, 0.3, 1.1], 1.0),
+    ],
+)
+@pytest.mark.parametrize("turn", [(0.0, 0.0, 0.0), (0.5, -0.9, 0.4), (2.0, 1.0, -2.0)])
+def test_most_shades_are_within_two_grey_levels_of_the_closed_form(
+    kind: mujoco.mjtGeom, size: list[float], most: float, turn: tuple[float, float, float]
+) -> None:
+    """Share of the blocks inside the outline; OpenGL shades corners and interpolates, and has 256 levels.
+
+    The rest lie where the Sun's light ends, and on the ridge of a flat ellipsoid.
+    """
+    quat = np.zeros(4)
+    mujoco.mju_mat2Quat(quat, exp(np.array(turn)).ravel())
+    drawn, traced = _both(*_scene({"type": kind, "pos": [8.0, 0.2, -0.1], "size": size, "quat": quat}))
+    inside = (drawn != SKY) & (traced != SKY)
+    assert inside.sum() > 2000
+    error = 255.0 * np.abs(drawn - traced)[inside]
+    assert (error < 2.0).mean() >= most
+    assert error.mean() < 1.0
+
+
+@pytest.mark.gl
+def test_ranges_for_the_haze_come_from_the_depth_buffer() -> None:
+    """Black balls at 2, 20 and 200 m in bright haze: what is seen is haze, 1 - exp(-b r)."""
+    geoms = [
+        {"type": GEOM.mjGEOM_SPHERE, "pos": [d, side * d, 0.1 * d], "size": [0.05 * d, 0, 0], "rgba": [0, 0, 0, 1]}
+        for d, side in ((2.0, 0.2), (20.0, 0.0), (200.0, -0.2))
+    ]
+    drawn, traced = _both(*_scene(*geoms), Haze(extinction_1_m=0.02, airlight=1.0))
+    inside = (drawn != SKY) & (traced != SKY)
+    assert np.abs(drawn - traced)[inside].max() < 2e-3
+    assert np.ptp(traced[inside]) > 0.9
+
+
+@pytest.mark.gl
+def test_what_stands_outside_the_frustum_is_left_out_and_what_reaches_in_is_not() -> None:
+    """Two hundred balls in the picture, beside it and behind the lens, against all of them by rays."""
+    rng = np.random.default_rng(2)
+    places = np.array([1.0, 1.2, 1.2]) * rng.uniform([-10.0, -5.0, -3.0], [12.0, 5.0, 3.0], (200, 3))
+    model, data = _scene(*({"type": GEOM.mjGEOM_SPHERE, "pos": p, "size": [0.2, 0.0, 0.0]} for p in places))
+    drawn = DrawnSolids(model, SUNLIT, BLOCKS_PER_TANGENT, (len(Y), len(X)))
+    out = np.full((len(Y), len(X)), SKY, dtype=np.float32)
+    drawn.draw(out, data, AT_ORIGIN, X, Y, Haze())
+    traced = np.full_like(out, SKY)
+    TracedSolids(model, SUNLIT).draw(traced, data, AT_ORIGIN, X, Y, Haze())
+    count = drawn._scene.ngeom
+    drawn.close()
+    assert ((out != SKY) != (traced != SKY)).mean() < 0.005
+    assert 10 < count < 60
+
+
+@pytest.mark.gl
+def test_a_solid_the_lens_stands_in_is_not_seen() -> None:
+    drawn, _ = _both(*_scene({"type": GEOM.mjGEOM_ELLIPSOID, "pos": [1.0, 0.0, 0.0], "size": [4.0, 2.0, 2.0]}))
+    assert np.all(drawn == SKY)
+
+
+def test_a_machine_without_opengl_is_told_when_the_first_picture_is_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    def no_context(width: int, height: int) -> None:
+        raise ImportError("libEGL.so.1: cannot open shared object file")
+
+    model, data = _scene({"type": GEOM.mjGEOM_SPHERE, "pos": [5.0, 0.0, 0.0], "size": [0.3, 0.0, 0.0]})
+    drawn = DrawnSolids(model, SUNLIT, BLOCKS_PER_TANGENT, (len(Y), len(X)))
+    monkeypatch.setattr(off_screen, "gl_context", no_context)
+    with pytest.raises(MachineError, match="libegl1"):
+        drawn.draw(np.zeros((len(Y), len(X)), dtype=np.float32), data, AT_ORIGIN, X, Y, Haze())
+    drawn.close()
