@@ -134,6 +134,7 @@ def reproduce(
     """Reproduce a published figure or table: ours beside the source's, and a picture."""
     from dockair.scenarios.output import show_reproduction, show_reproductions, show_working
     from dockair.scenarios.reproduce import registry
+    from dockair.scenarios.reproduce.reference import picture_name
 
     if wanted is None:
         if as_json:
@@ -147,7 +148,7 @@ def reproduce(
     if as_json:
         _print_json(table)
     else:
-        show_reproduction(table, folder)
+        show_reproduction(table, folder / picture_name(wanted))
 
 
 class BenchSubject(Enum):

@@ -176,7 +176,7 @@ def show_reproductions(titles: Mapping[str, str]) -> None:
     Console(highlight=False).print(table)
 
 
-def show_reproduction(reproduction: Mapping[str, Any], folder: Path) -> None:
+def show_reproduction(reproduction: Mapping[str, Any], picture: Path) -> None:
     """Print ours beside the reference's, one line a figure, and where the picture is."""
     console = Console(highlight=False)
     console.print(f"[bold]{reproduction['id']}[/]  {reproduction['source']}", soft_wrap=True)
@@ -187,8 +187,7 @@ def show_reproduction(reproduction: Mapping[str, Any], folder: Path) -> None:
         for figure, ours in row["ours"].items():
             table.add_row(row["case"], figure, _figure(ours), _figure(row["reference"].get(figure)))
     console.print(table)
-    for path in reproduction.get("pictures", ()):
-        console.print(f"  {folder / path}", soft_wrap=True)
+    console.print(f"  {picture}", soft_wrap=True)
 
 
 def _figure(value: Any) -> str:

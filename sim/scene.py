@@ -85,6 +85,7 @@ def _set_options(spec: Any, step_s: float) -> None:
 
 
 def _add_sky_and_sun(spec: Any, sun_direction_W: Array) -> None:
+    """Add the Sun, whose direction the camera takes from here; strengths, sky and colours are for people's pictures."""
     headlight = spec.visual.headlight
     headlight.active, headlight.ambient[:], headlight.diffuse[:], headlight.specular[:] = 0, 0.0, 0.0, 0.0
     sun = np.asarray(sun_direction_W, dtype=float)

@@ -18,12 +18,12 @@ from dockair.messages import CameraFrame
 from dockair.nav.image.detect import detect
 from dockair.rotations import Array
 from dockair.scenarios.build import Parts, build
+from dockair.scenarios.reproduce.reference import picture_name
 from dockair.scenarios.schema import load_scenario
 from dockair.sim.camera.camera import NearInfraredCamera
 
 ID = "sensor/contact-sheet"
 TITLE = "sixteen frames: Sun, clouds, glints, night, haze, ranges, faults"
-PICTURE = "sensor-contact-sheet.png"
 _SETTLING_FRAMES = 8
 _FOUND_WITHIN_PX = 2.0
 _REDUCTION = 4
@@ -52,7 +52,7 @@ SHOTS = (
     Shot(title="Sun abeam", settings=_sun(90.0, 30.0)),
     Shot(
         title="glints: Sun high behind, bare metal",
-        settings=_sun(150.0, 60.0) | {"parameters.surfaces.metal_specular": 0.6},
+        settings=_sun(150.0, 60.0) | {"parameters.surfaces.metal_share": 0.6},
     ),
     Shot(title="Sun in view", range_m=10.0, settings=_AHEAD),
     Shot(title="Sun in view, 20 nm band-pass", range_m=10.0, settings=_AHEAD | {"camera.filter": "band_pass"}),
@@ -85,9 +85,11 @@ def reproduce(out: Path | None) -> dict[str, Any]:
         for shot, (_, _, figures) in zip(SHOTS, taken, strict=True)
     ]
     if out is not None:
-        _draw([(shot.title, frame, leds) for shot, (frame, leds, _) in zip(SHOTS, taken, strict=True)], out / PICTURE)
-    pictures = [] if out is None else [PICTURE]
-    return {"id": ID, "source": TITLE, "rows": rows, "pictures": pictures}
+        _draw(
+            [(shot.title, frame, leds) for shot, (frame, leds, _) in zip(SHOTS, taken, strict=True)],
+            out / picture_name(ID),
+        )
+    return {"id": ID, "source": TITLE, "rows": rows}
 
 
 def _take(shot: Shot) -> tuple[CameraFrame, Array, dict[str, float]]:

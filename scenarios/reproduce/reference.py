@@ -1,7 +1,12 @@
-"""Published tables and curves: `assets/reference/<name>.csv`, comment lines first, then a header."""
+"""Names of pictures; published tables and curves: `assets/reference/<name>.csv`, comments first, then a header."""
 
 import csv
 from importlib.resources import files
+
+
+def picture_name(wanted: str) -> str:
+    """Return the file name of a reproduction's picture: `sensor/band` is drawn in `sensor-band.png`."""
+    return wanted.replace("/", "-") + ".png"
 
 
 def read_reference(name: str) -> list[dict[str, str]]:

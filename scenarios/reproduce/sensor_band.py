@@ -15,7 +15,7 @@ import numpy as np
 from dockair.calibration import Camera
 from dockair.parameters import load_parameters, read_sheet
 from dockair.rotations import Array
-from dockair.scenarios.reproduce.reference import read_reference
+from dockair.scenarios.reproduce.reference import picture_name, read_reference
 from dockair.sim.camera.radiometry import (
     detection,
     filter_transmittance,
@@ -41,7 +41,7 @@ _Row = dict[str, Any]
 
 
 def reproduce(out: Path | None) -> dict[str, Any]:
-    """Compare spectrum, band and default sheets with what is printed; `sensor_band.png` in `out`."""
+    """Compare spectrum, band and default sheets with what is printed; its picture in `out`."""
     printed = {(row["table"], row["quantity"]): float(row["value"]) for row in read_reference("yoon_2018_tables")}
     tables = [
         ("4", "table 4, sensor", _sensor()),
@@ -51,8 +51,8 @@ def reproduce(out: Path | None) -> dict[str, Any]:
     ]
     rows = [*_sunlight(), *(_row(case, ours, printed, table) for table, case, ours in tables)]
     if out is not None:
-        _draw(out / "sensor_band.png")
-    return {"id": ID, "source": _SOURCE, "rows": rows, "pictures": [] if out is None else ["sensor_band.png"]}
+        _draw(out / picture_name(ID))
+    return {"id": ID, "source": _SOURCE, "rows": rows}
 
 
 def _row(case: str, ours: dict[str, float], printed: dict[tuple[str, str], float], table: str) -> _Row:

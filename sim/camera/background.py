@@ -13,6 +13,7 @@ Not modelled: blur of the background by the lens (a block is wider than the poin
 the parts.
 """
 
+import math
 from typing import Protocol
 
 import mujoco
@@ -68,6 +69,7 @@ class Background:
         backend: str = "auto",
     ) -> None:
         self._sky, self._blocks = sky, Blocks(camera, parameters.reduction)
+        self._memory = np.empty(math.prod(self._blocks.drawn.shape), dtype=np.float32)  # new memory costs more than sky
         light = Lighting.of(model, sky)
         self._solids: DrawnSolids | TracedSolids
         if available_backend(backend) == "mujoco":
@@ -111,7 +113,7 @@ class Background:
         extent = blocks.around(window)
         drawn = blocks.drawn_for(extent)
         x, y = blocks.tangents(drawn)
-        picture = np.empty(drawn.shape, dtype=np.float32)
+        picture = self._memory[: math.prod(drawn.shape)].reshape(drawn.shape)
         self._sky.fill(picture, pose[0], x, y)
         self._solids.draw(picture, data, pose, x, y, haze)
         picture = blocks.to_sensor(picture, drawn, extent)

@@ -95,6 +95,8 @@ class Blocks:
         """Blocks of the pinhole's picture that blocks of the sensor are taken from."""
         if self._places is None:
             return extent
+        if extent == self.whole and self.drawn != self.whole:
+            return self.drawn
         rows, columns = (self._part(place, extent) for place in self._places)
         return Extent(
             int(np.floor(rows.min())),
@@ -128,7 +130,7 @@ class Blocks:
         """Return (rows, columns) expected electrons of the window, Eq. (1).
 
         Args:
-            picture: radiances of the sensor's blocks.
+            picture: radiances of the sensor's blocks; changed.
             extent: which those are.
             window: what is wanted.
             white_e: electrons of radiance 1 on the axis.
@@ -136,7 +138,7 @@ class Blocks:
             dirt: factor; None for 1.
         """
         k = self._k
-        picture = picture * self._part(self._fall_off, extent)
+        picture *= self._part(self._fall_off, extent)
         picture *= np.float32(white_e)
         rows = _line(window.row_start, window.row_stop, 2 * k, 1 - k, extent.row_start)
         columns = _line(window.column_start, window.column_stop, 2 * k, 1 - k, extent.column_start)

@@ -249,7 +249,8 @@ class NearInfraredCamera:
             self._glare.add_fine(image, start, sun_C, visible, exposure_s, veil)
             patch = self._sun.patch(data, pose)
             if patch is not None:
-                self._glare.add_disc(image, start, sun_C, *patch, exposure_s, self._spread.edge_sigma_px())
+                seen, first = patch if dirt is None else (patch[0] * dirt.over(patch[0].shape, patch[1]), patch[1])
+                self._glare.add_disc(image, start, sun_C, seen, first, exposure_s, self._spread.edge_sigma_px())
         factors = self._faults.led_factors(time_s, exposure_s)
         for sources in self._sources.of(data, pose, exposure_s, factors):
             self._add(image, start, sources, dirt)

@@ -55,6 +55,12 @@ class Dirt:
         """(n,) transmittance at pixels (n, 2) (u, v)."""
         return self.grid.at(pixels)
 
+    def over(self, shape: tuple[int, int], first: tuple[int, int]) -> Array:
+        """(rows, columns) transmittance of a patch of pixels whose first one is at (row, column) on the sensor."""
+        rows, columns = np.indices(shape)
+        pixels = np.column_stack([columns.ravel() + first[1], rows.ravel() + first[0]])
+        return self.at(pixels).reshape(shape)
+
 
 def _field(parameters: GlareParameters, focal_px: float, rng: np.random.Generator, shape: tuple[int, int]) -> Array:
     """(m, n) field g of Eq. (1)."""

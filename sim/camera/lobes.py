@@ -124,7 +124,12 @@ def facet_rows(
         half = facets.half[i]
         spot = (p, n, _turned(xmat[g], frame[2]), _turned(xmat[g], frame[3]), _vector(facets.curvature[i], 0))
         box = (-half[0], half[0], -half[1], half[1])
-        lobe = _lobe(spot, box, light, eye, finishes[facets.material[i]], limits[0])
+        finish = finishes[facets.material[i]]
+        lobe = _lobe(spot, box, light, eye, finish, limits[0])
+        if lobe[0] == 0.0:
+            continue
+        spot, box = _nearer(spot, box, light, eye)  # where it is bright, Eq. (2)'s linear map is better
+        lobe = _lobe(spot, box, light, eye, finish, limits[0])
         if lobe[0] > 0.0 and lobe[0] >= limits[1] and lobe[1] >= limits[2] and count < len(rows):
             _write(rows[count], spot, lobe, _SKIN_M, 0)
             count += 1
@@ -142,6 +147,22 @@ def _write(row: Array, spot: Spot, lobe: Lobe, skin: float, j: int) -> None:
     for k in range(3):
         row[k], row[3 + k] = middle[k], normal[k]
     row[6], row[7], row[8], row[9] = area, math.sqrt(6.0 * (var1 + var2)), skin, j
+
+
+@njit(cache=True)
+def _nearer(spot: Spot, box: Box, light: Light, eye: Vector) -> tuple[Spot, Box]:
+    """Move to the mirror point, or to the box's edge on the way there."""
+    p, n, t1, t2, c = spot
+    m1, m2, b11, b12, b22 = _slopes(spot, light, eye)
+    det = b11 * b22 - b12 * b12
+    x1 = min(max((b22 * m1 - b12 * m2) / det, box[0]), box[1])
+    x2 = min(max((b11 * m2 - b12 * m1) / det, box[2]), box[3])
+    c1, c2 = c[0] * x1 + c[1] * x2, c[1] * x1 + c[2] * x2
+    p = _add(_add(_add(p, x1, t1), x2, t2), -0.5 * (c1 * x1 + c2 * x2), n)
+    n, _ = _unit(_add(_add(n, c1, t1), c2, t2))
+    t1, _ = _unit(_add(t1, -_dot(t1, n), n))
+    t2, _ = _unit(_add(_add(t2, -_dot(t2, n), n), -_dot(t2, t1), t1))
+    return (p, n, t1, t2, c), (box[0] - x1, box[1] - x1, box[2] - x2, box[3] - x2)
 
 
 @njit(cache=True)
@@ -230,20 +251,15 @@ def _lobe(spot: Spot, box: Box, light: Light, eye: Vector, finish: Array, cos_gr
 
     The radiance is the patch's middle's, over a white Lambertian surface's in normal sunlight.
     """
-    p, n, t1, t2, c = spot
-    s, d1 = _unit(_add(light[0], -light[1], p))
-    v, d = _unit(_add(eye, -1.0, p))
+    p, n, t1, t2, _ = spot
+    s, _ = _unit(_add(light[0], -light[1], p))
+    v, _ = _unit(_add(eye, -1.0, p))
     h, twice = _unit(_add(s, 1.0, v))
     hn, vn = _dot(h, n), _dot(v, n)
     if _dot(s, n) <= 0.0 or vn <= 0.0 or 0.5 * twice < cos_grazing or hn < _STEEPEST:
         return _DARK
-    k, near = 1.0 / twice, light[1] / d1
-    s1, s2, v1, v2 = _dot(s, t1), _dot(s, t2), _dot(v, t1), _dot(v, t2)
-    m1, m2 = _dot(h, t1) / hn, _dot(h, t2) / hn
-    b11 = c[0] + k * ((1.0 - v1 * v1) / d + (1.0 - s1 * s1) * near)
-    b12 = c[1] - k * (v1 * v2 / d + s1 * s2 * near)
-    b22 = c[2] + k * ((1.0 - v2 * v2) / d + (1.0 - s2 * s2) * near)
-    q, rough = light[2] * k * k, finish[3] ** 2
+    m1, m2, b11, b12, b22 = _slopes(spot, light, eye)
+    s1, s2, q, rough = _dot(s, t1), _dot(s, t2), light[2] / (twice * twice), finish[3] ** 2
     v11, v12, v22 = rough + q * (1.0 - s1 * s1), -q * s1 * s2, rough + q * (1.0 - s2 * s2)
     det, det_v = b11 * b22 - b12 * b12, v11 * v22 - v12 * v12
     if abs(det) < 1e-12:

@@ -2,7 +2,11 @@
 
 The blur of a point depends on its depth x through 1/x alone, in which the defocused disc and the die's image are
 linear. Cores [point_spread] are made when they are first needed, at steps of 1/x over which either grows by half a
-pixel, and interpolated by a parabola.
+pixel, and interpolated by a parabola; `splat` adds them up.
+
+Every pixel is within 0.5 % of the blob's brightest (f/1.4 to f/16, 1 m to infinity, die to 5 mm, diffusion 0.3 px; 1.5 %
+without diffusion). The sum is the electrons given. From f/7 on the first moment is the true position; a faster lens in
+focus is coarsely sampled, and its pixels bend the centroid as real ones do: 0.025 px at f/2.8.
 """
 
 import math
@@ -20,7 +24,7 @@ from dockair.sim.camera.splat import Tables, splat
 
 NEAREST_M: Final = 0.5  #: nearer points are as blurred as at this depth
 _STEP_PX = 0.5  # growth of the disc or of the die's image between two tabulated depths
-_SIZES = 8  # of sources whose cores are kept
+_SIZES = 16  # of sources whose cores are kept
 _EDGE_NODES = 1024
 
 

@@ -138,6 +138,13 @@ def poisson_from_uniforms(expected: float, u0: float, u1: float, cdf: Array, gui
 
 
 @njit(cache=True)
+def count_from_normal(expected: float, z: float) -> float:
+    """Return a whole number with a Poisson law's mean, variance and skew, for `expected` >= 30."""
+    # Rounding adds 1/12 to the variance, the term in z^2 another 1/18.
+    return np.rint(expected + np.sqrt(expected - 5.0 / 36.0) * z + (z * z - 1.0) / 6.0)
+
+
+@njit(cache=True)
 def _electrons(x: np.float32, g: np.int8, row_gain: np.float32, chain: Chain) -> np.float32:
     """Expected electrons of a pixel, Eq. (1)."""
     return fma(x, fma(np.float32(row_gain * chain.gain_step), np.float32(g), row_gain), chain.dark_e)
@@ -221,8 +228,7 @@ def _row_exact(
             u1 = mix(np.uint32(more ^ np.uint32(0x9E3779B9))) / 4294967296.0
             n = np.float32(poisson_from_uniforms(float(e), bits / 4294967296.0, u1, cdf, guide))
         else:
-            z = normal_from_bits(bits)  # rounding adds 1/12 to the variance, the skew's term 1/18
-            n = np.float32(np.rint(e + np.sqrt(e - 5.0 / 36.0) * z + (z * z - 1.0) / 6.0))
+            n = np.float32(count_from_normal(e, normal_from_bits(bits)))
         m = fma(chain.read_noise_e, normal_from_bits(more), min(n, chain.full_well_e))
         out[i] = _level(m, offset[i], column[i], chain)
 

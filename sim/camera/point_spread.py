@@ -21,8 +21,9 @@ Far from the centre the energy per pixel falls as r^-3, whatever the blurs, sinc
 
 H minus (7) has no cusp and its transform, the core, dies within a few rings: that is tabulated, W is a formula.
 
-Not modelled: aberrations, field curvature, the iris's blades, the width of the LED's line (30 nm washes out the rings
-beyond the tenth, which the core leaves out), a die seen obliquely or rolled, charge lost between pixels.
+Not modelled: aberrations (a real lens at f/1.4 is far from this one), field curvature, the iris's blades, rings beyond
+the tenth (the core fades from the fifth on; an LED's line, 30 nm wide, blurs them from the tenth to the twentieth), a
+die seen obliquely or rolled, the part in r^-5 that blurs add to the wings (3 % of their variance).
 Sources: Hopkins, Proc. R. Soc. A 231 (1955) 91 (2); Born & Wolf, Principles of Optics, sections 8.5.2 and 8.8.2.
 """
 

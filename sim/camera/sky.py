@@ -53,11 +53,11 @@ class Weather:
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.cloud_cover <= 1.0:
-            raise DockairError("sky.cloud_cover", expected="0 to 1", got=self.cloud_cover)
+            raise DockairError("weather.cloud_cover", expected="0 to 1", got=self.cloud_cover)
         if not 0.0 <= self.cloud_optical_depth < math.inf:
-            raise DockairError("sky.cloud_optical_depth", expected="a depth >= 0", got=self.cloud_optical_depth)
+            raise DockairError("weather.cloud_optical_depth", expected="a depth >= 0", got=self.cloud_optical_depth)
         if not self.visibility_m > 0.0:
-            raise DockairError("sky.visibility_m", expected="a distance > 0 m", got=self.visibility_m)
+            raise DockairError("weather.visibility_m", expected="a distance > 0 m", got=self.visibility_m)
 
 
 class Sky:

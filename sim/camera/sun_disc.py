@@ -10,7 +10,7 @@ J holds the stretch of a flat image (1/cos^2 t along the radius, 1/cos t across)
 light is flux over area, so that cos^4 t comes out by itself. s is the blur of the edge; an edge softened along its
 normal by a law of variance s^2 adds pi s^2 to the area (Steiner), which (3) takes back.
 
-Not modelled: limb darkening (the edge is at 0.6 of the middle at 850 nm, both hundreds of times over full well).
+Not modelled: limb darkening (the edge has about half of the middle, both hundreds of times over full well).
 Sources: Steiner's formula for parallel bodies; Cox, Allen's Astrophysical Quantities, section 14.7 (limb darkening).
 """
 

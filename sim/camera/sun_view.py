@@ -79,7 +79,7 @@ class SunView:
         if sun_C[0] <= 0.0:
             return None
         u, v = self._camera.pixels_from_points(sun_C[None])[0]
-        reach = self._radius_px
+        reach = self._radius_px / float(sun_C[0]) ** 2  # off the axis the disc is drawn out
         if not (-reach < u < self._camera.width_px + reach and -reach < v < self._camera.height_px + reach):
             return None
         first = int((v - reach) // _BLOCK_PX), int((u - reach) // _BLOCK_PX)

@@ -45,6 +45,7 @@ class TracedSolids:
     def __init__(self, model: mujoco.MjModel, lighting: Lighting) -> None:
         self._solids, self._lighting = Solids.of(model), lighting
         self._limits_m = depth_limits_m(model)
+        self._memory = np.empty(0, dtype=np.float32)
 
     def draw(
         self,
@@ -69,7 +70,10 @@ class TracedSolids:
         s, light = self._solids, self._lighting
         centres = (data.geom_xpos[s.geoms] - p_WC) @ R_WC
         axes = R_WC.T @ data.geom_xmat[s.geoms].reshape(-1, 3, 3)
-        nearest = np.full(out.shape, self._limits_m[1])
+        if self._memory.size < out.size:
+            self._memory = np.empty(out.size, dtype=np.float32)
+        nearest = self._memory[: out.size].reshape(out.shape)
+        nearest[:] = self._limits_m[1]
         shade = light.ambient, light.direct, haze.extinction_1_m, haze.airlight
         solids = s.kinds, s.half_sizes_m, s.reflectances
         _trace(out, nearest, solids, centres, axes, x, y, R_WC.T @ light.toward_W, shade, self._limits_m[0])
@@ -81,7 +85,7 @@ class TracedSolids:
 @njit(cache=True)
 def _trace(
     out: NDArray[np.float32],
-    nearest: Array,
+    nearest: NDArray[np.float32],
     solids: tuple[NDArray[np.int64], Array, Array],
     centres: Array,
     axes: Array,

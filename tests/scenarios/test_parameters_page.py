@@ -9,6 +9,7 @@ from dockair.parameters import load_parameters, read_sheet, sheet_names
 from dockair.scenarios import build
 from dockair.scenarios.parameters_page import parameters_page
 from dockair.scenarios.schema import load_scenario
+from dockair.sim.camera import camera
 
 PAGE = Path(__file__).parents[2] / "docs" / "parameters.md"
 
@@ -36,7 +37,7 @@ def test_numbers_are_told_as_they_are_and_tables_by_their_span() -> None:
 
 
 def test_every_sheet_fills_the_class_that_a_flight_is_built_with(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The default flight is built with each load recorded: all sheets are used, none but these, each in one class."""
+    """Flights with every choice of hardware are built with each load recorded: all sheets, each in one class."""
     loaded: dict[str, set[type[Any]]] = {}
 
     def recording(sheet: str, cls: type[Any], overrides: Any = None) -> Any:
@@ -44,7 +45,9 @@ def test_every_sheet_fills_the_class_that_a_flight_is_built_with(monkeypatch: py
         return load_parameters(sheet, cls, overrides)
 
     monkeypatch.setattr(build, "load_parameters", recording)
+    monkeypatch.setattr(camera, "load_parameters", recording)
     monkeypatch.setattr(build, "SETTLE_S", 0.0)
-    build.build(load_scenario("default"), 0)
+    for filter_name, imu in (("long_pass", "mti"), ("band_pass", "tactical"), ("long_pass", "consumer")):
+        build.build(load_scenario("default", {"camera.filter": filter_name, "hardware.imu": imu}), 0)
     assert sorted(loaded) == sheet_names()
     assert [len(classes) for classes in loaded.values()] == [1] * len(loaded)

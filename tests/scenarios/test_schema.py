@@ -28,7 +28,7 @@ SIGMAS = "three numbers, each 0 or more"
 @pytest.mark.parametrize(
     ("text", "key", "expected"),
     [
-        ("speed = 1", "speed", "a known key, got 'speed'; exists: accept, claim, flight,"),
+        ("speed = 1", "speed", "a known key, got 'speed'; exists: accept, camera, claim,"),
         ("flight.airspeed_kt = 1", "flight.airspeed_kt", "a known key, got 'airspeed_kt'; exists: airspeed_m_s,"),
         ('flight.airspeed_m_s = "180"', "flight.airspeed_m_s", f"{SPEED}, got '180'"),
         ("flight.airspeed_m_s = true", "flight.airspeed_m_s", f"{SPEED}, got True"),

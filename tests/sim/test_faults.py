@@ -144,6 +144,11 @@ def test_of_two_stuck_exposures_the_one_that_began_last_holds() -> None:
         assert [faults.camera(t).exposure_s for t in (0.5, 1.5, 3.0, 4.5)] == [None, 9e-5, 1e-5, 9e-5]
 
 
+def test_the_stuck_exposures_to_come_are_known_from_the_start() -> None:
+    faults = _faults(ExposureStuck(exposure_s=9e-5, start_s=70.0), StuckFrame(), ExposureStuck(exposure_s=1e-5))
+    assert faults.exposures_s == (9e-5, 1e-5)
+
+
 def test_gyro_biases_add_and_the_smallest_range_holds() -> None:
     fault = _faults(
         GyroBiasStep(rate_rad_s=(0.1, 0.0, 0.0)),

@@ -1,220 +1,300 @@
-"""Glints at true mirror points, the Sun's disc and its veil. No OpenGL is needed here."""
+"""All of the Sun's stray light together: what enters is accounted for, in the field, at its edge and beyond."""
 
 from dataclasses import replace
 
-import mujoco
 import numpy as np
 import pytest
 
-from dockair.calibration import Camera, LedRing
+from dockair.calibration import Camera
+from dockair.errors import DockairError
+from dockair.messages import Window
 from dockair.parameters import load_parameters
-from dockair.sim.camera.glare import add_disc, find_glints, is_clear, rim_of, veil_electrons
-from dockair.sim.camera.radiometry import CameraParameters, LedParameters, LightParameters, responses
+from dockair.rotations import Array
+from dockair.sim.camera.glare import Glare
+from dockair.sim.camera.halo import Halo
+from dockair.sim.camera.radiometry import Responses
+from dockair.sim.camera.sheets import GlareParameters, LensParameters, LightParameters
 
-CAMERA = load_parameters("camera", CameraParameters)
+PARAMETERS = load_parameters("glare", GlareParameters)
+LENS = load_parameters("lens", LensParameters)
 LIGHT = load_parameters("light", LightParameters)
-RESPONSE = responses(CAMERA, load_parameters("leds", LedParameters), LIGHT, Camera())
-EYE = np.zeros(3)
+FLUX_E_S, EXPOSURE_S = 4.5e14, 20e-6  # at f/8
+RESPONSE = Responses(
+    led_e_m2_sr_w_s=0.0,
+    led_transmission=np.ones(2),
+    white_e_s=0.0,
+    sun_disc_e_s=0.0,
+    sun_flux_e_s=FLUX_E_S,
+    glint_e_m2_s=0.0,
+)
+STRAIGHT = Camera()
+BENT = Camera(distortion=(-0.25, 0.08, 1e-3, -5e-4, 0.0))
+WIDE = Camera(width_px=8192, height_px=8192, principal_point_px=(4095.5, 4095.5))
+MIDDLE = Window(3400, 4800, 3400, 4800)  # of WIDE: everything that is added pixel by pixel
+NONE = np.zeros(2)
+ALONE = {"veiling_glare": 0.0, "halo_share": NONE, "spike_share": 0.0, "ghost_share": np.zeros(6)}
+SIGMA_PX = 0.7
 
 
-def _unit(*v: float) -> np.ndarray:
-    return np.array(v) / np.linalg.norm(v)
+def _glare(camera: Camera = STRAIGHT, f_number: float = LENS.f_number, **changes: object) -> Glare:
+    parameters = replace(PARAMETERS, **changes)
+    return Glare(parameters, replace(LENS, f_number=f_number), camera, LIGHT, RESPONSE, 870e-9)
 
 
-def _world(*geoms: dict) -> tuple[mujoco.MjModel, mujoco.MjData]:
-    spec = mujoco.MjSpec()
-    for geom in geoms:
-        spec.worldbody.add_geom(**geom)
-    model = spec.compile()
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
-    return model, data
+def _toward(place: tuple[float, float], camera: Camera = STRAIGHT) -> Array:
+    return np.asarray(camera.rays_from_pixels(np.array([place]))[0])
 
 
-def _sphere(at: list[float], radius: float, **more: object) -> dict:
-    return {"type": mujoco.mjtGeom.mjGEOM_SPHERE, "pos": at, "size": [radius, 0.0, 0.0], **more}
+def _stray(glare: Glare, sun_C: Array, camera: Camera = STRAIGHT) -> Array:
+    grid = glare.stray(sun_C, 1.0, EXPOSURE_S, camera.full_window)
+    assert grid is not None
+    return np.asarray(grid.values, dtype=float)
 
 
-def _mirror_error_rad(p: np.ndarray, n: np.ndarray, sun: np.ndarray) -> float:
-    """Angle between the Sun and the mirror image of the line of sight: the law of reflection, independently."""
-    sight = _unit(*(p - EYE))
-    reflected = sight - 2.0 * (sight @ n) * n
-    return float(np.arccos(np.clip(reflected @ sun, -1.0, 1.0)))
-
-
-@pytest.mark.parametrize("sun", [_unit(-1, 0, 1), _unit(-0.8, 0.5, 0.2), _unit(0.3, -1, 0.4)])
-def test_a_spheres_glint_obeys_the_law_of_reflection(sun: np.ndarray) -> None:
-    centre, radius = np.array([8.0, 1.0, -0.5]), 0.6
-    model, data = _world(_sphere(list(centre), radius))
-    glints = find_glints(model, data, None, EYE, sun, LIGHT)
-    assert glints.p_W.shape == (1, 3)
-    n = (glints.p_W[0] - centre) / radius
-    assert np.linalg.norm(n) == pytest.approx(1.0, abs=1e-9)
-    assert _mirror_error_rad(glints.p_W[0], n, sun) < 1e-5
-    assert glints.r1_r2_m2[0] == pytest.approx(radius**2, rel=1e-12)
-
-
-def test_an_ellipsoids_glint_obeys_the_law_of_reflection_and_has_its_gaussian_curvature() -> None:
-    axes, centre, sun = np.array([2.0, 0.5, 0.8]), np.array([9.0, -1.0, 0.7]), _unit(-0.6, 0.3, 0.7)
-    model, data = _world({"type": mujoco.mjtGeom.mjGEOM_ELLIPSOID, "pos": list(centre), "size": list(axes)})
-    glints = find_glints(model, data, None, EYE, sun, LIGHT)
-    local = glints.p_W[0] - centre
-    assert ((local / axes) ** 2).sum() == pytest.approx(1.0, abs=1e-9)
-    n = _unit(*(local / axes**2))
-    assert _mirror_error_rad(glints.p_W[0], n, sun) < 1e-4
-    # Gaussian curvature of a surface z(x, y) from second differences of the distance to the tangent plane
-    e1 = np.cross(n, [0.0, 0.0, 1.0])
-    e1 /= np.linalg.norm(e1)
-    e2 = np.cross(n, e1)
-    h = 1e-3
-
-    def depth(a: float, b: float) -> float:
-        q = local + a * e1 + b * e2  # drop along n onto the ellipsoid
-        A, B, C = ((n / axes) ** 2).sum(), (n * q / axes**2).sum(), ((q / axes) ** 2).sum() - 1.0
-        return float((-B + np.sqrt(B * B - A * C)) / A)
-
-    Lxx = (depth(h, 0) - 2 * depth(0, 0) + depth(-h, 0)) / h**2
-    Lyy = (depth(0, h) - 2 * depth(0, 0) + depth(0, -h)) / h**2
-    Lxy = (depth(h, h) - depth(h, -h) - depth(-h, h) + depth(-h, -h)) / (4 * h**2)
-    assert glints.r1_r2_m2[0] == pytest.approx(1.0 / (Lxx * Lyy - Lxy**2), rel=1e-4)
-
-
-def test_the_reflected_light_of_a_sphere_is_the_light_it_catches() -> None:
-    """I = E R r^2/4 into every direction: over the whole sphere 4 pi that is E R pi r^2, the light on its disc."""
-    r = 0.3
-    intensity_over_e = 0.25 * r**2
-    assert 4.0 * np.pi * intensity_over_e == pytest.approx(np.pi * r**2, rel=1e-12)
-    sun_per_s = RESPONSE.glint_e / LIGHT.glint_reflectance
-    assert sun_per_s == pytest.approx(RESPONSE.sun_flux_e, rel=1e-12)
-
-
-def test_something_in_the_way_of_the_sun_or_of_the_camera_puts_a_glint_out() -> None:
-    sun = _unit(-0.2, 0.0, 1.0)
-    ball = _sphere([8.0, 0.0, 0.0], 0.5)
-    assert len(find_glints(*_world(ball), None, EYE, sun, LIGHT).p_W) == 1
-    for at in ([7.0, 0.0, 4.0], [4.0, 0.0, 0.2]):
-        box = {"type": mujoco.mjtGeom.mjGEOM_BOX, "pos": at, "size": [0.5, 1.0, 0.3]}
-        assert len(find_glints(*_world(ball, box), None, EYE, sun, LIGHT).p_W) == 0
-        assert len(find_glints(*_world(ball, box | {"group": 3}), None, EYE, sun, LIGHT).p_W) == 1
-
-
-def test_the_sun_behind_a_body_makes_no_glint() -> None:
-    model, data = _world(_sphere([8.0, 0.0, 0.0], 0.5))
-    assert len(find_glints(model, data, None, EYE, _unit(1.0, 0.0, 0.01), LIGHT).p_W) == 0
-
-
-def _rim_world() -> tuple[mujoco.MjModel, mujoco.MjData]:
-    spec = mujoco.MjSpec()
-    body = spec.worldbody.add_body(name="drogue", pos=[6.0, 0.3, 0.2])
-    angle = 2.0 * np.pi * np.arange(24) / 24
-    at = 0.25 * np.column_stack([np.zeros(24), np.cos(angle), np.sin(angle)]) + [0.01, 0.0, 0.0]
-    for k in range(24):
-        ends = [*at[k], *at[(k + 1) % 24]]
-        body.add_geom(name=f"basket_rim_{k}", type=mujoco.mjtGeom.mjGEOM_CAPSULE, fromto=ends, size=[0.008, 0.0, 0.0])
-    model = spec.compile()
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
-    return model, data
-
-
-def test_the_rim_is_read_back_from_its_capsules() -> None:
-    rim = rim_of(_rim_world()[0])
-    assert rim is not None
-    assert rim.radius_m == pytest.approx(0.25, abs=1e-9)
-    assert rim.tube_radius_m == pytest.approx(0.008)
-    assert rim.centre_x_m == pytest.approx(0.01)
-    assert rim_of(_world(_sphere([1.0, 0.0, 0.0], 0.1))[0]) is None
-
-
-def test_the_rims_two_glints_obey_the_law_of_reflection_on_a_torus() -> None:
-    model, data = _rim_world()
-    rim, sun = rim_of(model), _unit(-0.8, 0.1, 0.6)
-    glints = find_glints(model, data, rim, EYE, sun, LIGHT)
-    assert len(glints.p_W) == 2
-    centre = np.array([6.01, 0.3, 0.2])
-    sides = set()
-    for p, area in zip(glints.p_W, glints.r1_r2_m2, strict=True):
-        q = p - centre
-        ring = 0.25 * q * [0, 1, 1] / np.hypot(q[1], q[2])
-        n = (q - ring) / 0.008
-        assert np.linalg.norm(n) == pytest.approx(1.0, abs=1e-6)
-        assert _mirror_error_rad(p, n, sun) < 1e-4
-        cos_phi = float(n @ ring / 0.25)
-        sides.add(np.sign(cos_phi))
-        # a torus has curvature cos phi/(r (R + r cos phi)); do Carmo, section 3-3, example 6
-        assert area == pytest.approx(0.008 * (0.25 + 0.008 * cos_phi) / abs(cos_phi), rel=1e-6)
-    assert sides == {1.0, -1.0}
-
-
-def test_a_ray_is_clear_up_to_what_it_meets() -> None:
-    model, data = _world(_sphere([5.0, 0.0, 0.0], 1.0))
-    ahead = np.array([1.0, 0.0, 0.0])
-    assert is_clear(model, data, EYE, ahead, 3.99)
-    assert not is_clear(model, data, EYE, ahead, 4.01)
-    assert is_clear(model, data, EYE, -ahead, np.inf)
-
-
-def _disc(centre: tuple[float, float], start: tuple[int, int], shape: tuple[int, int]) -> np.ndarray:
-    image = np.zeros(shape, dtype=np.float32)
-    visible = np.ones((30, 30), dtype=np.bool_)
-    add_disc(image, start, centre, 13.5, 0.6, 1.0, visible, (35, 35), 2)
+def _on_pixels(glare: Glare, sun_C: Array, window: Window, disc: bool = True) -> Array:
+    """(rows, columns) of what is added pixel by pixel."""
+    image = np.zeros(window.shape, dtype=np.float32)
+    start = window.row_start, window.column_start
+    glare.add_fine(image, start, sun_C, 1.0, EXPOSURE_S)
+    if disc:
+        glare.add_disc(image, start, sun_C, np.ones(window.shape), start, EXPOSURE_S, SIGMA_PX)
     return image
 
 
-def test_the_suns_disc_has_its_area_and_its_centre() -> None:
-    image = _disc((100.3, 98.8), (0, 0), (200, 200))
-    rows, columns = np.indices(image.shape)
-    # a radially blurred edge keeps area pi (R^2 + sigma^2)
-    assert image.sum() == pytest.approx(np.pi * (13.5**2 + 0.6**2), rel=2e-3)
-    assert (image * columns).sum() / image.sum() == pytest.approx(100.3, abs=0.02)
-    assert (image * rows).sum() / image.sum() == pytest.approx(98.8, abs=0.02)
+def _plane_sum(nodes: Array) -> float:
+    """Integral of nodes over the sensor, the outermost counted half."""
+    return float(64.0 * np.trapezoid(np.trapezoid(nodes, axis=1)))
 
 
-def test_the_suns_disc_in_a_window_is_the_full_frames() -> None:
-    assert np.array_equal(
-        _disc((100.3, 98.8), (90, 95), (40, 50)), _disc((100.3, 98.8), (0, 0), (200, 200))[90:130, 95:145]
+def test_what_enters_the_lens_is_accounted_for() -> None:
+    """Shares add up to 1, and each is what is found in the image of a sensor eight times as wide."""
+    glare = _glare(WIDE)
+    assert sum(glare.shares.values()) == pytest.approx(1.0, rel=1e-12)
+    assert min(glare.shares.values()) > 0.0
+    sun_C = _toward((4700.0, 3700.0), WIDE)
+    entered = FLUX_E_S * EXPOSURE_S * sun_C[0] / LENS.transmittance
+    total = _plane_sum(_stray(glare, sun_C, WIDE)) + _on_pixels(glare, sun_C, MIDDLE).sum(dtype=float)
+    assert total / entered + glare.shares["lost"] == pytest.approx(1.0, abs=5e-4)
+    stray = _plane_sum(_stray(glare, sun_C, WIDE)) + _on_pixels(glare, sun_C, MIDDLE, False).sum(dtype=float)
+    told = 1.0 - glare.shares["lost"] - glare.shares["disc"]
+    assert stray / entered == pytest.approx(told, rel=0.01)  # 0.7 % of it lies beyond even this sensor
+
+
+@pytest.mark.parametrize("camera", [STRAIGHT, BENT])
+@pytest.mark.parametrize("place", [(1023.5, 543.5), (300.3, 200.8), (1900.0, 950.5)])
+@pytest.mark.parametrize("f_number", [2.8, 8.0, 16.0])
+def test_disc_and_wing_hold_the_flux_that_radiometry_predicts(
+    camera: Camera, place: tuple[float, float], f_number: float
+) -> None:
+    """Sun's flux through the lens times the cosine: what scatters and reflects is beside it, the wing part of it."""
+    glare, sun_C = _glare(camera, f_number), _toward(place, camera)
+    window = Window(int(place[1]) - 40, int(place[1]) + 40, int(place[0]) - 40, int(place[0]) + 40)
+    image, start = np.zeros(window.shape, dtype=np.float32), (window.row_start, window.column_start)
+    glare.add_disc(image, start, sun_C, np.ones(window.shape), start, EXPOSURE_S, SIGMA_PX)
+    alone = _glare(camera, f_number, **(ALONE | {"spike_share": 1.0}))
+    wing = alone.shares["spikes"] / LENS.transmittance
+    expected = FLUX_E_S * EXPOSURE_S * sun_C[0]
+    assert image.sum(dtype=float) + wing * expected == pytest.approx(expected, rel=1e-3)
+    assert 0.003 < wing < 0.06
+
+
+def test_each_part_alone_puts_its_own_share_on_the_sensor() -> None:
+    sun_C = _toward((4700.0, 3700.0), WIDE)
+    entered = FLUX_E_S * EXPOSURE_S * sun_C[0] / LENS.transmittance
+    base = ALONE | {"iris_blades": 0}
+    wing = _plane_sum(_stray(_glare(WIDE, **base), sun_C, WIDE))
+    wing += _on_pixels(_glare(WIDE, **base), sun_C, MIDDLE, False).sum(dtype=float)
+    for changes, name in (
+        ({"veiling_glare": 0.01}, "veil"),
+        ({"halo_share": PARAMETERS.halo_share}, "halo"),
+        ({"ghost_share": PARAMETERS.ghost_share}, "ghosts"),
+        ({"iris_blades": 6, "spike_share": 1.0}, "spikes"),
+    ):
+        glare = _glare(WIDE, **(base | changes))
+        light = _plane_sum(_stray(glare, sun_C, WIDE))
+        light += _on_pixels(glare, sun_C, MIDDLE, False).sum(dtype=float)
+        beside = 0.0 if name in ("spikes", "halo") else wing
+        # the halo's tail beyond 4096 px is 2.4 % of it
+        assert (light - beside) / entered == pytest.approx(glare.shares[name], rel=0.03 if name == "halo" else 0.01)
+
+
+def test_the_veil_is_the_glare_indexs_share_of_the_flux_on_every_pixel_alike() -> None:
+    """ISO 9358: 1 % of 4.5e14 e-/s in 20 us over 2048 x 1088 pixels is 40 e- each."""
+    glare = _glare(**(ALONE | {"veiling_glare": 0.01, "iris_blades": 0}))
+    bare = _glare(**(ALONE | {"iris_blades": 0}))
+    sun_C = _toward((1500.0, 300.0))
+    veil = _stray(glare, sun_C) - _stray(bare, sun_C)
+    assert veil[:, 5:100] == pytest.approx(0.01 * 9e9 / (2048 * 1088) * sun_C[0], rel=1e-3)
+    assert np.ptp(veil) < 1e-2
+
+
+@pytest.mark.parametrize("camera", [STRAIGHT, BENT])
+def test_stray_light_is_continuous_as_the_sun_leaves_the_picture(camera: Camera) -> None:
+    glare = _glare(camera)
+    inside, outside = (_stray(glare, _toward((u, 400.0), camera), camera)[:, :230] for u in (2046.99, 2047.01))
+    assert np.abs(outside / inside - 1.0).max() < 3e-3
+    # and far beyond it, where the lens's polynomial is not to be trusted: no jump from step to step
+    angles = np.deg2rad(np.linspace(15.0, 60.0, 181))
+    level = [_stray(glare, np.array([np.cos(a), -np.sin(a), 0.01]), camera)[60, 20] for a in angles]
+    falls = np.diff(np.log(level))
+    assert np.abs(np.diff(falls)).max() < 0.1
+
+
+def test_beyond_a_distorted_field_the_suns_image_moves_on_as_a_pinholes() -> None:
+    """Told by the ghost that stands at a quarter of the Sun's distance from the centre, on the other side."""
+    glare = _glare(BENT, veiling_decay_rad=1.0)
+    places = [
+        glare.compact_ghosts(np.array([np.cos(a), -np.sin(a), 0.0]), 1.0, EXPOSURE_S).pixels[0]
+        for a in np.deg2rad([35.0, 45.0])
+    ]
+    way = 0.25 * BENT.focal_length_px * (np.tan(np.deg2rad(45.0)) - np.tan(np.deg2rad(35.0)))
+    assert places[0] - places[1] == pytest.approx([way, 0.0], abs=0.1)
+
+
+def test_outside_the_field_the_hood_cuts_it_to_1_over_e_in_its_angle() -> None:
+    glare = _glare(**(ALONE | {"veiling_glare": 0.01, "iris_blades": 0}))
+    edge = np.arctan((2047.0 - 1023.5) / STRAIGHT.focal_length_px)
+
+    def far_corner(angle: float) -> float:
+        return float(_stray(glare, np.array([np.cos(angle), -np.sin(angle), 0.0]))[0, 0])
+
+    foreshortening = np.cos(edge + PARAMETERS.veiling_decay_rad) / np.cos(edge)
+    ratio = far_corner(edge + PARAMETERS.veiling_decay_rad) / far_corner(edge - 1e-6)
+    assert ratio == pytest.approx(np.exp(-1.0) * foreshortening, rel=2e-3)
+
+
+def test_behind_the_camera_or_hidden_the_sun_gives_nothing() -> None:
+    glare, full = _glare(), STRAIGHT.full_window
+    for sun_C, visible in ((np.array([-0.2, 0.6, 0.77]), 1.0), (_toward((900.0, 500.0)), 0.0)):
+        assert glare.stray(sun_C, visible, EXPOSURE_S, full) is None
+        image = np.zeros((1088, 2048), dtype=np.float32)
+        glare.add_fine(image, (0, 0), sun_C, visible, EXPOSURE_S)
+        assert not image.any()
+    image = np.zeros((60, 60), dtype=np.float32)
+    glare.add_disc(image, (0, 0), np.array([-1.0, 0.0, 0.0]), np.ones((60, 60)), (0, 0), EXPOSURE_S, SIGMA_PX)
+    assert not image.any()
+
+
+@pytest.mark.parametrize(("visible", "exposure_s"), [(0.25, EXPOSURE_S), (1.0, 5e-6), (0.5, 1e-5)])
+def test_it_is_proportional_to_the_visible_part_and_to_the_exposure(visible: float, exposure_s: float) -> None:
+    glare, sun_C = _glare(), _toward((700.0, 400.0))
+    assert (grid := glare.stray(sun_C, visible, exposure_s, STRAIGHT.full_window)) is not None
+    assert np.allclose(grid.values, 0.25 * _stray(glare, sun_C), rtol=1e-5)
+    image = np.zeros((1088, 2048), dtype=np.float32)
+    glare.add_fine(image, (0, 0), sun_C, visible, exposure_s)
+    assert np.allclose(image, 0.25 * _on_pixels(glare, sun_C, STRAIGHT.full_window, False), rtol=1e-5, atol=0.0)
+    part, whole = glare.compact_ghosts(sun_C, visible, exposure_s), glare.compact_ghosts(sun_C, 1.0, EXPOSURE_S)
+    assert part.electrons == pytest.approx(0.25 * whole.electrons)
+
+
+@pytest.mark.parametrize("degrees_outside", [2.0, 6.0])
+def test_with_the_sun_outside_the_picture_its_ghosts_are_inside(degrees_outside: float) -> None:
+    glare = _glare(**(ALONE | {"ghost_share": PARAMETERS.ghost_share, "iris_blades": 0}))
+    edge = np.arctan((2047.0 - 1023.5) / STRAIGHT.focal_length_px)
+    outside = np.deg2rad(degrees_outside)
+    sun_C = np.array([np.cos(edge + outside), -np.sin(edge + outside), 0.0])
+    ghosts = glare.compact_ghosts(sun_C, 1.0, EXPOSURE_S)
+    strength = FLUX_E_S * EXPOSURE_S * sun_C[0] * np.exp(-((outside / PARAMETERS.veiling_decay_rad) ** 2))
+    assert ghosts.electrons == pytest.approx(PARAMETERS.ghost_share[:3] * strength, rel=1e-6)
+    inside = np.all((ghosts.pixels > 40) & (ghosts.pixels < [2008, 1048]), axis=1)
+    assert inside[:2].all()
+    image = _on_pixels(glare, sun_C, STRAIGHT.full_window, False)
+    assert image[:, :1500].sum(dtype=float) == pytest.approx(ghosts.electrons[inside].sum(), rel=0.01)
+
+
+def test_the_two_sharpest_ghosts_look_like_leds() -> None:
+    """20 us at f/8: LEDs' peaks are some thousands of electrons over some ten pixels; 53 e- are a grey level."""
+    glare, sun_C = _glare(), _toward((500.0, 300.0))
+    ghosts = glare.compact_ghosts(sun_C, 1.0, EXPOSURE_S)
+    image = _on_pixels(glare, sun_C, STRAIGHT.full_window)
+    for (u, v), radius in zip(ghosts.pixels[:2], ghosts.radius_px[:2], strict=True):
+        patch = image[int(v) - 15 : int(v) + 16, int(u) - 15 : int(u) + 16]
+        assert 800.0 < patch.max() < 8000.0
+        assert 10 < np.sum(patch > 0.5 * patch.max()) < 250
+        assert radius < 8.0
+
+
+def test_stopping_down_shrinks_a_defocused_ghost_and_lengthens_spikes() -> None:
+    open_, closed = _glare(f_number=4.0), _glare(f_number=8.0)
+    sun_C = _toward((500.0, 300.0))
+    assert open_.shares["spikes"] == pytest.approx(0.5 * closed.shares["spikes"], rel=1e-9)
+    wide, narrow = (g.compact_ghosts(sun_C, 1.0, EXPOSURE_S).radius_px for g in (open_, closed))
+    assert len(wide) == 2  # the third has outgrown the pixels' list
+    assert wide[0] == narrow[0]  # in focus: the Sun's image
+    assert len(narrow) == 3
+
+
+def test_a_round_iris_has_no_spikes_and_loses_no_light_by_it() -> None:
+    polygon, circle = _glare(), _glare(iris_blades=0)
+    assert circle.shares["spikes"] == 0.0
+    assert circle.shares["disc"] == pytest.approx(polygon.shares["disc"], rel=2e-3)
+    glare = _glare(**(ALONE | {"iris_blades": 0}))
+    nodes = _stray(glare, _toward((1024.0, 544.0)))
+    ring = [nodes[68 + i, 128 + j] for i, j in ((30, 40), (-40, 30), (50, 0), (0, -50), (-30, -40))]
+    assert ring == pytest.approx([ring[0]] * 5, rel=1e-5)
+
+
+def test_dirt_raises_veil_and_halo_and_nothing_else() -> None:
+    glare, sun_C, full = _glare(), _toward((700.0, 400.0)), STRAIGHT.full_window
+    clean, dirty = (glare.stray(sun_C, 1.0, EXPOSURE_S, full, factor) for factor in (1.0, 3.0))
+    assert clean is not None and dirty is not None
+    more = dirty.values.astype(float) - clean.values
+    v, u = 8.0 * np.indices(more.shape)
+    halo = Halo(
+        PARAMETERS.halo_share,
+        PARAMETERS.halo_core_rad * STRAIGHT.focal_length_px,
+        PARAMETERS.halo_exponent,
+        STRAIGHT.focal_length_px * np.tan(LIGHT.sun_angular_radius_rad),
     )
+    r = np.hypot(u - 700.0, v - 400.0)
+    law = halo.densities(r[r > 120.0]).sum(axis=0) + PARAMETERS.veiling_glare / (2048 * 1088)
+    assert np.allclose(more[r > 120.0], 2.0 * law * FLUX_E_S * EXPOSURE_S * sun_C[0], rtol=2e-3)
 
 
-def test_the_disc_is_27_pixels_wide() -> None:
-    assert 2.0 * Camera().focal_length_px * LIGHT.sun_angular_radius_rad == pytest.approx(27.0, abs=0.1)
+def test_all_is_centred_where_the_lens_images_the_sun() -> None:
+    """At a corner of a distorted picture, 19 px from the pinhole's place."""
+    glare, place = _glare(BENT), (150.0, 100.0)
+    sun_C = _toward(place, BENT)
+    assert np.linalg.norm(STRAIGHT.pixels_from_points(sun_C[None])[0] - place) > 15.0
+    window = Window(50, 150, 100, 200)
+    grid = glare.stray(sun_C, 1.0, EXPOSURE_S, window)
+    assert grid is not None
+    v, u = np.indices(window.shape)
+    at = np.column_stack([u.ravel() + 100.0, v.ravel() + 50.0])
+    image = _on_pixels(glare, sun_C, window) + grid.at(at).reshape(window.shape)
+    heart = np.where(image > 0.02 * image.max(), image, 0.0)
+    centre = [(heart * u).sum() / heart.sum() + 100.0, (heart * v).sum() / heart.sum() + 50.0]
+    assert centre == pytest.approx(place, abs=0.1)
 
 
-def test_blocks_that_do_not_see_the_sun_stay_dark() -> None:
-    image = np.zeros((200, 200), dtype=np.float32)
-    visible = np.ones((30, 30), dtype=np.bool_)
-    visible[:, :15] = False  # columns 70 to 99
-    add_disc(image, (0, 0), (100.0, 100.0), 13.5, 0.6, 1.0, visible, (35, 35), 2)
-    assert not image[:, :100].any()
-    assert image[:, 100:].sum() == pytest.approx(0.5 * np.pi * 13.5**2, rel=0.05)
+@pytest.mark.parametrize("camera", [STRAIGHT, BENT])
+@pytest.mark.parametrize("place", [(1200.0, 500.0), (2090.0, 300.0)])
+def test_a_window_is_the_full_frames_crop_bit_for_bit(camera: Camera, place: tuple[float, float]) -> None:
+    glare = _glare(camera)
+    sun_C = _toward(place, camera)
+    full = camera.full_window
+    grid, image = glare.stray(sun_C, 1.0, EXPOSURE_S, full), _on_pixels(glare, sun_C, full)
+    assert grid is not None
+    rng = np.random.default_rng(8)
+    for _ in range(40):
+        r, c = int(rng.integers(0, 788)), int(rng.integers(0, 1748))
+        window = Window(r, r + int(rng.integers(1, 300)), c, c + int(rng.integers(1, 300)))
+        part = glare.stray(sun_C, 1.0, EXPOSURE_S, window)
+        assert part is not None
+        (i, j), (m, n) = part.first, part.values.shape
+        assert np.array_equal(part.values, grid.values[i : i + m, j : j + n])
+        assert np.array_equal(_on_pixels(glare, sun_C, window), image[r : window.row_stop, c : window.column_stop])
 
 
-def test_two_percent_of_the_suns_light_spread_over_the_array_is_85_electrons_a_pixel() -> None:
-    parameters = replace(CAMERA, veiling_glare=0.02)
-    veil = veil_electrons(parameters, Camera(), np.array([1.0, 0.0, 0.0]), RESPONSE.sun_flux_e, 1.0)
-    assert veil / LIGHT.air_transmittance == pytest.approx(85.0, rel=0.01)
-
-
-def test_the_veil_falls_to_1_over_e_at_the_hoods_angle_outside_the_field_and_vanishes_behind() -> None:
-    camera = Camera()
-    edge = np.arctan(1024.0 / camera.focal_length_px)
-
-    def veil(angle: float, visible: float = 1.0) -> float:
-        sun_C = np.array([np.cos(angle), np.sin(angle), 0.0])
-        return veil_electrons(CAMERA, camera, sun_C, RESPONSE.sun_flux_e, visible)
-
-    outside = edge + CAMERA.veiling_decay_rad
-    foreshortening = np.cos(outside) / np.cos(edge - 1e-3)
-    assert veil(outside) / veil(edge - 1e-3) == pytest.approx(np.exp(-1.0) * foreshortening, rel=5e-3)
-    assert veil(np.pi) == 0.0
-    assert veil(0.1, 0.25) == pytest.approx(0.25 * veil(0.1), rel=1e-12)
-
-
-def test_the_ring_is_the_scenes_own_scale() -> None:
-    """A rim glint at the default reflectance is dimmer than an LED but of its order, as the sheets claim."""
-    model, data = _rim_world()
-    glints = find_glints(model, data, rim_of(model), EYE, _unit(-0.8, 0.1, 0.6), LIGHT)
-    led = RESPONSE.led_e_m2_sr_w * load_parameters("leds", LedParameters).intensity_w_sr
-    ratio = RESPONSE.glint_e * 0.25 * glints.r1_r2_m2 / led
-    assert np.all((ratio > 0.05) & (ratio < 1.0)), ratio
-    assert LedRing().diameter_m == 0.5
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"iris_blades": 2}, r"iris_blades.*at least 3.*2"),
+        ({"veiling_glare": 0.1, "halo_share": np.array([0.03, 0.03])}, r"<= 1"),
+        ({"halo_share": np.array([0.01])}, r"halo_share.*halo_core_rad"),
+        ({"ghost_position": np.array([0.5])}, r"ghost_position.*ghost_defocus_m"),
+    ],
+)
+def test_a_sheet_that_cannot_be_is_refused(changes: dict[str, object], message: str) -> None:
+    with pytest.raises(DockairError, match=message):
+        _glare(**changes)

@@ -120,6 +120,16 @@ def test_in_the_world_the_imus_place_accelerates_as_the_truth_says(make_world: A
         np.testing.assert_allclose(at.alpha_WB_B, (at.w_WB_B - before.w_WB_B) * 1e3, atol=5e-3)
 
 
+def test_a_bias_uses_up_range() -> None:
+    """Clipping comes after everything that is added: a biased gyro saturates at its range, not beyond it."""
+    sheet = replace(QUIET, gyro_turn_on_bias_sigma_rad_s=0.5)
+    imu = _imu(sheet)
+    bias = imu.gyro_bias_I
+    out = imu.record(1, w_WB_B=np.sign(bias)[None] * (SHEET.gyro_range_rad_s - 1e-3)).angular_rate_rad_s[0]
+    assert np.abs(bias).min() > 2e-3
+    assert np.abs(out) == pytest.approx(SHEET.gyro_range_rad_s, abs=1e-9)
+
+
 # Clock
 
 

@@ -110,6 +110,27 @@ def test_out_of_focus_too_each_pixel_holds_the_diffraction_integral(f_number: fl
     assert image[56:65, 56:65] == pytest.approx(expected, rel=0.0, abs=0.01 * expected.max())
 
 
+@pytest.mark.parametrize(
+    "f_number,depth_m,size_m,at,peak,within_61_px",
+    [
+        (8.0, 10.0, 0.0, (0.2, -0.3), 0.27439, 0.99260),
+        (8.0, 10.0, 1e-3, (0.27, 0.41), 0.23934, 0.99260),
+        (2.8, 10.0, 0.0, (0.2, -0.3), 0.48741, 0.99747),
+        (16.0, 10.0, 0.0, (0.0, 0.0), 0.11196, 0.98516),
+        (8.0, 2.0, 1e-3, (0.1, 0.2), 0.17977, 0.99259),
+        (5.6, 3.0, 0.0, (0.1, 0.2), 0.33043, 0.99483),
+        (4.0, 1.7, 5e-3, (-0.3, 0.2), 0.01306, 0.99629),
+    ],
+)
+def test_brightest_pixel_and_energy_near_it_are_those_of_galsim(
+    f_number: float, depth_m: float, size_m: float, at: tuple[float, float], peak: float, within_61_px: float
+) -> None:
+    """GalSim 2.8.5: Airy, or OpticalPSF with defocus b/(16 sqrt(3) q) waves, * Gaussian(0.3) * Pixel(s), drawImage."""
+    image = _blob(_spread(f_number), at, electrons=1e8, depth_m=depth_m, size_m=size_m, half=30) / 1e8
+    assert image.max() == pytest.approx(peak, rel=3e-3)
+    assert image.sum(dtype=float) == pytest.approx(within_61_px, abs=3e-4)
+
+
 def test_the_energy_within_a_radius_is_1_less_j0_squared_less_j1_squared() -> None:
     """Born & Wolf section 8.5.2. Pixels of 1.1 um, 1/6 of q; their box is undone to second order, p - Laplacian/24."""
     camera = Camera(pixel_pitch_m=1.1e-6)
@@ -305,7 +326,7 @@ def test_a_blob_does_not_depend_on_which_others_were_drawn_before() -> None:
 def test_sizes_beyond_those_kept_are_made_again() -> None:
     spread = _spread()
     first = _blob(spread, (0.1, 0.2), size_m=1e-3, depth_m=3.0)
-    for size_m in np.linspace(2e-3, 4e-3, 9):
+    for size_m in np.linspace(2e-3, 4e-3, 17):
         _blob(spread, (0.1, 0.2), size_m=size_m, depth_m=3.0)
     assert np.array_equal(_blob(spread, (0.1, 0.2), size_m=1e-3, depth_m=3.0), first)
 
