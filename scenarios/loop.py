@@ -47,7 +47,7 @@ class Flight:
         parts = build(scenario, seed)
         self.scenario, self.clock, self.sheets = scenario, parts.clock, parts.sheets
         self.world, self.camera, self.imu, self.navigator = parts.world, parts.camera, parts.imu, parts.navigator
-        self._faults = parts.faults
+        self.as_built, self._faults = parts.as_built, parts.faults
         self.referee = Referee()
         self._full_frames = full_frames
         self._periods = parts.periods

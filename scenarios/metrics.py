@@ -76,6 +76,7 @@ class Result:
     disconnect: Disconnect | None
     collided_with: str
     truth_navigation: bool
+    background: str  #: who drew what the camera saw, "mujoco" or "analytic"; "" without a camera
     nav: NavigationFigures
     frames: int
     duration_s: float
@@ -234,6 +235,7 @@ def summarise(
     frames: int,
     mounting: Mounting,
     truth_navigation: bool,
+    background: str,
     wall_time_s: float,
     out_dir: str | Path | None,
 ) -> Result:
@@ -250,6 +252,7 @@ def summarise(
         frames: that were delivered to the navigation.
         mounting: where the navigation believes its camera to be.
         truth_navigation: the truth stood in place of `nav`.
+        background: who drew what the camera saw, "" without a camera.
         wall_time_s: that the flight took.
         out_dir: where the flight was written.
     """
@@ -265,6 +268,7 @@ def summarise(
         disconnect=disconnect,
         collided_with=collided_with,
         truth_navigation=truth_navigation,
+        background=background,
         nav=navigation_figures(solutions, truths, mounting),
         frames=frames,
         duration_s=duration_s,

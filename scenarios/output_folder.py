@@ -13,6 +13,7 @@ FLIGHT_FILES = (
     "messages.parquet",
     "estimates.parquet",
     "navigator.json",
+    "as_built.json",
 )
 
 

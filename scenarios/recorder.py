@@ -1,5 +1,6 @@
 """Everything that is kept of a flight, behind one object: the loop appends control ticks and asks for the result."""
 
+import json
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
@@ -15,6 +16,7 @@ if TYPE_CHECKING:  # the loop imports this module
     from dockair.scenarios.loop import Flight, Tick
 
 RECORD = ("full", "window", "none")
+AS_BUILT = "as_built.json"  #: how the hardware of the flight differed from its nominal sheets
 
 
 class Recorder:
@@ -76,6 +78,7 @@ class Recorder:
             frames=log.frames,
             mounting=flight.sheets.mounting,
             truth_navigation=flight.scenario.navigation.is_truth,
+            background="" if flight.camera is None else flight.camera.background,
             wall_time_s=wall_time_s,
             out_dir=self._folder,
         )
@@ -89,6 +92,7 @@ class Recorder:
         from dockair.sim.shapes import shapes_of
 
         result.write(folder)
+        (folder / AS_BUILT).write_text(json.dumps(flight.as_built.record(), indent=1) + "\n", encoding="utf-8")
         self._log.write_parquet(folder)
         write_episode(
             folder,

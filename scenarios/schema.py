@@ -167,7 +167,7 @@ class Weather(_Table):
     """What lies between and behind: clouds, haze, night."""
 
     cloud_cover: float = Field(default=0.0, ge=0.0, le=1.0)  #: part of the sky under the layer of broken cloud
-    cloud_optical_depth: float = Field(default=12.0, gt=0.0, le=100.0)  #: mean, where there is cloud
+    cloud_optical_depth: float = Field(default=8.0, gt=0.0, le=100.0)  #: mean, where there is cloud
     visibility_m: float = Field(default=100e3, ge=50.0, le=300e3)  #: meteorological optical range
     night: bool = False  #: no Sun, no daylight
 

@@ -64,6 +64,23 @@ def _chain(sensor: SensorParameters, pattern: FixedPattern, exposure_s: float, b
     )
 
 
+def _row_gain(sensor: SensorParameters, first: int, rows: int, exposure_s: float) -> NDArray[np.float32]:
+    """1 + P w/t of Eq. (1) for rows of the sensor."""
+    wait_s = overhead_time_s(sensor) + (first + np.arange(rows)) * row_time_s(sensor)
+    return (1.0 + sensor.parasitic_light_sensitivity * wait_s / exposure_s).astype(np.float32)
+
+
+def _check(
+    window: tuple[int, ...], start: tuple[int, int], whole: tuple[int, int], sensor: SensorParameters, bits: int
+) -> None:
+    if bits not in (OUTPUT_BITS, sensor.converter_bits):
+        exists = [str(OUTPUT_BITS), str(sensor.converter_bits)]
+        raise DockairError("digitise.bits", expected="the output's or the converter's", got=bits, exists=exists)
+    if not all(0 <= first <= size - part for first, size, part in zip(start, whole, window, strict=True)):
+        expected = f"{window[0]} x {window[1]} pixels inside the sensor's {whole[0]} x {whole[1]}"
+        raise DockairError("digitise.start", expected=expected, got=start)
+
+
 def digitise(
     expected: NDArray[np.float32],
     sensor: SensorParameters,
@@ -89,15 +106,8 @@ def digitise(
     Raises:
         DockairError: other bits; pixels outside the pattern.
     """
-    if bits not in (OUTPUT_BITS, sensor.converter_bits):
-        exists = [str(OUTPUT_BITS), str(sensor.converter_bits)]
-        raise DockairError("digitise.bits", expected="the output's or the converter's", got=bits, exists=exists)
-    (rows, columns), (height, width) = expected.shape, pattern.shape
-    if not (0 <= start[0] <= height - rows and 0 <= start[1] <= width - columns):
-        expected_text = f"{rows} x {columns} pixels inside the sensor's {height} x {width}"
-        raise DockairError("digitise.start", expected=expected_text, got=start)
-    wait_s = overhead_time_s(sensor) + (start[0] + np.arange(rows)) * row_time_s(sensor)
-    row_gain = (1.0 + sensor.parasitic_light_sensitivity * wait_s / exposure_s).astype(np.float32)
+    _check(expected.shape, start, pattern.shape, sensor, bits)
+    row_gain = _row_gain(sensor, start[0], expected.shape[0], exposure_s)
     out = np.empty(expected.shape, dtype=np.uint8 if bits == OUTPUT_BITS else np.uint16)
     digitise_rows(
         np.ascontiguousarray(expected, dtype=np.float32),

@@ -17,12 +17,13 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from dockair.rotations import Array
 from dockair.sim.camera.curved_mirrors import ellipsoid_spots, rim_spots
 from dockair.sim.camera.lobes import ROW, SPOT, facet_rows, spot_rows
 from dockair.sim.camera.mirrors import METAL, Mirrors, finishes, vector
-from dockair.sim.camera.occlusion import hidden, is_clear
+from dockair.sim.camera.occlusion import first_hits, is_clear
 from dockair.sim.camera.round_mirrors import round_spots
 from dockair.sim.camera.sheets import LightParameters, SurfaceParameters
 
@@ -63,10 +64,27 @@ def find_glints(
     rows = _rows(data, mirrors, np.asarray(p_WC, dtype=float), np.asarray(s_W, dtype=float), surfaces, light)
     if ahead_W is not None:
         rows = rows[(rows[:, :3] - p_WC) @ ahead_W > 0.0]
-    starts = rows[:, :3] + rows[:, 8:9] * rows[:, 3:6]
-    seen = np.flatnonzero(~hidden(model, data, p_WC, starts, 0.0))
-    kept = [i for i in seen if is_clear(model, data, starts[i], s_W, np.inf)]
+    seen, starts = starts_of_seen(model, data, p_WC, rows)
+    kept = [i for i in np.flatnonzero(seen) if is_clear(model, data, starts[i], s_W, np.inf)]
     return Glints(p_W=rows[kept, :3], area_m2_sr=rows[kept, 6], size_m=rows[kept, 7])
+
+
+def starts_of_seen(
+    model: mujoco.MjModel, data: mujoco.MjData, p_WC: Array, rows: Array
+) -> tuple[NDArray[np.bool_], Array]:
+    """(n,) which of the patches the lens sees, (n, 3) a little above them, where rays to the light start.
+
+    Their middles are on the surface to second order only, and the drawn rim has corners: what the line of sight meets
+    within half a patch of the middle is the surface itself.
+    """
+    ray = rows[:, :3] - p_WC
+    distance = np.linalg.norm(ray, axis=1)
+    direction = ray / np.maximum(distance, np.finfo(float).tiny)[:, None]
+    hit = first_hits(model, data, p_WC, direction, float(distance.max(initial=0.0) + 1.0))
+    slack = rows[:, 8] + 0.5 * rows[:, 7]
+    on_surface = np.where((hit >= 0.0) & (np.abs(hit - distance) < slack), hit, distance)
+    starts = p_WC + on_surface[:, None] * direction + rows[:, 8:9] * rows[:, 3:6]
+    return (hit < 0.0) | (hit > distance - slack), starts
 
 
 def _rows(

@@ -23,9 +23,10 @@ from numpy.typing import NDArray
 
 from dockair.rotations import Array
 from dockair.sim.camera.curved_mirrors import ellipsoid_spots, rim_spots
+from dockair.sim.camera.glints import starts_of_seen
 from dockair.sim.camera.lobes import ROW, SPOT, spot_rows
 from dockair.sim.camera.mirrors import METAL, Mirrors, finishes, vector
-from dockair.sim.camera.occlusion import hidden, is_clear
+from dockair.sim.camera.occlusion import is_clear
 from dockair.sim.camera.round_mirrors import round_spots
 from dockair.sim.camera.sheets import SurfaceParameters
 
@@ -75,9 +76,9 @@ def find_led_reflections(
     pattern = np.maximum(np.maximum(ray @ axis_W / d1, 0.0) ** pattern_exponent, surfaces.led_side_light)
     intensity = np.asarray(intensity_w_sr)[led] * pattern * rows[:, 6] / d1**2
     bright = np.flatnonzero((intensity > 0.0) & (intensity >= limit))
-    starts = rows[:, :3] + rows[:, 8:9] * rows[:, 3:6]
-    seen = bright[~hidden(model, data, p_WC, starts[bright], 0.0)]
-    kept = [i for i in seen if _is_lit(model, data, starts[i], leds_W[led[i]], surfaces.led_seat_m)]
+    rows, intensity, led = rows[bright], intensity[bright], led[bright]
+    seen, starts = starts_of_seen(model, data, p_WC, rows)
+    kept = [i for i in np.flatnonzero(seen) if _is_lit(model, data, starts[i], leds_W[led[i]], surfaces.led_seat_m)]
     return LedReflections(p_W=rows[kept, :3], intensity_w_sr=intensity[kept], led=led[kept])
 
 

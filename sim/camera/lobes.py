@@ -246,6 +246,21 @@ def _strip(low: float, high: float, mean: float, sd: float) -> tuple[float, floa
 
 
 @njit(cache=True)
+def _slopes(spot: Spot, light: Light, eye: Vector) -> tuple[float, float, float, float, float]:
+    """Eq. (2): m1, m2, B11, B12, B22."""
+    p, n, t1, t2, c = spot
+    s, d1 = _unit(_add(light[0], -light[1], p))
+    v, d = _unit(_add(eye, -1.0, p))
+    h, twice = _unit(_add(s, 1.0, v))
+    k, near, hn = 1.0 / twice, light[1] / d1, _dot(h, n)
+    s1, s2, v1, v2 = _dot(s, t1), _dot(s, t2), _dot(v, t1), _dot(v, t2)
+    b11 = c[0] + k * ((1.0 - v1 * v1) / d + (1.0 - s1 * s1) * near)
+    b12 = c[1] - k * (v1 * v2 / d + s1 * s2 * near)
+    b22 = c[2] + k * ((1.0 - v2 * v2) / d + (1.0 - s2 * s2) * near)
+    return _dot(h, t1) / hn, _dot(h, t2) / hn, b11, b12, b22
+
+
+@njit(cache=True)
 def _lobe(spot: Spot, box: Box, light: Light, eye: Vector, finish: Array, cos_grazing: float) -> Lobe:
     """Eqs. (2) to (4).
 

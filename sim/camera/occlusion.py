@@ -36,17 +36,17 @@ def hidden(
     rays = np.asarray(targets_W, dtype=float) - p_WC
     distances = np.linalg.norm(rays, axis=1)
     reach = float(distances.max(initial=0.0))
-    hits = _first_hits(model, data, p_WC, rays / np.maximum(distances, np.finfo(float).tiny)[:, None], reach)
+    hits = first_hits(model, data, p_WC, rays / np.maximum(distances, np.finfo(float).tiny)[:, None], reach)
     return np.asarray((hits >= 0.0) & (hits < distances - clearance_m))
 
 
 def clear_directions(model: mujoco.MjModel, data: mujoco.MjData, p_W: Array, directions: Array) -> NDArray[np.bool_]:
     """(n,) whether nothing visible lies along each of the unit vectors (n, 3) from a point, however far."""
-    return np.asarray(_first_hits(model, data, p_W, np.asarray(directions, dtype=float), _EVERYWHERE) < 0.0)
+    return np.asarray(first_hits(model, data, p_W, np.asarray(directions, dtype=float), _EVERYWHERE) < 0.0)
 
 
-def _first_hits(model: mujoco.MjModel, data: mujoco.MjData, p_W: Array, directions: Array, reach: float) -> Array:
-    """(n,) distances to the nearest surface; -1 for none within reach."""
+def first_hits(model: mujoco.MjModel, data: mujoco.MjData, p_W: Array, directions: Array, reach: float) -> Array:
+    """(n,) distances along unit vectors (n, 3) to the nearest surface [m]; -1 for none within `reach`."""
     n = len(directions)
     distances, geoms = np.full(n, -1.0), np.empty(n, dtype=np.int32)
     if n:

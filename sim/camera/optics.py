@@ -4,9 +4,9 @@ The blur of a point depends on its depth x through 1/x alone, in which the defoc
 linear. Cores [point_spread] are made when they are first needed, at steps of 1/x over which either grows by half a
 pixel, and interpolated by a parabola; `splat` adds them up.
 
-Every pixel is within 0.5 % of the blob's brightest (f/1.4 to f/16, 1 m to infinity, die to 5 mm, diffusion 0.3 px; 1.5 %
-without diffusion). The sum is the electrons given. From f/7 on the first moment is the true position; a faster lens in
-focus is coarsely sampled, and its pixels bend the centroid as real ones do: 0.025 px at f/2.8.
+Every pixel is within 0.7 % of the blob's brightest (f/1.4 to f/16, 1 m to infinity, die to 5 mm, diffusion 0.3 px;
+1.5 % without diffusion). The sum is the electrons given. From f/7 on the first moment is the true position; a faster
+lens in focus is coarsely sampled, and its pixels bend the centroid as real ones do: 0.025 px at f/2.8.
 """
 
 import math
@@ -24,6 +24,7 @@ from dockair.sim.camera.splat import Tables, splat
 
 NEAREST_M: Final = 0.5  #: nearer points are as blurred as at this depth
 _STEP_PX = 0.5  # growth of the disc or of the die's image between two tabulated depths
+_LARGEST_M = 5e-3  # a larger square is drawn as 4, 16, ... squares
 _SIZES = 16  # of sources whose cores are kept
 _EDGE_NODES = 1024
 
@@ -63,21 +64,32 @@ class PointSpread:
             pixels: (n, 2) true (u, v) at the middle of the exposure; outside is allowed, NaN adds nothing.
             electrons: (n,) of each whole blob.
             depth_m: (n,) along the lens's axis; infinity for the Sun's.
-            size_m: side of the sources, 0 for points.
+            size_m: side of the sources, squares that face the lens; 0 for points.
             smear_px: (n, 2) way (du, dv) during the exposure.
         """
-        cores = self._cores.get(size_m)
-        if cores is None:
-            if len(self._cores) == _SIZES:
-                del self._cores[next(iter(self._cores))]
-            cores = self._cores[size_m] = _Cores(self._lens, self._camera, self._sharp, size_m)
-        levels = cores.levels(np.asarray(depth_m, dtype=float))
+        pixels, electrons, depth_m = (np.asarray(a, dtype=float) for a in (pixels, electrons, depth_m))
+        if size_m > _LARGEST_M:
+            side = 2 ** math.ceil(math.log2(size_m / _LARGEST_M))
+            size_m /= side
+            step_px = self._camera.focal_length_px * size_m / np.maximum(depth_m, NEAREST_M)
+            pixels = (pixels[:, None] + step_px[:, None, None] * _grid(side)).reshape(-1, 2)
+            electrons, depth_m = np.repeat(electrons / side**2, side**2), np.repeat(depth_m, side**2)
+            smear_px = np.repeat(smear_px, side**2, axis=0)
+        cores = self._cores_of(size_m)
+        levels = cores.levels(depth_m)
         pixels, electrons, smear_px = (np.ascontiguousarray(a, dtype=float) for a in (pixels, electrons, smear_px))
         splat(image, start, pixels, electrons, smear_px, levels, cores.tables, self._sharp.wing)
 
     def edge_sigma_px(self) -> float:
         """Gaussian equivalent [px] of the blur of the Sun's edge: the same slope in the middle of a straight edge."""
         return self._edge_sigma_px
+
+    def _cores_of(self, size_m: float) -> "_Cores":
+        if size_m not in self._cores:
+            if len(self._cores) == _SIZES:
+                del self._cores[next(iter(self._cores))]
+            self._cores[size_m] = _Cores(self._lens, self._camera, self._sharp, size_m)
+        return self._cores[size_m]
 
     def _edge_sigma(self) -> float:
         """From the line spread at 0, which is the integral of the spectrum along one axis, the pixel's box included."""
@@ -86,6 +98,12 @@ class PointSpread:
         f = (np.arange(_EDGE_NODES) + 0.5) / (_EDGE_NODES * q)
         line = transfer(f, q, blur) * np.exp(-2.0 * (np.pi * d * f) ** 2) * np.sinc(f)
         return 1.0 / (math.sqrt(2.0 * math.pi) * 2.0 * float(line.sum()) / (_EDGE_NODES * q))
+
+
+def _grid(side: int) -> Array:
+    """(side^2, 2) places in a square grid of step 1 about 0."""
+    along = np.arange(side) - 0.5 * (side - 1)
+    return np.stack(np.meshgrid(along, along), axis=-1).reshape(-1, 2)
 
 
 class _Cores:

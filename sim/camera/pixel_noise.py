@@ -7,8 +7,9 @@ All is IEEE single precision, with every fused multiply-add written out and no r
 compiler's vectors, its remainder loops and single pixels give the same bits. The equations are those of `electronics`.
 A row is done with one normal number a pixel; a second pass puts right the pixels near full well, if it has any.
 
-Sources: Steele, Lea & Flood 2014 (SplitMix64); C. Wellons, hash-prospector (lowbias32); polynomials fitted by least
-maximum for this module.
+Not modelled: more than 6.3 standard deviations, where 31 bits end.
+Sources: Steele, Lea & Flood 2014 (SplitMix64); C. Wellons, hash-prospector (lowbias32); the polynomials are minimax
+fits made for this module.
 """
 
 from typing import Any, NamedTuple
@@ -228,7 +229,7 @@ def _row_exact(
             u1 = mix(np.uint32(more ^ np.uint32(0x9E3779B9))) / 4294967296.0
             n = np.float32(poisson_from_uniforms(float(e), bits / 4294967296.0, u1, cdf, guide))
         else:
-            n = np.float32(count_from_normal(e, normal_from_bits(bits)))
+            n = np.float32(count_from_normal(float(e), float(normal_from_bits(bits))))
         m = fma(chain.read_noise_e, normal_from_bits(more), min(n, chain.full_well_e))
         out[i] = _level(m, offset[i], column[i], chain)
 

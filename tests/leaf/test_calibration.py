@@ -56,6 +56,7 @@ def test_distortion_is_opencvs():
     )
     np.testing.assert_allclose(DISTORTED.pixels_from_points(p_C), theirs.reshape(-1, 2), atol=1e-9)
 
+
 SHEET = """focal_length_m = 0.016
 pixel_pitch_m = 5.5e-6
 width_px = 2048

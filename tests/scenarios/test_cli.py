@@ -41,6 +41,7 @@ def a_result(scenario, seed, out, **changes) -> Result:
         "disconnect": None,
         "collided_with": "",
         "truth_navigation": scenario.navigation.is_truth,
+        "background": "mujoco",
         "nav": NAVIGATION,
         "frames": 612,
         "duration_s": 20.0,

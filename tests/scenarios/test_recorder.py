@@ -12,7 +12,7 @@ from dockair.scenarios.recorder import summary_of
 from dockair.scenarios.replay import replay
 from dockair.scenarios.schema import load_scenario
 
-ALWAYS = {"result.json", "flight.parquet", "episode.rrd", "flight.png"}
+ALWAYS = {"result.json", "as_built.json", "flight.parquet", "episode.rrd", "flight.png"}
 REPLAY = {MESSAGES, ESTIMATES, NAVIGATOR}
 TIMES_OF_DAY = ("wall_time_s", "real_time_factor", "out_dir")
 

@@ -111,15 +111,16 @@ def test_between_nodes_the_picture_is_the_radiance() -> None:
     assert _picture(sky, R, X[::16], Y[::16]) == pytest.approx(wanted, rel=1e-3)
 
 
-@pytest.mark.parametrize("start", [(0, 0), (3, 5), (131, 257), (200, 1), (394, 874)])
-def test_a_window_is_the_full_pictures_bit_for_bit(start: tuple[int, int]) -> None:
-    """With broken cloud, camera turned; the windows' sky has seen nothing before."""
+def test_a_window_is_the_full_pictures_bit_for_bit() -> None:
+    """With broken cloud, camera turned; each window's sky has seen nothing before but smaller windows."""
     weather, sun = Weather(cloud_cover=0.6), _toward(8.0)
     R = Rotation.from_euler("ZYX", (3.0, -2.0, 25.0), degrees=True).as_matrix()
-    full, fresh = _picture(_sky(weather, sun), R), _sky(weather, sun)
-    for rows, columns in ((150, 150), (1, 1), (17, 33)):
-        y, x = slice(start[0], start[0] + rows), slice(start[1], start[1] + columns)
-        assert np.array_equal(_picture(fresh, R, X[x], Y[y]), full[y, x])
+    full = _picture(_sky(weather, sun), R)
+    for row, column in ((0, 0), (3, 5), (131, 257), (200, 1), (394, 874)):
+        fresh = _sky(weather, sun)
+        for rows, columns in ((1, 1), (17, 33), (150, 150)):
+            y, x = slice(row, row + rows), slice(column, column + columns)
+            assert np.array_equal(_picture(fresh, R, X[x], Y[y]), full[y, x])
 
 
 def test_the_key_settles_the_clouds_and_nothing_else_does() -> None:
@@ -140,7 +141,7 @@ def test_a_low_sun_behind_broken_cloud_makes_blobs_like_leds() -> None:
     """The whole field, toward the Sun at 5 degrees: above 60 % of full scale at f/8 and 20 us; a clear sky has none."""
     sun = _toward(5.0, 2.0)
     for key in (3, 4, 5):
-        assert _compact_blobs(_picture(_sky(Weather(cloud_cover=0.6), sun, key=key)), 0.6 * FULL_SCALE_E) >= 5
+        assert _compact_blobs(_picture(_sky(Weather(cloud_cover=0.6), sun, key=key)), 0.6 * FULL_SCALE_E) >= 10
     clear = _picture(_sky(Weather(), sun))
     assert WHITE_E * clear.max() < 0.1 * FULL_SCALE_E
 
