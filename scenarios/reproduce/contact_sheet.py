@@ -27,6 +27,7 @@ TITLE = "sixteen frames: Sun, clouds, glints, night, haze, ranges, faults"
 _SETTLING_FRAMES = 8
 _FOUND_WITHIN_PX = 2.0
 _REDUCTION = 4
+_GAMMA = 0.4
 _INSET_MARGIN = 1.6  # ring radii
 
 
@@ -43,7 +44,7 @@ def _sun(azimuth_deg: float, elevation_deg: float) -> dict[str, Any]:
     return {"sun.azimuth_deg": azimuth_deg, "sun.elevation_deg": elevation_deg}
 
 
-_AHEAD = _sun(9.0, 9.0)
+_AHEAD = _sun(-10.0, 8.0)
 SHOTS = (
     Shot(title="30 m", range_m=30.0),
     Shot(title="15 m", range_m=15.0),
@@ -56,7 +57,7 @@ SHOTS = (
     ),
     Shot(title="Sun in view", range_m=10.0, settings=_AHEAD),
     Shot(title="Sun in view, 20 nm band-pass", range_m=10.0, settings=_AHEAD | {"camera.filter": "band_pass"}),
-    Shot(title="low Sun, gaps in cloud", range_m=10.0, settings=_sun(5.0, 6.0) | {"weather.cloud_cover": 0.6}),
+    Shot(title="low Sun, gaps in cloud", range_m=10.0, settings=_sun(-8.0, 5.0) | {"weather.cloud_cover": 0.6}),
     Shot(title="night", range_m=10.0, settings={"weather.night": True}),
     Shot(title="haze, visibility 150 m", range_m=10.0, settings={"weather.visibility_m": 150.0}),
     Shot(
@@ -108,16 +109,15 @@ def _take(shot: Shot) -> tuple[CameraFrame, Array, dict[str, float]]:
 
 
 def _placed(parts: Parts, range_m: float) -> mujoco.MjData:
-    """The world with the receiver moved along its camera's axis until the lens is so far from the ring's centre."""
-    world, camera = parts.world, parts.camera
-    assert camera is not None
+    """The world with the receiver moved until the ring is ahead of its probe, so far from the lens."""
+    world, mounting = parts.world, parts.as_built.mounting
     data = mujoco.MjData(world.model)
     mujoco.mj_copyData(data, world.model, world.data)
-    R_WC, p_WC = camera.pose(data)
-    p_CD = R_WC.T @ (world.truth.p_WD - p_WC)
-    forward = p_CD[0] - np.sqrt(range_m**2 - p_CD[1] ** 2 - p_CD[2] ** 2)
+    p_CP_B = mounting.p_BP - mounting.p_BC
+    ahead_m = np.sqrt(range_m**2 - p_CP_B[1] ** 2 - p_CP_B[2] ** 2) - p_CP_B[0]
+    p_BD_B = mounting.p_BP + np.array([ahead_m, 0.0, 0.0])
     joint = world.model.joint("receiver").qposadr[0]
-    data.qpos[joint : joint + 3] += forward * R_WC[:, 0]
+    data.qpos[joint : joint + 3] = world.truth.p_WD - world.truth.R_WB @ p_BD_B
     mujoco.mj_forward(world.model, data)
     return data
 
@@ -153,7 +153,7 @@ def _draw(frames: list[tuple[str, CameraFrame, Array]], path: Path) -> None:
         axes.set_title(f"{title}, {1e6 * frame.exposure_s:.0f} µs", fontsize=8, pad=2)
         axes.set_axis_off()
         inset = axes.inset_axes((0.0, 0.0, 0.32, 0.6))
-        inset.imshow(_surroundings(frame.pixels, leds_px), cmap="gray", vmin=0, vmax=255, interpolation="nearest")
+        inset.imshow(_surroundings(frame.pixels, leds_px), cmap="gray", vmin=0.0, vmax=1.0, interpolation="nearest")
         inset.set_xticks([])
         inset.set_yticks([])
         for spine in inset.spines.values():
@@ -162,16 +162,20 @@ def _draw(frames: list[tuple[str, CameraFrame, Array]], path: Path) -> None:
 
 
 def _thumbnail(pixels: NDArray[np.uint8]) -> Array:
-    """Brightest of each block, so that a far LED stays, brightened by a square root."""
+    """Brightest of each block, so that a far LED stays, brightened."""
     rows, columns = (n // _REDUCTION for n in pixels.shape)
     blocks = pixels[: rows * _REDUCTION, : columns * _REDUCTION].reshape(rows, _REDUCTION, columns, _REDUCTION)
-    return np.asarray(np.sqrt(blocks.max(axis=(1, 3)) / 255.0))
+    return _brightened(blocks.max(axis=(1, 3)))
 
 
-def _surroundings(pixels: NDArray[np.uint8], leds_px: Array) -> NDArray[np.uint8]:
+def _surroundings(pixels: NDArray[np.uint8], leds_px: Array) -> Array:
     """A square around the ring, black where it leaves the frame."""
     centre = leds_px.mean(axis=0)
     half = int(np.ceil(_INSET_MARGIN * np.linalg.norm(leds_px - centre, axis=1).max())) + 4
     column, row = (round(float(c)) for c in centre)
     padded = np.pad(pixels, half)
-    return padded[row : row + 2 * half, column : column + 2 * half]
+    return _brightened(padded[row : row + 2 * half, column : column + 2 * half])
+
+
+def _brightened(pixels: NDArray[np.uint8]) -> Array:
+    return np.asarray((pixels / 255.0) ** _GAMMA)

@@ -138,6 +138,28 @@ def test_what_stands_outside_the_frustum_is_left_out_and_what_reaches_in_is_not(
 
 
 @pytest.mark.gl
+@pytest.mark.parametrize("edge", [(X[-1], 0.0), (X[0], 0.0), (0.0, Y[-1]), (0.0, Y[0])])
+def test_a_ball_beside_the_picture_is_drawn_as_long_as_a_part_of_it_is_inside(edge: tuple[float, float]) -> None:
+    """Its centre 0.4 radii beyond the edge, then 1.5; ten metres away, 0.5 m in radius."""
+    drawn = DrawnSolids(_beside(edge, 0.4)[0], SUNLIT, BLOCKS_PER_TANGENT, (len(Y), len(X)))
+    counts, shown = [], []
+    for radii in (0.4, 1.5):
+        _, data = _beside(edge, radii)
+        out = np.full((len(Y), len(X)), SKY, dtype=np.float32)
+        drawn.draw(out, data, AT_ORIGIN, X, Y, Haze())
+        counts.append(drawn._scene.ngeom)
+        shown.append((out != SKY).sum())
+    drawn.close()
+    assert counts == [1, 0]
+    assert shown[0] > 300 and shown[1] == 0
+
+
+def _beside(edge: tuple[float, float], radii: float) -> tuple[mujoco.MjModel, mujoco.MjData]:
+    x, y = (10.0 * e + radii * 0.5 * np.sign(e) for e in edge)
+    return _scene({"type": GEOM.mjGEOM_SPHERE, "pos": [10.0, -x, -y], "size": [0.5, 0.0, 0.0]})
+
+
+@pytest.mark.gl
 def test_a_solid_the_lens_stands_in_is_not_seen() -> None:
     drawn, _ = _both(*_scene({"type": GEOM.mjGEOM_ELLIPSOID, "pos": [1.0, 0.0, 0.0], "size": [4.0, 2.0, 2.0]}))
     assert np.all(drawn == SKY)

@@ -96,6 +96,18 @@ def test_mujoco_can_be_imported_where_the_library_asked_for_is_missing(kind: str
 
 
 @needs_linux
+@pytest.mark.parametrize(
+    ("there", "left"), [("libEGL.so.1 libGL.so.1", "egl"), ("libEGL.so.1", "disabled"), ("libGL.so.1", "disabled")]
+)
+def test_egl_needs_its_own_library_and_one_of_opengls(there: str, left: str) -> None:
+    code = (
+        "from dockair.sim import opengl; import os;"
+        f"opengl._loads = {there.split()}.__contains__; opengl.let_mujoco_be_imported(); print(os.environ['MUJOCO_GL'])"
+    )
+    assert _run(code, MUJOCO_GL="egl").stdout.strip() == left
+
+
+@needs_linux
 @pytest.mark.gl
 def test_a_library_that_is_there_stays_chosen() -> None:
     code = (

@@ -236,9 +236,8 @@ def test_a_large_square_holds_its_electrons_where_it_stands() -> None:
     """64 mm at 6 m, 31 px wide."""
     image = _blob(_spread(), (3.3, -2.1), electrons=1e6, depth_m=6.0, size_m=0.064, half=90)
     assert _moments(image)[:3] == pytest.approx((1e6, 3.3, -2.1), rel=1e-5, abs=5e-4)
-    assert image[90 - 2, 90 + 3 - 14 : 90 + 3 + 15] == pytest.approx(
-        1e6 / (0.064 / 6.0 / 5.5e-6 * 0.016) ** 2, rel=0.03
-    )
+    plateau = 1e6 / (0.016 / 5.5e-6 * 0.064 / 6.0) ** 2
+    assert image[88, 93 - 11 : 93 + 12] == pytest.approx(plateau, rel=0.02)  # the wings carry 1 % over the edge
 
 
 @pytest.mark.parametrize("depth_m,size_m", [(3.0, 5e-3), (1.5, 3e-3)])

@@ -11,7 +11,7 @@ from dockair.sim.camera.solids import VISIBLE_GROUPS, Haze, Lighting
 from dockair.sim.camera.traced import TracedSolids
 
 AT_ORIGIN = (np.eye(3), np.zeros(3))
-X, Y = np.linspace(-0.4, 0.4, 81), np.linspace(-0.25, 0.25, 51)
+X, Y = np.arange(-40, 41) / 100.0, np.arange(-25, 26) / 100.0
 SKY = -1.0
 GEOM = mujoco.mjtGeom
 KINDS = {
@@ -132,13 +132,16 @@ def test_a_solid_around_the_lens_or_behind_it_is_not_seen(kind: str) -> None:
     assert np.all(_draw(behind, data) == SKY)
 
 
+@pytest.mark.parametrize("up", [1.0, -1.0])
 @pytest.mark.parametrize("kind", ["capsule", "cylinder"])
-def test_a_tube_seen_along_its_axis_shows_its_end(kind: str) -> None:
-    """The middle ray runs along the axis exactly; the lens stands inside the endless tube."""
-    model, data = _scene(_geom(kind, [5.0, 0.0, 0.0], (0.0, np.pi / 2, 0.0)))
-    clear = _draw(model, data, haze=Haze(extinction_1_m=0.1))
+def test_a_tube_seen_along_its_axis_shows_its_end(kind: str, up: float) -> None:
+    """The middle ray runs along the axis to the bit, as the camera looks along z; the lens is in the endless tube."""
+    look_along_z = np.array([[0.0, 0.0, -up], [0.0, 1.0, 0.0], [up, 0.0, 0.0]])
+    model, data = _scene(_geom(kind, [0.0, 0.0, 5.0 * up]))
+    clear = _draw(model, data, haze=Haze(extinction_1_m=0.1), pose=(look_along_z, np.zeros(3)))
     radius, half = KINDS[kind][1][:2]
     nearest = 5.0 - half - (radius if kind == "capsule" else 0.0)
+    assert X[40] == Y[25] == 0.0
     assert -np.log(clear[25, 40]) / 0.1 == pytest.approx(nearest, rel=1e-6)
     assert (clear[25] > 0.0).sum() == pytest.approx(2.0 * radius / (5.0 - half) / (X[1] - X[0]), abs=1.5)
 
