@@ -58,7 +58,7 @@ class Dirt:
     def over(self, shape: tuple[int, int], first: tuple[int, int]) -> Array:
         """(rows, columns) transmittance of a patch of pixels whose first one is at (row, column) on the sensor."""
         rows, columns = np.indices(shape)
-        pixels = np.column_stack([columns.ravel() + first[1], rows.ravel() + first[0]])
+        pixels = np.column_stack([columns.ravel() + first[1], rows.ravel() + first[0]]).astype(float)
         return self.at(pixels).reshape(shape)
 
 

@@ -114,7 +114,8 @@ def test_result_json_has_the_documented_keys(hand_made, tmp_path):
     written = json.loads(result.write(tmp_path).read_text())
     assert list(written) == [
         "schema_version", "scenario", "seed", "outcome", "attempts", "contact", "hold", "disconnect", "collided_with",
-        "truth_navigation", "background", "nav", "frames", "duration_s", "real_time_factor", "wall_time_s", "versions", "out_dir",
+        "truth_navigation", "background", "nav", "frames", "duration_s", "real_time_factor", "wall_time_s", "versions",
+        "out_dir",
     ]  # fmt: skip
     assert list(written["contact"]) == ["time_s", "radial_offset_m", "closure_speed_m_s", "angle_deg"]
     assert written["real_time_factor"] == pytest.approx(0.1)

@@ -76,7 +76,7 @@ def small_world() -> SmallWorld:
 
 @pytest.fixture(params=[pytest.param("mujoco", marks=pytest.mark.gl), "analytic"])
 def make_camera(request: pytest.FixtureRequest) -> Iterator[Callable[..., tuple[SmallWorld, NearInfraredCamera]]]:
-    """make_camera(sun_W=None, seed=77, faults=(), overrides={}, hub=True, **more of NearInfraredCamera) -> world, camera.
+    """make_camera(sun_W, seed, faults, overrides, hub, **more of NearInfraredCamera) -> world, camera.
 
     Once with each background. The drogue is 8 m ahead of the lens; the exposure is fixed.
     """
