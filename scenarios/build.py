@@ -26,6 +26,7 @@ from dockair.sim.aircraft.receiver import Receiver
 from dockair.sim.aircraft.trim import level_trim
 from dockair.sim.as_built import AsBuilt, AsBuiltParameters, draw_as_built
 from dockair.sim.camera.camera import CameraNoise, CameraSheets, NearInfraredCamera
+from dockair.sim.camera.readout import shortest_period_s
 from dockair.sim.camera.sheets import LedParameters
 from dockair.sim.camera.sky import Weather
 from dockair.sim.faults import Faults
@@ -253,9 +254,10 @@ def _as_built(scenario: Scenario, seed: int, sheets: NavigationSheets) -> AsBuil
 
 
 def _camera(scenario: Scenario, seed: int, as_built: AsBuilt, faults: Faults, world: World) -> NearInfraredCamera:
-    table, weather = scenario.camera, scenario.weather
+    table, weather, sheets = scenario.camera, scenario.weather, camera_sheets(scenario)
+    _check_camera_rate(scenario.rates.camera_hz, as_built.camera, sheets)
     return NearInfraredCamera(
-        camera_sheets(scenario),
+        sheets,
         as_built,
         CameraNoise.of(seed),
         world.model,
@@ -271,6 +273,17 @@ def _camera(scenario: Scenario, seed: int, as_built: AsBuilt, faults: Faults, wo
         automatic_exposure=table.exposure == "auto",
         background=table.background,
     )
+
+
+def _check_camera_rate(camera_hz: int, camera: Camera, sheets: CameraSheets) -> None:
+    """A full frame must be read before the next: the navigation may ask for one at any time."""
+    longest_s = sheets.exposure.longest_s
+    highest_hz = 1.0 / shortest_period_s(camera.height_px, sheets.sensor, longest_s)
+    if camera_hz > highest_hz:
+        expected = (
+            f"a rate up to {highest_hz:.0f} Hz, at which the sensor's {sheets.sensor.outputs} outputs read full frames"
+        )
+        raise DockairError("rates.camera_hz", expected=expected, got=camera_hz)
 
 
 def camera_sheets(scenario: Scenario) -> CameraSheets:

@@ -24,7 +24,9 @@ _TRUTH_VECTORS = {
     "p_WB": ("p_WB", "m"),
     "v_WB": ("v_WB", "m_s"),
     "w_WB_B": ("w_WB_B", "rad_s"),
+    "alpha_WB_B": ("alpha_WB_B", "rad_s2"),
     "a_WB": ("a_WB", "m_s2"),
+    "specific_force_B": ("specific_force_B", "m_s2"),
     "p_WP": ("p_WP", "m"),
     "v_WP": ("v_WP", "m_s"),
     "p_WD": ("p_WD", "m"),
@@ -48,13 +50,15 @@ class FlightLog:
         self.truths: list[Truth] = []
         self.solutions: list[NavSolution] = []
         self.imu: list[tuple[ImuSample, ...]] = []
+        self.exposures_s: list[float] = []  #: of the frame that arrived, NaN where none did
         self.frames = 0
 
     def append(self, truth: Truth, imu: Sequence[ImuSample], frame: CameraFrame | None, solution: NavSolution) -> None:
-        """Take one control tick; of the frame, that there was one."""
+        """Take one control tick; of the frame, that there was one and how long it was exposed."""
         self.truths.append(truth)
         self.imu.append(tuple(imu))
         self.solutions.append(solution)
+        self.exposures_s.append(float("nan") if frame is None else frame.exposure_s)
         self.frames += frame is not None
 
     def columns(self) -> dict[str, Any]:
@@ -65,7 +69,7 @@ class FlightLog:
             "tick": np.array([truth.tick for truth in self.truths]),
             "time_s": np.array([truth.time_s for truth in self.truths]),
         }
-        return columns | self._truth_columns() | self._nav_columns() | self._gyro_columns()
+        return columns | self._truth_columns() | self._nav_columns() | self._sensor_columns()
 
     def write_parquet(self, out_dir: str | Path) -> Path:
         """Write `flight.parquet` into a folder and return its path."""
@@ -109,10 +113,12 @@ class FlightLog:
         columns |= _components("command_acceleration", "m_s2", [s.command.acceleration_m_s2 for s in solutions])
         return columns
 
-    def _gyro_columns(self) -> dict[str, Any]:
+    def _sensor_columns(self) -> dict[str, Any]:
         none = np.full(3, np.nan)
-        newest = [samples[-1].angular_rate_rad_s if samples else none for samples in self.imu]
-        return dict(_components("gyro_w_WI_I", "rad_s", newest))
+        rates = [samples[-1].angular_rate_rad_s if samples else none for samples in self.imu]
+        forces = [samples[-1].specific_force_m_s2 if samples else none for samples in self.imu]
+        columns = dict(_components("gyro_w_WI_I", "rad_s", rates))
+        return columns | _components("accelerometer_f_I", "m_s2", forces) | {"camera_exposure_s": self.exposures_s}
 
 
 def standard_deviations(solutions: Sequence[NavSolution]) -> Array:

@@ -79,7 +79,8 @@ def _plots() -> Any:
         plot("lateral", "Ring off the probe's line [m]"),
         plot("closing", "Closing speed [m/s]"),
         rrb.Tabs(
-            plot("gyro", "Gyro [deg/s]"), plot("reel", "Hose taken in [m]"), plot("tension", "Hose tension [N]"),
+            plot("gyro", "Gyro [deg/s]"), plot("accelerometer", "Specific force [m/s^2]"),
+            plot("exposure", "Exposure [us]"), plot("reel", "Hose taken in [m]"), plot("tension", "Hose tension [N]"),
             rrb.TextDocumentView(origin="summary", name="Result"), active_tab=0,
         ),
     )  # fmt: skip

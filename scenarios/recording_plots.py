@@ -39,6 +39,7 @@ def plot_series(log: FlightLog) -> Mapping[str, tuple[str, Sequence[int], Array]
     bound_mm = 3e3 * sigma[:, 3:6]
     none = np.full(3, np.nan)
     gyro = np.degrees([imu[-1].angular_rate_rad_s if imu else none for imu in log.imu])
+    force = np.array([imu[-1].specific_force_m_s2 if imu else none for imu in log.imu])
     series: dict[str, tuple[str, Sequence[int], Array]] = {
         "range/truth": ("truth", TRUTH, p_true[:, 0]),
         "range/belief": ("belief", BELIEF, p_nav[:, 0]),
@@ -59,7 +60,16 @@ def plot_series(log: FlightLog) -> Mapping[str, tuple[str, Sequence[int], Array]
     series["lateral_error/lower"] = ("-3 sigma", _SIGMA, -bound_mm[:, 1:].max(axis=1))
     for axis, label in enumerate(("roll", "pitch, nose down", "yaw, left")):
         series[f"gyro/{'xyz'[axis]}"] = (label, AXES[axis], gyro[:, axis])
+    for axis, label in enumerate(("forward", "left", "up")):
+        series[f"accelerometer/{'xyz'[axis]}"] = (label, AXES[axis], force[:, axis])
+    series["exposure/exposure"] = ("exposure", TRUTH, _held(1e6 * np.array(log.exposures_s)))
     return series
+
+
+def _held(values: Array) -> Array:
+    """(n,) each NaN replaced by the last value before it."""
+    newest = np.maximum.accumulate(np.where(np.isfinite(values), np.arange(len(values)), 0))
+    return values[newest]
 
 
 def _shade(colour: Sequence[int], axis: int) -> list[int]:

@@ -14,8 +14,8 @@ off by a quarter of a block at most, up to a radius of 100 blocks. The meshes' r
 outline is right in the mean. What lies outside the frustum is left out.
 
 The scene is shifted so that the lens is its origin, in double precision, before OpenGL's single precision sees it.
-Not modelled: more than 256 grey levels, more than one sample a block (edges are steps of a block), the round ends of
-capsules thinner than a block.
+Not modelled: more than 256 grey levels, more than one sample a block (edges are steps of a block). Capsules up to twelve
+blocks thick have flat ends of the round ones' area.
 """
 
 import ctypes
@@ -32,7 +32,8 @@ from dockair.sim.camera.solids import BALL, BOX, CAPSULE, Haze, Lighting, Solids
 from dockair.sim.camera.unit_meshes import BALLS, CUBE, ENDS, LEVELS, TUBES, unit_meshes
 from dockair.sim.off_screen import Canvas
 
-_ROUND_END_BLOCKS = 1.0  # radius from which a capsule gets its round ends
+_ROUND_END_BLOCKS = 6.0  # radius from which a capsule gets its round ends
+_FLAT_END = 0.25 * math.pi  # length of a flat end that covers the area of a round one, in radii
 _HALF_LEVEL = 128  # of 256: blue is 0 or 255
 
 
@@ -204,7 +205,8 @@ def _pieces(
         ends = 3 if kind == CAPSULE and radius >= _ROUND_END_BLOCKS else 1
         for part in range(ends):
             side = 1.0 if part < 2 else -1.0  # of a capsule's end; the lower one is the upper one turned about x
-            size = (h[0], h[1], h[2]) if part == 0 else (h[0], side * h[0], side * h[0])
+            length = h[2] + _FLAT_END * h[0] if kind == CAPSULE and ends == 1 else h[2]
+            size = (h[0], h[1], length) if part == 0 else (h[0], side * h[0], side * h[0])
             offset = 0.0 if part == 0 else side * h[2]
             if kind == BOX:
                 meshes[count] = CUBE

@@ -311,7 +311,7 @@ def test_polished_ribs_and_coupling_show_the_leds_and_dull_ones_do_not(make_worl
     assert len(dull.p_W) > 0
 
 
-def test_a_dark_ring_reflects_nothing(make_world) -> None:
+def test_a_dark_led_reflects_nothing() -> None:
     world = _world(_sphere(np.array([4.0, 0.0, 0.0]), 0.2))
     led = np.array([[3.0, 1.5, 0.0]])
     found = find_led_reflections(*world, Mirrors.of(world[0]), EYE, led, AFT, np.zeros(1), 2.6, IDEAL)
