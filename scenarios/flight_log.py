@@ -117,8 +117,10 @@ class FlightLog:
         none = np.full(3, np.nan)
         rates = [samples[-1].angular_rate_rad_s if samples else none for samples in self.imu]
         forces = [samples[-1].specific_force_m_s2 if samples else none for samples in self.imu]
-        columns = dict(_components("gyro_w_WI_I", "rad_s", rates))
-        return columns | _components("accelerometer_f_I", "m_s2", forces) | {"camera_exposure_s": self.exposures_s}
+        columns: dict[str, Any] = {"camera_exposure_s": self.exposures_s}
+        columns |= _components("gyro_w_WI_I", "rad_s", rates)
+        columns |= _components("accelerometer_f_I", "m_s2", forces)
+        return columns
 
 
 def standard_deviations(solutions: Sequence[NavSolution]) -> Array:

@@ -44,7 +44,7 @@ def ellipsoid_spots(
             M, at = xmat[g], (xpos[g, 0], xpos[g, 1], xpos[g, 2])
             light = _into(M, _add((lights[j, 0], lights[j, 1], lights[j, 2]), -point, at))
             found, p, n, t1, t2, c = _on_ellipsoid(axes, light, point, _into(M, _add(eye, -1.0, at)))
-            if found:
+            if found and abs(n[balls.thin[i]]) <= balls.most_cos[i]:
                 out = spots[count]
                 _write(out, _add(at, 1.0, _out_of(M, p)), _out_of(M, n), _out_of(M, t1), _out_of(M, t2), c)
                 out[19], out[20], out[21] = balls.material[i], _SKIN_M, j

@@ -14,8 +14,8 @@ off by a quarter of a block at most, up to a radius of 100 blocks. The meshes' r
 outline is right in the mean. What lies outside the frustum is left out.
 
 The scene is shifted so that the lens is its origin, in double precision, before OpenGL's single precision sees it.
-Not modelled: more than 256 grey levels, more than one sample a block (edges are steps of a block). Capsules up to twelve
-blocks thick have flat ends of the round ones' area.
+Not modelled: more than 256 grey levels, more than one sample a block (edges are steps of a block). Capsules up to
+twelve blocks thick have flat ends of the round ones' area.
 """
 
 import ctypes
@@ -34,6 +34,7 @@ from dockair.sim.off_screen import Canvas
 
 _ROUND_END_BLOCKS = 6.0  # radius from which a capsule gets its round ends
 _FLAT_END = 0.25 * math.pi  # length of a flat end that covers the area of a round one, in radii
+_NEAR = 4  # which of the frustum's planes
 _HALF_LEVEL = 128  # of 256: blue is 0 or 255
 
 
@@ -137,12 +138,13 @@ class DrawnSolids:
         """Put into the scene what may be seen; return how many pieces that is."""
         s = self._solids
         centres, axes = data.geom_xpos[s.geoms] - p_WC, data.geom_xmat[s.geoms].reshape(-1, 3, 3)
-        solids = s.kinds, s.half_sizes_m, s.bounds_m, s.reflectances
+        near, far = self._limits_m
+        left, right, top, bottom = frustum
+        outward_C = [[left, 1, 0], [-right, -1, 0], [top, 0, 1], [-bottom, 0, -1], [-1, 0, 0], [1, 0, 0]]
+        planes = np.column_stack([outward_C @ R_WC.T, [0.0, 0.0, 0.0, 0.0, -near, far]])
         meshes = np.empty_like(self._meshes)
-        count = _pieces(
-            solids, centres, axes, R_WC, frustum, self._limits_m, self._scale,
-            (meshes, self._places, self._turns, self._colours),
-        )  # fmt: skip
+        pieces = meshes, self._places, self._turns, self._colours
+        count = _pieces((s.kinds, s.half_sizes_m, s.reflectances), centres, axes, planes, self._scale, pieces)
         for i in np.flatnonzero(meshes[:count] != self._meshes[:count]):
             self._geoms[i].dataid = 2 * int(meshes[i])  # MuJoCo counts each mesh and its convex hull
         self._meshes[:count] = meshes[:count]
@@ -173,41 +175,35 @@ def _all(geoms: list[Any], name: str, shape: tuple[int, ...]) -> NDArray[np.floa
 
 @njit(cache=True)
 def _pieces(
-    solids: tuple[NDArray[np.int64], Array, Array, Array],
+    solids: tuple[NDArray[np.int64], Array, Array],
     centres: Array,
     axes: Array,
-    R_WC: Array,
-    frustum: Array,
-    limits: tuple[float, float],
+    planes: Array,
     scale: float,
     pieces: tuple[NDArray[np.int64], NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]],
 ) -> int:
-    """Fill (mesh, place, turn, colour) of the pieces of what the frustum may hold; return how many."""
-    kinds, half_sizes, bounds, reflectances = solids
+    """Fill (mesh, place, turn, colour) of the pieces of what may be in the frustum; return how many.
+
+    Planes are (outward normal, offset), the last two being the near and the far one.
+    """
+    kinds, half_sizes, reflectances = solids
     meshes, places, turns, colours = pieces
     count = 0
     for g in range(kinds.shape[0]):
-        depth, left, up = 0.0, 0.0, 0.0
-        for k in range(3):
-            depth += R_WC[k, 0] * centres[g, k]
-            left += R_WC[k, 1] * centres[g, k]
-            up += R_WC[k, 2] * centres[g, k]
-        bound = bounds[g]
-        if depth + bound < limits[0] or depth - bound > limits[1]:
+        kind, h, M = kinds[g], half_sizes[g], axes[g]
+        if _is_outside(kind, h, M, centres[g], planes):
             continue
-        if _beyond(-left, depth, frustum[0], frustum[1], bound) or _beyond(-up, depth, frustum[2], frustum[3], bound):
-            continue
-        kind, h = kinds[g], half_sizes[g]
-        radius = scale * (max(h[0], h[1], h[2]) if kind == BALL else h[0]) / max(depth - bound, limits[0])
+        depth = -_along(planes[_NEAR], centres[g]) - _reach(kind, h, M, planes[_NEAR])
+        radius = scale * (max(h[0], h[1], h[2]) if kind == BALL else h[0]) / max(depth, -planes[_NEAR, 3])
         level = 0
         while level < LEVELS.shape[0] - 1 and radius > LEVELS[level]:
             level += 1
         ends = 3 if kind == CAPSULE and radius >= _ROUND_END_BLOCKS else 1
         for part in range(ends):
             side = 1.0 if part < 2 else -1.0  # of a capsule's end; the lower one is the upper one turned about x
+            offset = 0.0 if part == 0 else side * h[2]
             length = h[2] + _FLAT_END * h[0] if kind == CAPSULE and ends == 1 else h[2]
             size = (h[0], h[1], length) if part == 0 else (h[0], side * h[0], side * h[0])
-            offset = 0.0 if part == 0 else side * h[2]
             if kind == BOX:
                 meshes[count] = CUBE
             elif part > 0:
@@ -215,20 +211,41 @@ def _pieces(
             else:
                 meshes[count] = (BALLS if kind == BALL else TUBES) + level
             for k in range(3):
-                places[count, k] = centres[g, k] + offset * axes[g, k, 2]
+                places[count, k] = centres[g, k] + offset * M[k, 2]
                 for axis in range(3):
-                    turns[count, k, axis] = axes[g, k, axis] * size[axis]
+                    turns[count, k, axis] = M[k, axis] * size[axis]
             colours[count, 0], colours[count, 1], colours[count, 2], colours[count, 3] = reflectances[g], 0.0, 1.0, 1.0
             count += 1
     return count
 
 
 @njit(cache=True)
-def _beyond(across: float, depth: float, low: float, high: float, bound: float) -> bool:
-    """Whether a ball lies outside one pair of the frustum's side planes."""
-    return (across - low * depth < -bound * math.sqrt(1.0 + low * low)) or (
-        across - high * depth > bound * math.sqrt(1.0 + high * high)
-    )
+def _is_outside(kind: int, h: Array, M: Array, centre: Array, planes: Array) -> bool:
+    """Whether a solid lies wholly beyond one of the planes."""
+    for k in range(planes.shape[0]):
+        if _along(planes[k], centre) - planes[k, 3] > _reach(kind, h, M, planes[k]):
+            return True
+    return False
+
+
+@njit(cache=True)
+def _along(plane: Array, p: Array) -> float:
+    return plane[0] * p[0] + plane[1] * p[1] + plane[2] * p[2]
+
+
+@njit(cache=True)
+def _reach(kind: int, h: Array, M: Array, plane: Array) -> float:
+    """How far a solid reaches from its centre along a plane's normal, in units of the normal's length."""
+    x = abs(M[0, 0] * plane[0] + M[1, 0] * plane[1] + M[2, 0] * plane[2])
+    y = abs(M[0, 1] * plane[0] + M[1, 1] * plane[1] + M[2, 1] * plane[2])
+    z = abs(M[0, 2] * plane[0] + M[1, 2] * plane[1] + M[2, 2] * plane[2])
+    if kind == BALL:
+        return math.sqrt((h[0] * x) ** 2 + (h[1] * y) ** 2 + (h[2] * z) ** 2)
+    if kind == BOX:
+        return h[0] * x + h[1] * y + h[2] * z
+    if kind == CAPSULE:
+        return h[2] * z + h[0] * math.sqrt(x * x + y * y + z * z)
+    return h[2] * z + h[0] * math.sqrt(x * x + y * y)
 
 
 @njit(cache=True)

@@ -75,13 +75,13 @@ def starts_of_seen(
     """(n,) which of the patches the lens sees, (n, 3) a little above them, where rays to the light start.
 
     Their middles are on the surface to second order only, and the drawn rim has corners: what the line of sight meets
-    within half a patch of the middle is the surface itself.
+    within a sixth of a patch of the middle is the surface itself.
     """
     ray = rows[:, :3] - p_WC
     distance = np.linalg.norm(ray, axis=1)
     direction = ray / np.maximum(distance, np.finfo(float).tiny)[:, None]
     hit = first_hits(model, data, p_WC, direction, float(distance.max(initial=0.0) + 1.0))
-    slack = rows[:, 8] + 0.5 * rows[:, 7]
+    slack = rows[:, 8] + rows[:, 7] / 6.0
     on_surface = np.where((hit >= 0.0) & (np.abs(hit - distance) < slack), hit, distance)
     starts = p_WC + on_surface[:, None] * direction + rows[:, 8:9] * rows[:, 3:6]
     return (hit < 0.0) | (hit > distance - slack), starts

@@ -118,13 +118,14 @@ def facet_rows(
         g, frame = facets.geom[i], facets.frame[i]
         n, at = _turned(xmat[g], frame[1]), _turned(xmat[g], frame[0])
         p = (xpos[g, 0] + at[0], xpos[g, 1] + at[1], xpos[g, 2] + at[2])
-        h, _ = _unit(_add(_unit(_add(eye, -1.0, p))[0], 1.0, sun))
-        if _dot(n, h) < _STEEPEST:
-            continue
-        half = facets.half[i]
+        v, d = _unit(_add(eye, -1.0, p))
+        h, twice = _unit(_add(v, 1.0, sun))
+        hn, half, finish = _dot(n, h), facets.half[i], finishes[facets.material[i]]
+        bend = facets.bend[i] + 2.0 * (half[0] + half[1]) / (d * twice)
+        if hn < _STEEPEST or 1.0 / hn**2 - 1.0 > (6.0 * finish[3] + bend + 6.0 * math.sqrt(sun_variance) / twice) ** 2:
+            continue  # out of the lobe's reach
         spot = (p, n, _turned(xmat[g], frame[2]), _turned(xmat[g], frame[3]), _vector(facets.curvature[i], 0))
         box = (-half[0], half[0], -half[1], half[1])
-        finish = finishes[facets.material[i]]
         lobe = _lobe(spot, box, light, eye, finish, limits[0])
         if lobe[0] == 0.0:
             continue

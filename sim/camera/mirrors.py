@@ -6,12 +6,14 @@
     rim       the basket's rim, which the scene draws as straight capsules, as one torus
 
 An ellipsoid with half-axes a >= b >= c is flat when its middle is so little curved that a rough surface's slopes reach
-as far as the body does; then no single point stands for the glint and it is cut into tiles.
+as far as the body does; then no single point stands for the glint of its two sides, and they are cut into tiles. Its
+edge remains a ball.
 
 A material follows from the geom's name. Not modelled: meshes, planes, height fields.
 Sources: do Carmo, Differential Geometry of Curves and Surfaces, section 3-3 (second fundamental form of a tile).
 """
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -31,7 +33,8 @@ _NEAR_LEDS = ("basket_rib", "coupling_", "probe_")  # what the LEDs shine on fro
 _FLAT_RATIO = 10.0  # of an ellipsoid's longest to its shortest half-axis
 _TILE_M = 0.5  # tiles of flat faces are no longer than this, up to _MOST_TILES a side
 _MOST_TILES = 12
-_TILES_ALONG, _TILES_AROUND = 20, 16  # of a flat ellipsoid
+_TILES_ALONG, _TILES_AROUND = 20, 32  # of a flat ellipsoid
+_EDGE_COS = math.cos(0.4)  # of the angle between normal and thin axis where its edge begins
 _THINNEST_M = 0.02  # faces narrower than this are edges
 _SKIN_M = 1e-3  # a ray that starts on a surface starts this far off it
 
@@ -49,6 +52,8 @@ class Balls(NamedTuple):
     axes: Array  #: (n, 3) half-axes [m]
     at_z: Array  #: (n,) [m]
     side: Array  #: (n,) 0 for the whole ball; 1 or -1 for the half toward z or -z
+    thin: NDArray[np.int64]  #: (n,) the shortest axis
+    most_cos: Array  #: (n,) no glint where the normal is nearer than this to the thin axis; 2 for none such
 
 
 class Tubes(NamedTuple):
@@ -68,6 +73,7 @@ class Facets(NamedTuple):
     frame: Array  #: (n, 4, 3) centre [m], normal, and the two tangents along the sides
     half: Array  #: (n, 2) half sides [m]
     curvature: Array  #: (n, 3) 11, 12, 22 of the second fundamental form, positive for convex [1/m]
+    bend: Array  #: (n,) how much the slope may differ from the middle's
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -170,7 +176,7 @@ def _balls(model: mujoco.MjModel, i: int) -> list[tuple[Array, float, float]]:
     kind, size = model.geom_type[i], np.array(model.geom_size[i])
     if kind == _G.mjGEOM_SPHERE:
         return [(np.full(3, size[0]), 0.0, 0.0)]
-    if kind == _G.mjGEOM_ELLIPSOID and not _is_flat(size):
+    if kind == _G.mjGEOM_ELLIPSOID:
         return [(size, 0.0, 0.0)]
     if kind == _G.mjGEOM_CAPSULE:
         return [(np.full(3, size[0]), side * size[1], side) for side in (1.0, -1.0)]
@@ -233,6 +239,8 @@ def _ellipsoid_tiles(axes: Array) -> list[Tile]:
             along_a = np.cos(b) * (-np.sin(a) * thin + np.cos(a) * across)
             gradient = p / axes**2
             n = gradient / np.linalg.norm(gradient)
+            if abs(n[order[2]]) < _EDGE_COS:
+                continue
             t1 = along_b / np.linalg.norm(along_b)
             t2 = np.cross(n, t1)
             area = float(np.linalg.norm(np.cross(along_a, along_b))) * step_a * step_b
@@ -244,7 +252,10 @@ def _ellipsoid_tiles(axes: Array) -> list[Tile]:
 
 def _ball_table(rows: list[tuple[int, int, Array, float, float]]) -> Balls:
     geom, material, axes, at_z, side = zip(*rows, strict=True) if rows else ((),) * 5
-    return Balls(_index(geom), _index(material), np.reshape(axes, (-1, 3)).astype(float), _real(at_z), _real(side))
+    table = np.reshape(axes, (-1, 3)).astype(float)
+    thin = [int(np.argmin(a)) for a in table]
+    most_cos = [_EDGE_COS if _is_flat(a) else 2.0 for a in table]
+    return Balls(_index(geom), _index(material), table, _real(at_z), _real(side), _index(thin), _real(most_cos))
 
 
 def _tube_table(rows: list[tuple[int, int, float, float]]) -> Tubes:
@@ -254,13 +265,10 @@ def _tube_table(rows: list[tuple[int, int, float, float]]) -> Tubes:
 
 def _facet_table(rows: list[tuple[int, int, Array, tuple[float, float], Vector]]) -> Facets:
     geom, material, frame, half, curvature = zip(*rows, strict=True) if rows else ((),) * 5
-    return Facets(
-        _index(geom),
-        _index(material),
-        np.reshape(frame, (-1, 4, 3)).astype(float),
-        np.reshape(half, (-1, 2)).astype(float),
-        np.reshape(curvature, (-1, 3)).astype(float),
-    )
+    sides = np.reshape(half, (-1, 2)).astype(float)
+    C = np.reshape(curvature, (-1, 3)).astype(float)
+    bend = np.abs(C[:, [0, 1, 1, 2]]).sum(axis=1) * sides.sum(axis=1)
+    return Facets(_index(geom), _index(material), np.reshape(frame, (-1, 4, 3)).astype(float), sides, C, bend)
 
 
 def _index(values: object) -> NDArray[np.int64]:

@@ -41,7 +41,6 @@ class Solids:
     geoms: NDArray[np.intp]  #: (n,) their numbers in the model
     kinds: NDArray[np.int64]  #: (n,)
     half_sizes_m: Array  #: (n, 3) half extents along their own axes; capsule: of its cylinder
-    bounds_m: Array  #: (n,) radius of the sphere around each
     reflectances: Array  #: (n,)
 
     @classmethod
@@ -73,7 +72,6 @@ class Solids:
                     np.where(spheres, size[:, 0], np.where(round_about_z, size[:, 1], size[:, 2])),
                 ]
             ),
-            bounds_m=np.array(model.geom_rbound[geoms]),
             reflectances=np.array(model.geom_rgba[geoms, 0], dtype=float),
         )
 

@@ -111,7 +111,7 @@ def test_the_navigation_is_not_told_of_a_changed_drogue():
 
 def test_a_camera_faster_than_its_sensor_can_be_read_is_refused_with_both_rates():
     slow = {"parameters.sensor.outputs": 2, "rates.camera_hz": 50}
-    with pytest.raises(DockairError, match=r"rates.camera_hz: expected a rate up to 42 Hz, .* 2 outputs .*, got 50"):
+    with pytest.raises(DockairError, match=r"rates.camera_hz: expected a rate up to 43 Hz, .* 2 outputs .*, got 50"):
         build(load_scenario("still_air", slow), 0)
     fast = {"rates.physics_hz": 1800, "rates.gyro_hz": 450, "rates.control_hz": 180, "rates.camera_hz": 180}
     parts = build(load_scenario("still_air", fast), 0)

@@ -74,3 +74,20 @@ def test_the_line_is_850_nm_and_nearly_all_electrons_come_from_the_band(band):
     assert row["ours"]["led_wavelength_nm"] == pytest.approx(row["reference"]["led_wavelength_nm"])
     assert row["ours"]["band_from_nm"] == pytest.approx(row["reference"]["band_from_nm"], abs=10.0)
     assert row["ours"]["band_to_nm"] == pytest.approx(row["reference"]["band_to_nm"], abs=50.0)
+
+
+@pytest.mark.slow
+@pytest.mark.gl
+def test_the_contact_sheet_shows_in_figures_what_its_titles_say(tmp_path):
+    sheet = registry.reproduce("sensor/contact-sheet", tmp_path)
+    shot = {row["case"]: row["ours"] for row in sheet["rows"]}
+    assert len(shot) == 16 and cv2.imread(str(tmp_path / "sensor-contact-sheet.png")).std() > 10.0
+    for case in ("6 m, Sun behind", "2.5 m", "Sun abeam", "night", "haze, visibility 150 m"):
+        assert shot[case]["leds_found"] == shot[case]["leds_visible"] == 8, case
+    exposures = [shot[case]["exposure_us"] for case in ("30 m", "15 m", "6 m, Sun behind", "2.5 m")]
+    assert exposures == sorted(exposures, reverse=True) and exposures[-1] == pytest.approx(14.0)
+    assert shot["night"]["background_dn"] <= 3 and shot["night"]["other_blobs"] == 0
+    assert shot["low Sun, gaps in cloud"]["other_blobs"] > 30
+    assert shot["LEDs 1 and 2 off, 5 dim"]["leds_found"] <= 6
+    assert shot["exposure stuck at 500 µs"]["exposure_us"] == pytest.approx(500.0)
+    assert shot["Sun in view"]["background_dn"] > 1.5 * shot["Sun in view, 20 nm band-pass"]["background_dn"]
