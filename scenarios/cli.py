@@ -11,12 +11,15 @@ import os
 import sys
 from enum import Enum
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 import dockair
 from dockair.errors import DockairError
+
+if TYPE_CHECKING:
+    from dockair.scenarios.schema import Scenario
 
 app = typer.Typer(
     name="dockair",
@@ -68,15 +71,13 @@ def fly(
     as_json: Json = False,
 ) -> None:
     """Fly a scenario and write result.json and episode.rrd."""
-    from dockair.scenarios.doctor import require_rendering
     from dockair.scenarios.output import FlightProgress, show_result
     from dockair.scenarios.output_folder import check_output_folder, default_output_folder
     from dockair.scenarios.schema import load_scenario
 
     chosen = load_scenario(scenario, _overrides(settings))
     seed = chosen.seed if seed is None else seed
-    if not chosen.navigation.is_truth:
-        require_rendering()
+    _require_background(chosen)
     folder = out or default_output_folder(chosen.name, seed)
     check_output_folder(folder)
     from dockair.scenarios.loop import fly as fly_scenario
@@ -169,7 +170,6 @@ def bench(
     as_json: Json = False,
 ) -> None:
     """Say how fast the closed loop runs here and where its time goes; or how fast the sensors' stages are."""
-    from dockair.scenarios.doctor import require_rendering
     from dockair.scenarios.output import show_bench
     from dockair.scenarios.schema import load_scenario
 
@@ -184,7 +184,7 @@ def bench(
         else:
             show_sensor_bench(figures)
         return
-    require_rendering()
+    _require_background(chosen)
     from dockair.scenarios.bench import bench as bench_scenario
 
     report = bench_scenario(chosen, seconds)
@@ -207,6 +207,23 @@ def doctor(as_json: Json = False) -> None:
         show_checks(checks, package_versions())
     if not is_fit(checks):
         raise typer.Exit(3)
+
+
+def _require_background(scenario: "Scenario") -> None:
+    """Refuse a flight whose camera cannot be drawn here; say so when it will be drawn without OpenGL.
+
+    Raises:
+        MachineError: the scenario asks for MuJoCo's drawing, and there is no off-screen OpenGL.
+    """
+    from dockair.scenarios.doctor import require_rendering
+    from dockair.sim.opengl import available_backend, why_analytic
+
+    if scenario.navigation.is_truth:
+        return
+    if scenario.camera.background == "mujoco":
+        require_rendering()
+    elif scenario.camera.background == "auto" and available_backend() == "analytic":
+        print(f"dockair: no OpenGL here ({why_analytic()}): the camera's background is analytic", file=sys.stderr)
 
 
 def _overrides(settings: list[str] | None) -> dict[str, str]:

@@ -139,7 +139,7 @@ def show_checks(checks: Sequence["Check"], versions: Mapping[str, str]) -> None:
     console = Console(highlight=False)
     table = Table(show_header=False, box=None, padding=(0, 1))
     for check in checks:
-        word = "[green]ok[/]" if check.ok else "[red]missing[/]" if check.needed else "[yellow]low[/]"
+        word = "[green]ok[/]" if check.ok else "[red]missing[/]" if check.needed else "[yellow]note[/]"
         table.add_row(word, check.name, check.found if check.ok else f"{check.found}; {check.remedy}")
     console.print(table)
     console.print(", ".join(f"{name} {version}" for name, version in versions.items()), style="dim")

@@ -10,7 +10,7 @@ So a solid in the dark still hides the sky.
 
 The frustum is off-centre, on the outer edges of the blocks asked for. Every solid is one of a few unit meshes
 (ball, tube, cube), stretched; how finely they are cut follows the solid's size in the picture, so that an outline is
-off by a quarter of a block at most, up to a radius of 100 blocks. The meshes' radius is that of the polygon whose
+off by a quarter of a block at most, up to a radius of 160 blocks. The meshes' radius is that of the polygon whose
 outline is right in the mean. What lies outside the frustum is left out.
 
 The scene is shifted so that the lens is its origin, in double precision, before OpenGL's single precision sees it.

@@ -109,5 +109,5 @@ def _rows(
         n += rim_spots(mirrors.rim.torus_W(data), float(METAL), mirrors.rim.skin_m, sun, 0.0, eye, spots[n:])
     rows = np.empty((_MOST, ROW))
     count = spot_rows(spots[:n], sun, 0.0, variance, eye, finish, limits, rows, 0)
-    count = facet_rows(mirrors.facets, xpos, xmat, vector(s_W), variance, eye, finish, limits, rows, count)
+    count = facet_rows(mirrors.facets, (xpos, xmat), (vector(s_W), 0.0, variance), eye, finish, limits, rows, count)
     return rows[:count]

@@ -44,8 +44,10 @@ _DARK = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 Vector = tuple[float, float, float]
 Spot = tuple[Vector, Vector, Vector, Vector, Vector]  # p, n, t1, t2, C11 C12 C22
 Light = tuple[Vector, float, float]  # direction or place, 0 or 1 for which of them, a^2/4
+Lamp = tuple[Light, Vector, Array]  # light, lens, finish of the surface
 Box = tuple[float, float, float, float]  # bounds of x1, of x2
 Lobe = tuple[float, float, float, float, float, float, float]  # A, radiance, mean (2) and covariance (3) of the patch
+Poses = tuple[Array, Array]  # (ngeom, 3) places and (ngeom, 9) attitudes of the geoms
 Limits = tuple[float, float, float, float]  # cosine of the grazing angle, faintest A, faintest radiance, step [rad]
 
 
@@ -75,8 +77,7 @@ def spot_rows(
         count: rows that are there already.
     """
     for row in spots:
-        j = int(row[21])
-        light = ((lights[j, 0], lights[j, 1], lights[j, 2]), point, sun_variance)
+        light = (_vector(lights[int(row[21])], 0), point, sun_variance)
         finish, box = finishes[int(row[19])], (row[15], row[16], row[17], row[18])
         spot = (_vector(row, 0), _vector(row, 3), _vector(row, 6), _vector(row, 9), _vector(row, 12))
         lobe = _lobe(spot, box, light, eye, finish, limits[0])
@@ -85,44 +86,45 @@ def spot_rows(
         if box[1] >= _EVERYWHERE:
             spot = _along_patch(spot, lobe)
             lobe = _lobe(spot, box, light, eye, finish, limits[0])
-        _, _, x1, _, var1, _, var2 = lobe
-        step = limits[3] * _unit(_add(eye, -1.0, spot[0]))[1]
-        long = math.sqrt(12.0 * var1)
-        pieces = min(max(int(long / max(math.sqrt(12.0 * var2), step) + 0.5), 1), _MOST_PIECES)
-        for k in range(pieces):
-            low = box[0] if k == 0 else x1 + (k / pieces - 0.5) * long
-            high = box[1] if k == pieces - 1 else x1 + ((k + 1) / pieces - 0.5) * long
-            lobe = _lobe(spot, (low, high, box[2], box[3]), light, eye, finish, limits[0])
-            if lobe[0] > 0.0 and count < len(rows):
-                _write(rows[count], spot, lobe, row[20], j)
-                count += 1
+        count = _pieces(spot, box, (light, eye, finish), limits, lobe, row, rows, count)
+    return count
+
+
+@njit(cache=True)
+def _pieces(spot: Spot, box: Box, lamp: Lamp, limits: Limits, lobe: Lobe, row: Array, rows: Array, count: int) -> int:
+    """Append a lobe, cut across t1 into pieces as long as it is wide."""
+    light, eye, finish = lamp
+    step = limits[3] * _unit(_add(eye, -1.0, spot[0]))[1]
+    middle, long = lobe[2], math.sqrt(12.0 * lobe[4])
+    pieces = min(max(int(long / max(math.sqrt(12.0 * lobe[6]), step) + 0.5), 1), _MOST_PIECES)
+    for k in range(pieces):
+        low = box[0] if k == 0 else middle + (k / pieces - 0.5) * long
+        high = box[1] if k == pieces - 1 else middle + ((k + 1) / pieces - 0.5) * long
+        part = _lobe(spot, (low, high, box[2], box[3]), light, eye, finish, limits[0])
+        if part[0] > 0.0 and count < len(rows):
+            _write(rows[count], spot, part, row[20], row[21])
+            count += 1
     return count
 
 
 @njit(cache=True)
 def facet_rows(
-    facets: Facets,
-    xpos: Array,
-    xmat: Array,
-    sun: Vector,
-    sun_variance: float,
-    eye: Vector,
-    finishes: Array,
-    limits: Limits,
-    rows: Array,
-    count: int,
+    facets: Facets, poses: Poses, light: Light, eye: Vector, finishes: Array, limits: Limits, rows: Array, count: int
 ) -> int:
-    """Append what facets send of the Sun to the lens; arguments as of `spot_rows` and `round_spots`."""
-    light = (sun, 0.0, sun_variance)
+    """Append what facets send of the Sun to the lens; arguments as of `spot_rows`."""
+    xpos, xmat = poses
     for i in range(len(facets.geom)):
         g, frame = facets.geom[i], facets.frame[i]
         n, at = _turned(xmat[g], frame[1]), _turned(xmat[g], frame[0])
         p = (xpos[g, 0] + at[0], xpos[g, 1] + at[1], xpos[g, 2] + at[2])
         v, d = _unit(_add(eye, -1.0, p))
-        h, twice = _unit(_add(v, 1.0, sun))
+        h, twice = _unit(_add(v, 1.0, light[0]))
         hn, half, finish = _dot(n, h), facets.half[i], finishes[facets.material[i]]
-        bend = facets.bend[i] + 2.0 * (half[0] + half[1]) / (d * twice)
-        if hn < _STEEPEST or 1.0 / hn**2 - 1.0 > (6.0 * finish[3] + bend + 6.0 * math.sqrt(sun_variance) / twice) ** 2:
+        bend = facets.bend[i] + 2.0 * (half[0] + half[1]) / max(d * twice, 1e-9)
+        if (
+            hn < _STEEPEST
+            or 1.0 / hn**2 - 1.0 > (6.0 * finish[3] + bend + 6.0 * math.sqrt(light[2]) / max(twice, 1e-9)) ** 2
+        ):
             continue  # out of the lobe's reach
         spot = (p, n, _turned(xmat[g], frame[2]), _turned(xmat[g], frame[3]), _vector(facets.curvature[i], 0))
         box = (-half[0], half[0], -half[1], half[1])
@@ -132,13 +134,13 @@ def facet_rows(
         spot, box = _nearer(spot, box, light, eye)  # where it is bright, Eq. (2)'s linear map is better
         lobe = _lobe(spot, box, light, eye, finish, limits[0])
         if lobe[0] > 0.0 and lobe[0] >= limits[1] and lobe[1] >= limits[2] and count < len(rows):
-            _write(rows[count], spot, lobe, _SKIN_M, 0)
+            _write(rows[count], spot, lobe, _SKIN_M, 0.0)
             count += 1
     return count
 
 
 @njit(cache=True)
-def _write(row: Array, spot: Spot, lobe: Lobe, skin: float, j: int) -> None:
+def _write(row: Array, spot: Spot, lobe: Lobe, skin: float, j: float) -> None:
     """The patch's middle, put back onto the surface to second order in x, and its normal there."""
     p, n, t1, t2, c = spot
     area, _, x1, x2, var1, _, var2 = lobe
@@ -278,16 +280,15 @@ def _lobe(spot: Spot, box: Box, light: Light, eye: Vector, finish: Array, cos_gr
     s1, s2, q, rough = _dot(s, t1), _dot(s, t2), light[2] / (twice * twice), finish[3] ** 2
     v11, v12, v22 = rough + q * (1.0 - s1 * s1), -q * s1 * s2, rough + q * (1.0 - s2 * s2)
     det, det_v = b11 * b22 - b12 * b12, v11 * v22 - v12 * v12
-    if abs(det) < 1e-12:
+    if abs(det) < 1e-20:
         return _DARK
     i11, i12, i22 = b22 / det, -b12 / det, b11 / det
     a11, a12, a21, a22 = i11 * v11 + i12 * v12, i11 * v12 + i12 * v22, i12 * v11 + i22 * v12, i12 * v12 + i22 * v22
     p11, p12, p22 = a11 * i11 + a12 * i12, a11 * i12 + a12 * i22, a21 * i12 + a22 * i22
     x1, x2, ratio = i11 * m1 + i12 * m2, i12 * m1 + i22 * m2, p12 / p11
     part1, mean1, var1 = _strip(box[0], box[1], x1, math.sqrt(p11))
-    part2, mean2, var2 = _strip(
-        box[2], box[3], x2 + ratio * (mean1 - x1), math.sqrt(max(p22 - ratio * p12, 1e-12 * p22))
-    )
+    rest = math.sqrt(max(p22 - ratio * p12, 1e-12 * p22))
+    part2, mean2, var2 = _strip(box[2], box[3], x2 + ratio * (mean1 - x1), rest)
     reflected = _reflectance(0.5 * twice, finish) / hn**4
     e1, e2 = m1 - b11 * mean1 - b12 * mean2, m2 - b12 * mean1 - b22 * mean2
     exponent = 0.5 * (v22 * e1 * e1 - 2.0 * v12 * e1 * e2 + v11 * e2 * e2) / det_v

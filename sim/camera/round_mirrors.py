@@ -58,32 +58,45 @@ def round_spots(
     for j in range(len(lights)):
         toward = (lights[j, 0], lights[j, 1], lights[j, 2])
         for i in range(len(balls.geom)):
-            g, axes = balls.geom[i], balls.axes[i]
-            if not wanted[j, i] or not axes[0] == axes[1] == axes[2]:
-                continue
-            z = (xmat[g, 2], xmat[g, 5], xmat[g, 8])
-            centre = _add((xpos[g, 0], xpos[g, 1], xpos[g, 2]), balls.at_z[i], z)
-            found, n = _on_sphere(centre, axes[0], toward, point, eye)
-            if found and balls.side[i] * _dot(n, z) >= 0.0:
-                t1, t2 = _frame(n)
-                c = 1.0 / axes[0]
-                _write(spots[count], _add(centre, axes[0], n), n, t1, t2, (c, c), (_EVERYWHERE, _EVERYWHERE))
-                spots[count, 19], spots[count, 21] = balls.material[i], j
+            if wanted[j, i] and _ball_spot(balls, i, xpos, xmat, toward, point, eye, spots[count]):
+                spots[count, 21] = j
                 count += 1
         for i in range(len(tubes.geom)):
-            if not wanted[j, len(balls.geom) + i]:
-                continue
-            g, radius, half = tubes.geom[i], tubes.radius[i], tubes.half_length[i]
-            axis = (xmat[g, 2], xmat[g, 5], xmat[g, 8])
-            centre = (xpos[g, 0], xpos[g, 1], xpos[g, 2])
-            found, n, x = _on_tube(centre, axis, radius, half, toward, point, eye)
-            if found:
-                p = _add(_add(centre, x, axis), radius, n)
-                _write(spots[count], p, n, axis, _cross(axis, n), (0.0, 1.0 / radius), (half, _EVERYWHERE))
-                spots[count, 15], spots[count, 16] = -half - x, half - x
-                spots[count, 19], spots[count, 21] = tubes.material[i], j
+            if wanted[j, len(balls.geom) + i] and _tube_spot(tubes, i, xpos, xmat, toward, point, eye, spots[count]):
+                spots[count, 21] = j
                 count += 1
     return count
+
+
+@njit(cache=True)
+def _ball_spot(
+    balls: Balls, i: int, xpos: Array, xmat: Array, toward: Vector, point: float, eye: Vector, row: Array
+) -> bool:
+    g, axes = balls.geom[i], balls.axes[i]
+    if not axes[0] == axes[1] == axes[2]:
+        return False
+    z = (xmat[g, 2], xmat[g, 5], xmat[g, 8])
+    centre = _add((xpos[g, 0], xpos[g, 1], xpos[g, 2]), balls.at_z[i], z)
+    found, n = _on_sphere(centre, axes[0], toward, point, eye)
+    if not found or balls.side[i] * _dot(n, z) < 0.0:
+        return False
+    t1, t2 = _frame(n)
+    c = 1.0 / axes[0]
+    _write(row, _add(centre, axes[0], n), n, t1, t2, (c, c), (-_EVERYWHERE, _EVERYWHERE), balls.material[i])
+    return True
+
+
+@njit(cache=True)
+def _tube_spot(
+    tubes: Tubes, i: int, xpos: Array, xmat: Array, toward: Vector, point: float, eye: Vector, row: Array
+) -> bool:
+    g, radius, half = tubes.geom[i], tubes.radius[i], tubes.half_length[i]
+    axis, centre = (xmat[g, 2], xmat[g, 5], xmat[g, 8]), (xpos[g, 0], xpos[g, 1], xpos[g, 2])
+    found, n, x = _on_tube(centre, axis, radius, half, toward, point, eye)
+    if found:
+        p, bounds = _add(_add(centre, x, axis), radius, n), (-half - x, half - x)
+        _write(row, p, n, axis, _cross(axis, n), (0.0, 1.0 / radius), bounds, tubes.material[i])
+    return found
 
 
 @njit(cache=True)
@@ -94,13 +107,14 @@ def _write(
     t1: Vector,
     t2: Vector,
     curvature: tuple[float, float],
-    half: tuple[float, float],
+    bounds: tuple[float, float],
+    material: int,
 ) -> None:
     for k in range(3):
         row[k], row[3 + k], row[6 + k], row[9 + k] = p[k], n[k], t1[k], t2[k]
     row[12], row[13], row[14] = curvature[0], 0.0, curvature[1]
-    row[15], row[16], row[17], row[18] = -half[0], half[0], -half[1], half[1]
-    row[20] = _SKIN_M
+    row[15], row[16], row[17], row[18] = bounds[0], bounds[1], -_EVERYWHERE, _EVERYWHERE
+    row[19], row[20] = material, _SKIN_M
 
 
 @njit(cache=True)

@@ -8,10 +8,8 @@ o being the lens and d the ray, the nearer root t of
     box       |o + t d|_k <= h_k, k = x, y, z             entered where the last of three slabs is               (3)
 
 A capsule is a tube up to its two balls, a cylinder a tube cut by one slab. The nearest solid wins, block by block.
-Only entries count: a solid that the lens stands in is not seen, as with OpenGL's culled back faces.
-
-Each solid visits the blocks between the edges of its box's picture, row by row. What a block shows depends on its own
-ray and the scene alone, never on which other blocks are drawn.
+Only entries count: a solid that the lens stands in is not seen, as with OpenGL's culled back faces. Each solid visits
+the blocks between the edges of its box's picture, row by row; what a block shows depends on its own ray alone.
 Not modelled: more than one ray a block (edges are steps of a block).
 Source: Glassner (ed.), An Introduction to Ray Tracing, ch. 2.
 """

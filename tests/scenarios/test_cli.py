@@ -16,6 +16,7 @@ from dockair.scenarios import cli, doctor
 from dockair.scenarios.metrics import NavigationFigures, Result
 from dockair.scenarios.output_folder import prepare_output_folder
 from dockair.scenarios.referee import Contact
+from dockair.sim import opengl
 
 NAVIGATION = NavigationFigures(
     range_rmse_m=0.02,
@@ -177,19 +178,27 @@ def test_perfect_navigation_is_said_in_the_outcome_and_needs_no_opengl(command, 
     assert "perfect navigation" in out
 
 
-def test_without_opengl_flying_ends_with_status_three_and_keeps_the_earlier_flight(
+def test_without_opengl_a_drawn_background_ends_with_status_three_and_keeps_the_earlier_flight(
     command, flights, monkeypatch, tmp_path
 ):
     command("fly")
-    monkeypatch.setenv("MUJOCO_GL", "egl")
-    monkeypatch.setattr(doctor, "_RENDER", "None.eglQueryString")
+    monkeypatch.setenv("MUJOCO_GL", "disabled")
     monkeypatch.setattr(doctor, "require_rendering", REQUIRE_RENDERING)
-    status, out, err = command("fly")
+    status, out, err = command("fly", "--set", "camera.background=mujoco")
     assert status == 3
     assert out == ""
-    remedy = "type: sudo apt-get install -y libegl1 libgl1-mesa-dri libopengl0"
-    assert err == f"dockair: off-screen OpenGL: expected a picture through egl; {remedy}\n"
+    assert err.startswith("dockair: off-screen OpenGL: expected a picture through disabled; ")
+    assert err.count("\n") == 1
     assert (tmp_path / "out/default-0/result.json").is_file()
+
+
+def test_without_opengl_the_analytic_background_is_taken_and_said(command, flights, monkeypatch):
+    monkeypatch.setattr(opengl, "_trial", lambda: opengl.Trial("", "none of it"))
+    status, out, err = command("fly")
+    assert status == 0 and out.startswith("contact")
+    assert "dockair: no OpenGL here (none of it): the camera's background is analytic\n" in err
+    status, _, err = command("fly", "--set", "camera.background=analytic")
+    assert status == 0 and "no OpenGL" not in err  # asked for
 
 
 REQUIRE_RENDERING = doctor.require_rendering
