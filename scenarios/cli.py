@@ -175,6 +175,9 @@ def bench(
 
     chosen = load_scenario(scenario, _overrides(settings))
     if subject is BenchSubject.SENSORS:
+        from dockair.sim.opengl import kind_of_context
+
+        os.environ.setdefault("MUJOCO_GL", kind_of_context())  # mujoco.Renderer asks for it at its first import
         from dockair.scenarios.bench_sensors import bench_sensors
         from dockair.scenarios.output import show_sensor_bench
 

@@ -252,8 +252,7 @@ class NearInfraredCamera:
                 seen, first = patch if dirt is None else (patch[0] * dirt.over(patch[0].shape, patch[1]), patch[1])
                 self._glare.add_disc(image, start, sun_C, seen, first, exposure_s, self._spread.edge_sigma_px())
         factors = self._faults.led_factors(time_s, exposure_s)
-        for sources in self._sources.of(data, pose, exposure_s, factors):
-            self._add(image, start, sources, dirt)
+        self._add(image, start, self._sources.of(data, pose, exposure_s, factors), dirt)
         return image
 
     def background_electrons(
@@ -304,12 +303,13 @@ class NearInfraredCamera:
         if not kept.any():
             return
         camera, p_C, way = self._as_built.camera, sources.p_C[kept], 0.5 * sources.way_C_m[kept]
-        pixels = camera.pixels_from_points(p_C)
-        smear = camera.pixels_from_points(p_C + way) - camera.pixels_from_points(p_C - way)
-        electrons = sources.electrons[kept]
+        ends = camera.pixels_from_points(np.concatenate([p_C, p_C + way, p_C - way])).reshape(3, -1, 2)
+        pixels, smear, electrons, size = ends[0], ends[1] - ends[2], sources.electrons[kept], sources.size_m[kept]
         if dirt is not None:
             electrons = electrons * dirt.at(pixels)
-        self._spread.splat(image, start, pixels, electrons, p_C[:, 0], sources.size_m, smear)
+        for size_m in np.unique(size):
+            of = size == size_m
+            self._spread.splat(image, start, pixels[of], electrons[of], p_C[of, 0], float(size_m), smear[of])
 
     def _dirt_at(self, time_s: float) -> Dirt | None:
         cover = self._faults.camera(time_s).dirt_cover

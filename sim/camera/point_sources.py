@@ -10,7 +10,6 @@ it.
 Not modelled: the way of a glint over its surface; what hides an LED in a part of the exposure.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -18,7 +17,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from dockair.rotations import Array
+from dockair.rotations import Array, skew
 from dockair.sim.as_built import AsBuilt
 from dockair.sim.camera.glints import find_glints
 from dockair.sim.camera.led_reflections import find_led_reflections
@@ -32,21 +31,33 @@ if TYPE_CHECKING:  # the camera imports this module
 
 _SMALLEST_PX = 0.5  # of a patch that is not a point
 _LARGEST_STEP = 6.0  # 64 mm; larger flashes come as several patches
+_NEAREST_M = 1e-3
 _LED_AXIS_D = np.array([-1.0, 0.0, 0.0])  # [docs/notation.md]: LEDs shine aft
+
+_Found = tuple[Array, Array, Array]  # places in W (n, 3), electrons per second times m^2 (n,), sizes (n,)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Sources:
-    """Points of one size."""
+    """Points as the lens sees them."""
 
     p_C: Array  #: (n, 3) camera axes [m]
-    electrons: Array  #: (n,) of each whole blob
-    size_m: float
+    electrons: Array  #: (n,) of each whole blob, 0 for what is hidden
+    size_m: Array  #: (n,) side of the source
     way_C_m: Array  #: (n, 3) motion during the exposure
 
 
 class PointSources:
-    """Finds the points of one world."""
+    """Finds the points of one world.
+
+    Args:
+        model: the world's.
+        sheets: LEDs, surfaces, light.
+        as_built: LEDs' places and intensities.
+        response: electrons of each kind of source.
+        sun: None without Sun.
+        extinction_1_m: of the air.
+    """
 
     def __init__(
         self,
@@ -62,10 +73,8 @@ class PointSources:
         self._receiver, self._drogue = model.body("receiver").id, model.body("drogue").id
         self._mirrors = Mirrors.of(model)
 
-    def of(
-        self, data: mujoco.MjData, pose: tuple[Array, Array], exposure_s: float, led_factors: Array
-    ) -> Iterator[Sources]:
-        """Yield the points that the camera sees, those hidden with 0 electrons.
+    def of(self, data: mujoco.MjData, pose: tuple[Array, Array], exposure_s: float, led_factors: Array) -> Sources:
+        """Return all points: the LEDs first, in their order, then their reflections, then the Sun's glints.
 
         Args:
             data: positions and velocities up to date.
@@ -74,22 +83,24 @@ class PointSources:
             led_factors: (n,) what faults leave of each LED's light.
         """
         R_WC, p_WC = pose
-        leds_W = self.leds_W(data)
-        intensity = self._as_built.led_intensity_w_sr * led_factors
-        axis_C = R_WC.T @ data.xmat[self._drogue].reshape(3, 3) @ _LED_AXIS_D
-        p_CL = (leds_W - p_WC) @ R_WC
-        electrons = led_electrons(
-            self._response, self._sheets.leds, intensity, p_CL, axis_C, exposure_s, self._extinction_1_m
+        leds_W, intensity = self.leds_W(data), self._as_built.led_intensity_w_sr * led_factors
+        places_W, rates = [leds_W], [self._led_rates(data, pose, leds_W, intensity)]
+        sizes = [np.full(len(leds_W), self._sheets.leds.die_size_m)]
+        for p_W, electrons_m2_s, size_m in (
+            self._led_reflections(data, p_WC, leds_W, intensity),
+            self._glints(data, pose),
+        ):
+            p_C = (p_W - p_WC) @ R_WC
+            places_W.append(p_W)
+            rates.append(electrons_m2_s * self._per_area(p_C))
+            sizes.append(_rounded(size_m, self._as_built.camera.focal_length_px / np.maximum(p_C[:, 0], _NEAREST_M)))
+        p_C = (np.concatenate(places_W) - p_WC) @ R_WC
+        return Sources(
+            p_C=p_C,
+            electrons=exposure_s * np.concatenate(rates),
+            size_m=np.concatenate(sizes),
+            way_C_m=exposure_s * self._velocities_C(data, pose, p_C, leds_W),
         )
-        yield Sources(
-            p_C=p_CL,
-            electrons=np.where(self.visible_leds(data, p_WC), electrons, 0.0),
-            size_m=self._sheets.leds.die_size_m,
-            way_C_m=exposure_s * self._velocity_C(data, pose, p_CL, leds_W),
-        )
-        yield self._led_reflections(data, pose, exposure_s, leds_W, intensity)
-        if self._sun is not None and self._sun.beam > 0.0:
-            yield from self._glints(data, pose, exposure_s, self._sun)
 
     def leds_W(self, data: mujoco.MjData) -> Array:
         """(n, 3) the LEDs as built [m]."""
@@ -101,72 +112,58 @@ class PointSources:
         clearance = self._sheets.leds.occlusion_clearance_m
         return np.logical_not(hidden(self._model, data, p_WC, self.leds_W(data), clearance))
 
-    def _led_reflections(
-        self, data: mujoco.MjData, pose: tuple[Array, Array], exposure_s: float, leds_W: Array, intensity: Array
-    ) -> Sources:
+    def _led_rates(self, data: mujoco.MjData, pose: tuple[Array, Array], leds_W: Array, intensity: Array) -> Array:
+        """(n,) electrons per second of the LEDs themselves."""
         R_WC, p_WC = pose
-        axis_W = data.xmat[self._drogue].reshape(3, 3) @ _LED_AXIS_D
-        found = find_led_reflections(
-            self._model,
-            data,
-            self._mirrors,
-            p_WC,
-            leds_W,
-            axis_W,
-            intensity,
-            self._sheets.leds.pattern_exponent,
-            self._sheets.surfaces,
-        )
-        p_C = (found.p_W - p_WC) @ R_WC
-        # of the LEDs' spectrum, toward the lens: a source without a pattern
-        electrons = self._response.led_e_m2_sr_w_s * exposure_s * found.intensity_w_sr * self._per_area(p_C)
-        way_C_m = exposure_s * self._velocity_C(data, pose, p_C, None)
-        return Sources(p_C=p_C, electrons=electrons, size_m=0.0, way_C_m=way_C_m)
+        axis_C = R_WC.T @ data.xmat[self._drogue].reshape(3, 3) @ _LED_AXIS_D
+        p_CL = (leds_W - p_WC) @ R_WC
+        rates = led_electrons(self._response, self._sheets.leds, intensity, p_CL, axis_C, 1.0, self._extinction_1_m)
+        return np.where(self.visible_leds(data, p_WC), rates, 0.0)
 
-    def _glints(
-        self, data: mujoco.MjData, pose: tuple[Array, Array], exposure_s: float, sun: SunView
-    ) -> Iterator[Sources]:
-        R_WC, p_WC = pose
+    def _led_reflections(self, data: mujoco.MjData, p_WC: Array, leds_W: Array, intensity: Array) -> _Found:
+        """LEDs mirrored by basket and probe: their light has the LEDs' spectrum."""
+        axis_W = data.xmat[self._drogue].reshape(3, 3) @ _LED_AXIS_D
+        exponent, surfaces = self._sheets.leds.pattern_exponent, self._sheets.surfaces
+        found = find_led_reflections(
+            self._model, data, self._mirrors, p_WC, leds_W, axis_W, intensity, exponent, surfaces
+        )
+        return found.p_W, self._response.led_e_m2_sr_w_s * found.intensity_w_sr, np.zeros(len(found.p_W))
+
+    def _glints(self, data: mujoco.MjData, pose: tuple[Array, Array]) -> _Found:
+        """The Sun mirrored by everything."""
+        sun = self._sun
+        if sun is None or sun.beam <= 0.0:
+            return np.empty((0, 3)), np.empty(0), np.empty(0)
         found = find_glints(
             self._model,
             data,
             self._mirrors,
-            p_WC,
+            pose[1],
             sun.direction_W,
             self._sheets.surfaces,
             self._sheets.light,
-            R_WC[:, 0],
+            pose[0][:, 0],
         )
-        p_C = (found.p_W - p_WC) @ R_WC
-        electrons = self._response.glint_e_m2_s * sun.beam * exposure_s * found.area_m2_sr * self._per_area(p_C)
-        way_C_m = exposure_s * self._velocity_C(data, pose, p_C, None)
-        sizes_m = _rounded(found.size_m, self._as_built.camera.focal_length_px / np.maximum(p_C[:, 0], 1e-3))
-        for size_m in np.unique(sizes_m):
-            of_size = sizes_m == size_m
-            yield Sources(
-                p_C=p_C[of_size], electrons=electrons[of_size], size_m=float(size_m), way_C_m=way_C_m[of_size]
-            )
+        return found.p_W, self._response.glint_e_m2_s * sun.beam * found.area_m2_sr, found.size_m
 
     def _per_area(self, p_C: Array) -> Array:
         """(n,) cos t/r^2 with what is left of the light on its way [1/m^2]."""
         r = np.linalg.norm(p_C, axis=1)
         return np.asarray(np.clip(p_C[:, 0] / r, 0.0, 1.0) * np.exp(-self._extinction_1_m * r) / r**2)
 
-    def _velocity_C(
-        self, data: mujoco.MjData, pose: tuple[Array, Array], p_C: Array, drogue_points_W: Array | None
-    ) -> Array:
-        """(n, 3) Eq. (1) of points of the drogue, or of points at rest in W where None."""
+    def _velocities_C(self, data: mujoco.MjData, pose: tuple[Array, Array], p_C: Array, leds_W: Array) -> Array:
+        """(n, 3) Eq. (1): the LEDs, which come first, move with the drogue; what mirrors is taken to stand still."""
         R_WC, p_WC = pose
-        w_W = data.cvel[self._receiver, :3]
-        v_lens = self._point_velocity(data, self._receiver, p_WC)
-        v_W = 0.0 if drogue_points_W is None else self._point_velocity(data, self._drogue, drogue_points_W)
-        return np.asarray((v_W - v_lens) @ R_WC - np.cross(R_WC.T @ w_W, p_C))
+        v_lens = self._point_velocities(data, self._receiver, p_WC[None])
+        velocity_W = np.broadcast_to(-v_lens, p_C.shape).copy()
+        velocity_W[: len(leds_W)] += self._point_velocities(data, self._drogue, leds_W)
+        w_C = R_WC.T @ data.cvel[self._receiver, :3]
+        return np.asarray(velocity_W @ R_WC + p_C @ skew(w_C))  # p x w = -w x p
 
-    def _point_velocity(self, data: mujoco.MjData, body: int, points_W: Array) -> Array:
+    def _point_velocities(self, data: mujoco.MjData, body: int, points_W: Array) -> Array:
         """(n, 3) velocity in W of points of a body [m/s]; MuJoCo keeps that of the tree's centre of mass."""
         root = data.subtree_com[self._model.body_rootid[body]]
-        w_W, v_root = data.cvel[body, :3], data.cvel[body, 3:]
-        return np.asarray(v_root + np.cross(w_W, points_W - root))
+        return np.asarray(data.cvel[body, 3:] - (points_W - root) @ skew(data.cvel[body, :3]))
 
 
 def _rounded(size_m: Array, px_per_m: Array) -> Array:

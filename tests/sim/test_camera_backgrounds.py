@@ -48,7 +48,7 @@ def test_leds_have_the_same_electrons_to_the_bit_and_are_seen_alike(both) -> Non
     for _ in range(POSES):
         world.put_drogue(drawn, *_random_place(rng))
         factors = np.ones(8)
-        one, other = (next(iter(c._sources.of(world.data, c.pose(world.data), 2e-5, factors))) for c in (drawn, traced))
+        one, other = (c._sources.of(world.data, c.pose(world.data), 2e-5, factors) for c in (drawn, traced))
         assert np.array_equal(one.electrons, other.electrons) and np.array_equal(one.p_C, other.p_C)
         assert np.array_equal(drawn.visible_leds(world.data), traced.visible_leds(world.data))
 

@@ -52,14 +52,8 @@ def _sphere(at: np.ndarray, radius: float) -> dict:
 
 
 def _tube(at: np.ndarray, radius: float, half: float, R: np.ndarray) -> dict:
-    quat = quaternion_from_matrix(R)
-    return {
-        "name": "probe_boom",
-        "type": _G.mjGEOM_CYLINDER,
-        "pos": list(at),
-        "size": [radius, half, 0.0],
-        "quat": quat,
-    }
+    size, quat = [radius, half, 0.0], quaternion_from_matrix(R)
+    return {"name": "probe_boom", "type": _G.mjGEOM_CYLINDER, "pos": list(at), "size": size, "quat": quat}
 
 
 def _find(
@@ -296,6 +290,24 @@ def test_the_bound_that_spares_faint_pairs_drops_none_that_counts(make_world, mo
         assert np.array_equal(spared.p_W, every.p_W)
         assert np.array_equal(spared.led, every.led)
         assert np.array_equal(spared.intensity_w_sr, every.intensity_w_sr)
+
+
+def test_the_bound_is_above_every_reflection_and_not_far_above_the_best() -> None:
+    """Of balls and tubes about an LED that shines at them, all ways; 0.01 of that when it turns its back."""
+    rng, side = np.random.default_rng(9), replace(IDEAL, led_side_light=0.01)
+    best = {"ball": 0.0, "tube": 0.0}
+    for _ in range(150):
+        centre, R = np.array([3.0, 0.2, -0.1]), exp(rng.normal(size=3))
+        led = centre + _unit(*rng.normal(size=3)) * rng.uniform(0.15, 1.0)
+        for kind, geom in (("ball", _sphere(centre, 0.04)), ("tube", _tube(centre, 0.04, 2.0, R))):
+            world = _world(geom)
+            for axis in (_unit(*(centre - led)), _unit(*(led - centre))):
+                found = _find(world, led, side, axis=axis, exponent=1e-6)
+                bound = led_reflections._bound(world[1], Mirrors.of(world[0]), EYE, led[None], axis, side).max()
+                for intensity in found.intensity_w_sr:
+                    assert intensity / 2.0 <= bound
+                    best[kind] = max(best[kind], intensity / 2.0 / bound)
+    assert min(best.values()) > 0.3, best
 
 
 def test_polished_ribs_and_coupling_show_the_leds_and_dull_ones_do_not(make_world) -> None:
