@@ -32,7 +32,8 @@ from dockair.sim.camera.exposure import ExposureControl
 from dockair.sim.camera.fixed_pattern import FixedPattern
 from dockair.sim.camera.glare import Glare
 from dockair.sim.camera.optics import PointSpread
-from dockair.sim.camera.point_sources import PointSources, Sources
+from dockair.sim.camera.patches import add_patches
+from dockair.sim.camera.point_sources import WIDE_PX, PointSources, Sources
 from dockair.sim.camera.radiometry import extinction_1_m, led_wavelength_m, responses
 from dockair.sim.camera.readout import latency_s, transfer_jitter_s
 from dockair.sim.camera.sky import Sky, Weather
@@ -41,6 +42,7 @@ from dockair.sim.faults import CameraFault, Faults, hot_pixel_places
 from dockair.streams import counter_key, random_stream
 
 _FAINTEST_E = 0.5  # a whole blob with fewer electrons is left out
+_SQUARE_SIGMAS = float(np.sqrt(12.0))  # side of a square over its standard deviation
 _EDGE_SIGMAS = 6.0  # how far the blurred edge of the Sun's disc is drawn
 
 
@@ -307,8 +309,11 @@ class NearInfraredCamera:
         pixels, smear, electrons, size = ends[0], ends[1] - ends[2], sources.electrons[kept], sources.size_m[kept]
         if dirt is not None:
             electrons = electrons * dirt.at(pixels)
-        for size_m in np.unique(size):
-            of = size == size_m
+        width_px = size * camera.focal_length_px / p_C[:, 0]
+        wide = width_px >= WIDE_PX
+        add_patches(image, start, pixels[wide], electrons[wide], width_px[wide] / _SQUARE_SIGMAS)
+        for size_m in np.unique(size[~wide]):
+            of = (size == size_m) & ~wide
             self._spread.splat(image, start, pixels[of], electrons[of], p_C[of, 0], float(size_m), smear[of])
 
     def _dirt_at(self, time_s: float) -> Dirt | None:

@@ -30,7 +30,7 @@ if TYPE_CHECKING:  # the camera imports this module
     from dockair.sim.camera.camera import CameraSheets
 
 _SMALLEST_PX = 0.5  # of a patch that is not a point
-_LARGEST_STEP = 6.0  # 64 mm; larger flashes come as several patches
+WIDE_PX = 8.0  #: side of a patch that is so much wider than the lens's blur that it is drawn without it
 _NEAREST_M = 1e-3
 _LED_AXIS_D = np.array([-1.0, 0.0, 0.0])  # [docs/notation.md]: LEDs shine aft
 
@@ -167,6 +167,10 @@ class PointSources:
 
 
 def _rounded(size_m: Array, px_per_m: Array) -> Array:
-    """(n,) sizes in powers of two of a millimetre, so that few spread functions serve all; 0 under half a pixel."""
-    steps = np.round(np.log2(np.maximum(size_m, 1e-6) / 1e-3))
-    return np.where(size_m * px_per_m < _SMALLEST_PX, 0.0, 1e-3 * 2.0 ** np.clip(steps, -2.0, _LARGEST_STEP))
+    """(n,) sizes in powers of two of a millimetre, so that few spread functions serve all.
+
+    Patches under half a pixel are points; those from WIDE_PX on keep their size, for they are drawn without the lens.
+    """
+    width_px = size_m * px_per_m
+    rounded = 1e-3 * 2.0 ** np.round(np.log2(np.maximum(size_m, _NEAREST_M) / 1e-3))
+    return np.where(width_px < _SMALLEST_PX, 0.0, np.where(width_px >= WIDE_PX, size_m, rounded))
