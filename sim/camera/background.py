@@ -27,11 +27,11 @@ from dockair.sim.camera.blocks import Blocks
 from dockair.sim.camera.coarse_grid import CoarseGrid
 from dockair.sim.camera.drawn import DrawnSolids
 from dockair.sim.camera.sheets import BackgroundParameters
-from dockair.sim.camera.solids import VISIBLE_GROUPS, Haze, Lighting, Shines
+from dockair.sim.camera.solids import Haze, Lighting, Shines
 from dockair.sim.camera.traced import TracedSolids
 from dockair.sim.opengl import available_backend
 
-__all__ = ["VISIBLE_GROUPS", "Background", "available_backend"]
+__all__ = ["Background", "available_backend"]
 
 
 class Heaven(Shines, Protocol):

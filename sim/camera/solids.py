@@ -22,7 +22,6 @@ from dockair.errors import DockairError
 from dockair.rotations import Array
 from dockair.sim.camera.occlusion import VISIBLE_GROUPS
 
-
 #: Kinds of solids, as numbers for compiled code.
 BALL, CAPSULE, CYLINDER, BOX = 0, 1, 2, 3
 _KIND_OF = {
