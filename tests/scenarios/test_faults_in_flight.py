@@ -1,0 +1,45 @@
+"""Faults through the whole loop: what the navigation gets while something is broken, and that it goes on."""
+
+from dockair.messages import CameraFrame, ImuSample
+from dockair.scenarios.loop import Flight
+from dockair.scenarios.schema import load_scenario
+
+FAULTS = [
+    {"kind": "gyro_drop_out", "start_s": 0.30, "stop_s": 0.40},
+    {"kind": "camera_drop_out", "start_s": 0.50, "stop_s": 0.70},
+    {"kind": "stuck_frame", "start_s": 0.80, "stop_s": 0.90},
+    {"kind": "gyro_bias_step", "start_s": 0.95, "rate_deg_s": [0.0, 0.0, 30.0]},
+    {"kind": "gyro_saturation", "start_s": 1.10, "limit_deg_s": 10.0},
+]
+
+
+def test_messages_stop_stick_and_jump_as_the_scenario_says_and_time_goes_on():
+    settings = {"faults": FAULTS, "camera.background": "analytic", "turbulence.model": "none"}
+    flight = Flight(load_scenario("default", settings), 1)
+    imu: dict[float, tuple[ImuSample, ...]] = {}
+    frames: list[CameraFrame] = []
+    stamps = []
+    try:
+        for _ in range(130):
+            tick = flight.step()
+            imu[round(tick.truth.time_s, 4)] = tick.imu
+            stamps.append(tick.solution.time_stamp_s)
+            if tick.frame is not None:
+                frames.append(tick.frame)
+    finally:
+        flight.close()
+    silent = [time_s for time_s, samples in imu.items() if not samples]
+    assert silent and 0.30 <= min(silent) and max(silent) <= 0.41
+    steps = [after - before for before, after in zip(stamps, stamps[1:], strict=False)]
+    assert min(steps) > 0.005 and max(steps) < 0.015  # the navigation's clock goes on without the gyro
+    taken = [frame.time_stamp_s for frame in frames]
+    assert not [t for t in taken if 0.50 <= t < 0.70] and len([t for t in taken if t < 0.50]) >= 23
+    stuck = [frame for frame in frames if 0.80 <= frame.time_stamp_s < 0.90]
+    assert len(stuck) == 5 and len({frame.pixels.tobytes() for frame in stuck}) == 1
+
+    def yaw_rate(time_s: float) -> float:
+        return max(abs(sample.angular_rate_rad_s[2]) for sample in imu[time_s])
+
+    assert yaw_rate(0.94) < 0.05  # 3 deg/s
+    assert yaw_rate(1.05) > 0.45  # 26 deg/s
+    assert 0.17 < yaw_rate(1.20) < 0.18  # 10 deg/s and a quantum
