@@ -184,6 +184,7 @@ class NearInfraredCamera:
         window = self._checked(window)
         fault = self._faults.camera(time_s)
         if fault.dropped:
+            transfer_jitter_s(self._sheets.sensor, self._noise.transfer)  # so that later frames take what they took
             return None
         if fault.stuck and self._last is not None:
             return replace(self._last, time_stamp_s=time_s)
@@ -301,8 +302,8 @@ class NearInfraredCamera:
 
     def _add(self, image: NDArray[np.float32], start: tuple[int, int], sources: Sources, dirt: Dirt | None) -> None:
         """Splat the sources that are bright enough and in front of the lens."""
-        kept = (sources.p_C[:, 0] > 0.0) & (sources.electrons > _FAINTEST_E)
-        if not kept.any():
+        kept = np.flatnonzero((sources.p_C[:, 0] > 0.0) & (sources.electrons > _FAINTEST_E))
+        if len(kept) == 0:
             return
         camera, p_C, way = self._as_built.camera, sources.p_C[kept], 0.5 * sources.way_C_m[kept]
         ends = camera.pixels_from_points(np.concatenate([p_C, p_C + way, p_C - way])).reshape(3, -1, 2)
@@ -312,9 +313,9 @@ class NearInfraredCamera:
         width_px = size * camera.focal_length_px / p_C[:, 0]
         wide = width_px >= WIDE_PX
         add_patches(image, start, pixels[wide], electrons[wide], width_px[wide] / _SQUARE_SIGMAS)
-        for size_m in np.unique(size[~wide]):
-            of = (size == size_m) & ~wide
-            self._spread.splat(image, start, pixels[of], electrons[of], p_C[of, 0], float(size_m), smear[of])
+        for size_m in sorted(set(size[~wide].tolist())):
+            of = np.flatnonzero((size == size_m) & ~wide)
+            self._spread.splat(image, start, pixels[of], electrons[of], p_C[of, 0], size_m, smear[of])
 
     def _dirt_at(self, time_s: float) -> Dirt | None:
         cover = self._faults.camera(time_s).dirt_cover
