@@ -74,13 +74,13 @@ def fit_ring(
     )
     image = _project(pose) * focal_length_px + np.array([cu, cv])
     freedom = 2 * int(np.count_nonzero(chosen >= 0)) - 6
-    axis = np.cross(pose[1], pose[2])
+    facing = pose[1, 1] * pose[2, 2] - pose[1, 2] * pose[2, 1]  # of the ring's axis along the camera's
     return RingFit(
         candidate=chosen,
         slots_px=image[:SLOTS],
         centre_px=image[SLOTS],
         radius_px=float(focal_length_px / pose[0, 0]),
-        tilt_rad=float(np.arccos(np.clip(axis[0], -1.0, 1.0))),
+        tilt_rad=float(np.arccos(np.clip(facing, -1.0, 1.0))),
         tolerance_px=float(tolerance * focal_length_px),
         rms_px=float(np.sqrt(squares / freedom) * focal_length_px) if freedom > 0 else 0.0,
     )

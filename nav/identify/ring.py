@@ -113,7 +113,7 @@ def identify(
     status, fit = IdentificationStatus.NOT_FOUND, None
     if prior.prediction_px is not None:
         tight = prior.tightened(settings.predicted_radius_tolerance, settings.predicted_roll_tolerance_rad)
-        fits = ring_fits(chosen, method, tight, camera, sigma, settings)
+        fits = ring_fits(chosen, method, tight, camera, sigma, settings, settings.max_false_rings_predicted)
         shape = settings.predicted_shape_tolerance * tight.expected_radius_px + settings.predicted_shape_sigmas * sigma
         fits = [one for one in fits if _shape_error(chosen, one.fit, tight) <= shape]
         status, fit = _decide(fits, tight, settings.max_false_rings_predicted, settings)
@@ -121,7 +121,8 @@ def identify(
         # a ring that contradicts a prediction needs as good a case as one that nothing was known of
         nominal = prior.has_centre and prior.prediction_px is None
         limit = settings.max_false_rings_with_prior if nominal else settings.max_false_rings
-        status, fit = _decide(ring_fits(chosen, method, prior, camera, sigma, settings), prior, limit, settings)
+        fits = ring_fits(chosen, method, prior, camera, sigma, settings, limit)
+        status, fit = _decide(fits, prior, limit, settings)
     if fit is None:
         return _nothing(status)
     return _numbered(chosen, index, fit, prior, camera, settings)

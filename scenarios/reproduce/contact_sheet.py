@@ -10,21 +10,17 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from dockair.messages import CameraFrame
 from dockair.nav.image.detect import detect
 from dockair.rotations import Array
-from dockair.scenarios.build import Parts, build
+from dockair.scenarios.reproduce.frames import matches, studio
 from dockair.scenarios.reproduce.reference import picture_name
-from dockair.scenarios.schema import load_scenario
-from dockair.sim.camera.camera import NearInfraredCamera
 
 ID = "sensor/contact-sheet"
 TITLE = "sixteen frames: Sun, clouds, glints, night, haze, ranges, faults"
-_SETTLING_FRAMES = 8
 _FOUND_WITHIN_PX = 2.0
 _REDUCTION = 4
 _GAMMA = 0.4
@@ -95,46 +91,22 @@ def reproduce(out: Path | None) -> dict[str, Any]:
 
 def _take(shot: Shot) -> tuple[CameraFrame, Array, dict[str, float]]:
     """The frame, where its LEDs are (n, 2) [px], and its figures."""
-    parts = build(load_scenario("still_air", {"seed": 3, **shot.settings}), 3)
-    assert parts.camera is not None
-    try:
-        data = _placed(parts, shot.range_m)
-        for k in range(_SETTLING_FRAMES):
-            frame = parts.camera.expose(data, 0.02 * k, k, None)
-        assert frame is not None
-        leds_px = parts.camera.led_pixels(data)
-        return frame, leds_px, _figures(parts.camera, data, frame, leds_px)
-    finally:
-        parts.camera.close()
+    with studio(shot.settings) as made:
+        data = made.ahead(shot.range_m)
+        taken = made.take(data)
+        return taken.frame, taken.leds_px, _figures(taken.frame, taken.leds_px, made.camera.visible_leds(data))
 
 
-def _placed(parts: Parts, range_m: float) -> mujoco.MjData:
-    """The world with the receiver moved until the ring is ahead of its probe, so far from the lens."""
-    world, mounting = parts.world, parts.as_built.mounting
-    data = mujoco.MjData(world.model)
-    mujoco.mj_copyData(data, world.model, world.data)
-    p_CP_B = mounting.p_BP - mounting.p_BC
-    ahead_m = np.sqrt(range_m**2 - p_CP_B[1] ** 2 - p_CP_B[2] ** 2) - p_CP_B[0]
-    p_BD_B = mounting.p_BP + np.array([ahead_m, 0.0, 0.0])
-    joint = world.model.joint("receiver").qposadr[0]
-    data.qpos[joint : joint + 3] = world.truth.p_WD - world.truth.R_WB @ p_BD_B
-    mujoco.mj_forward(world.model, data)
-    return data
-
-
-def _figures(camera: NearInfraredCamera, data: mujoco.MjData, frame: CameraFrame, leds_px: Array) -> dict[str, float]:
+def _figures(frame: CameraFrame, leds_px: Array, visible: NDArray[np.bool_]) -> dict[str, float]:
     blobs = detect(frame.pixels, None, frame.window, gain_dn_per_electron=frame.gain)
-    visible = camera.visible_leds(data)
-    distance = np.linalg.norm(blobs.centroids_px[:, None] - leds_px[None], axis=2)
-    found = (distance < _FOUND_WITHIN_PX).any(axis=0)
-    false = ~(distance < _FOUND_WITHIN_PX).any(axis=1)
+    on_led, found = matches(blobs.centroids_px, leds_px, _FOUND_WITHIN_PX)
     return {
         "exposure_us": 1e6 * frame.exposure_s,
         "background_dn": float(np.median(frame.pixels)),
         "brightest_led_dn": float(max(_peak(frame.pixels, uv) for uv in leds_px)),
         "leds_visible": int(visible.sum()),
         "leds_found": int(found.sum()),
-        "other_blobs": int(false.sum()),
+        "other_blobs": int((~on_led).sum()),
     }
 
 

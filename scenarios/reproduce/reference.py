@@ -13,3 +13,8 @@ def read_reference(name: str) -> list[dict[str, str]]:
     """Return the rows of a table by its columns' names, as text."""
     lines = files("dockair.assets").joinpath("reference", f"{name}.csv").read_text(encoding="utf-8").splitlines()
     return list(csv.DictReader(line for line in lines if not line.startswith("#")))
+
+
+def read_figure(name: str, figure: str) -> dict[str, float]:
+    """Return the quantities that are printed for one figure, from a table with columns figure, quantity, value."""
+    return {row["quantity"]: float(row["value"]) for row in read_reference(name) if row["figure"] == figure}

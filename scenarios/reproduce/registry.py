@@ -12,12 +12,37 @@ from pathlib import Path
 from typing import Any
 
 from dockair.errors import DockairError
-from dockair.scenarios.reproduce import contact_sheet, sensor_band
+from dockair.scenarios.reproduce import (
+    contact_sheet,
+    ground_fig29,
+    image_contour,
+    image_ellipse,
+    image_hough,
+    image_kalman,
+    image_labels,
+    image_morphology,
+    image_panels,
+    image_three_point,
+    sensor_band,
+)
 
 Reproduction = Callable[[Path | None], dict[str, Any]]
 
+_MODULES = (
+    contact_sheet,
+    ground_fig29,
+    image_contour,
+    image_ellipse,
+    image_kalman,
+    image_labels,
+    image_morphology,
+    image_panels,
+    image_three_point,
+    sensor_band,
+)
 _REPRODUCTIONS: dict[str, tuple[str, Reproduction]] = {
-    module.ID: (module.TITLE, module.reproduce) for module in (contact_sheet, sensor_band)
+    **{module.ID: (module.TITLE, module.reproduce) for module in _MODULES},
+    **image_hough.REPRODUCTIONS,
 }
 
 

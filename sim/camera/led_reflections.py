@@ -19,13 +19,14 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from dockair.rotations import Array
 from dockair.sim.camera.curved_mirrors import ellipsoid_spots, rim_spots
 from dockair.sim.camera.glints import starts_of_seen
-from dockair.sim.camera.lobes import ROW, SPOT, spot_rows
-from dockair.sim.camera.mirrors import METAL, Mirrors, finishes, vector
+from dockair.sim.camera.lobes import ROW, SPOT, Poses, spot_rows
+from dockair.sim.camera.mirrors import METAL, Balls, Mirrors, Tubes, Vector, finishes, vector
 from dockair.sim.camera.occlusion import is_clear
 from dockair.sim.camera.round_mirrors import round_spots
 from dockair.sim.camera.sheets import SurfaceParameters
@@ -86,25 +87,68 @@ def _bound(
     data: mujoco.MjData, mirrors: Mirrors, p_WC: Array, leds_W: Array, axis_W: Array, surfaces: SurfaceParameters
 ) -> Array:
     """(m, balls + tubes) what A I(psi)/(I_0 d1^2) cannot exceed, Eqs. (1) and (2)."""
-    balls, tubes = mirrors.near_balls, mirrors.near_tubes
-    share = finishes(surfaces)[:, 2]
-    z_b, z_t = data.geom_xmat[balls.geom, 2::3], data.geom_xmat[tubes.geom, 2::3]
-    ball = data.geom_xpos[balls.geom] + balls.at_z[:, None] * z_b - leds_W[:, None]
-    tube = data.geom_xpos[tubes.geom] - leds_W[:, None]
-    radius = balls.axes.max(axis=1)
-    d_ball = np.maximum(np.linalg.norm(ball, axis=2) - radius, _CLOSEST_M)
-    along = np.einsum("mnk,nk->mn", tube, z_t)
-    beyond = np.maximum(np.abs(along) - tubes.half_length, 0.0)
-    flat2 = np.maximum((tube**2).sum(axis=2) - along**2, 0.0)
-    d_tube = np.maximum(np.sqrt(flat2 + beyond**2) - tubes.radius, _CLOSEST_M)
-    sight = p_WC - leds_W
-    cos_c = sight @ z_t.T / np.linalg.norm(sight, axis=1)[:, None]
-    sin_c = np.sqrt(np.maximum(1.0 - cos_c**2, _CLOSEST_M**2))
-    side = surfaces.led_side_light
-    on_ball = np.where(ball @ axis_W + radius > 0.0, 1.0, side) * share[balls.material] * radius**2 / (4.0 * d_ball**2)
-    reach = tubes.half_length * np.abs(z_t @ axis_W) + tubes.radius
-    on_tube = np.where(tube @ axis_W + reach > 0.0, 1.0, side) * share[tubes.material] * tubes.radius
-    return np.hstack([on_ball, on_tube / (2.0 * sin_c * d_tube)])
+    balls, tubes, share, side = (
+        mirrors.near_balls,
+        mirrors.near_tubes,
+        finishes(surfaces)[:, 2],
+        surfaces.led_side_light,
+    )
+    bound, poses, axis = (
+        np.empty((len(leds_W), len(balls.geom) + len(tubes.geom))),
+        (data.geom_xpos, data.geom_xmat),
+        vector(axis_W),
+    )
+    _bound_of_balls(balls, poses, leds_W, axis, share, side, bound)
+    _bound_of_tubes(tubes, poses, leds_W, axis, vector(p_WC), share, side, bound[:, len(balls.geom) :])
+    return bound
+
+
+@njit(cache=True)
+def _bound_of_balls(
+    balls: Balls, poses: Poses, leds_W: Array, axis: Vector, share: Array, side: float, bound: Array
+) -> None:
+    xpos, xmat = poses
+    for i in range(len(balls.geom)):
+        g, radius = balls.geom[i], balls.axes[i].max()
+        most = share[balls.material[i]] * radius**2 / 4.0
+        for j in range(len(leds_W)):
+            p = _from_led(xpos[g], xmat[g], balls.at_z[i], leds_W[j])
+            d = max(math.sqrt(_dot(p, p)) - radius, _CLOSEST_M)
+            bound[j, i] = (1.0 if _dot(p, axis) + radius > 0.0 else side) * most / d**2
+
+
+@njit(cache=True)
+def _bound_of_tubes(
+    tubes: Tubes, poses: Poses, leds_W: Array, axis: Vector, eye: Vector, share: Array, side: float, bound: Array
+) -> None:
+    xpos, xmat = poses
+    for i in range(len(tubes.geom)):
+        g, radius, half = tubes.geom[i], tubes.radius[i], tubes.half_length[i]
+        z = (xmat[g, 2], xmat[g, 5], xmat[g, 8])
+        reach, most = half * abs(_dot(z, axis)) + radius, 0.5 * share[tubes.material[i]] * radius
+        for j in range(len(leds_W)):
+            p = _from_led(xpos[g], xmat[g], 0.0, leds_W[j])
+            along = _dot(p, z)
+            across2 = max(_dot(p, p) - along**2, 0.0)
+            d = max(math.sqrt(across2 + max(abs(along) - half, 0.0) ** 2) - radius, _CLOSEST_M)
+            sight = (eye[0] - leds_W[j, 0], eye[1] - leds_W[j, 1], eye[2] - leds_W[j, 2])
+            sin2_c = max(1.0 - _dot(sight, z) ** 2 / _dot(sight, sight), _CLOSEST_M**2)
+            bound[j, i] = (1.0 if _dot(p, axis) + reach > 0.0 else side) * most / (math.sqrt(sin2_c) * d)
+
+
+@njit(cache=True)
+def _from_led(place: Array, turn: Array, at_z: float, led_W: Array) -> Vector:
+    """From an LED to a point on the z axis of a geom at `place` (3,), turned by `turn` (9,)."""
+    return (
+        place[0] + at_z * turn[2] - led_W[0],
+        place[1] + at_z * turn[5] - led_W[1],
+        place[2] + at_z * turn[8] - led_W[2],
+    )
+
+
+@njit(cache=True)
+def _dot(a: Vector, b: Vector) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 def _is_lit(model: mujoco.MjModel, data: mujoco.MjData, start: Array, led_W: Array, seat_m: float) -> bool:

@@ -117,7 +117,10 @@ def facet_rows(
         g, frame = facets.geom[i], facets.frame[i]
         n, at = _turned(xmat[g], frame[1]), _turned(xmat[g], frame[0])
         p = (xpos[g, 0] + at[0], xpos[g, 1] + at[1], xpos[g, 2] + at[2])
-        v, d = _unit(_add(eye, -1.0, p))
+        sight = _add(eye, -1.0, p)
+        if _dot(light[0], n) <= 0.0 or _dot(sight, n) <= 0.0:
+            continue  # turned away
+        v, d = _unit(sight)
         h, twice = _unit(_add(v, 1.0, light[0]))
         hn, half, finish = _dot(n, h), facets.half[i], finishes[facets.material[i]]
         bend = facets.bend[i] + 2.0 * (half[0] + half[1]) / max(d * twice, 1e-9)

@@ -20,7 +20,7 @@ from dockair.calibration import Camera
 from dockair.rotations import Array
 from dockair.sim.camera.point_spread import Spread, airy_px, blur_px, core, transfer
 from dockair.sim.camera.sheets import LensParameters, SensorParameters
-from dockair.sim.camera.splat import Tables, splat
+from dockair.sim.camera.splat import Tables, missing_levels, splat
 
 NEAREST_M: Final = 0.5  #: nearer points are as blurred as at this depth
 _STEP_PX = 0.5  # growth of the disc or of the die's image between two tabulated depths
@@ -73,8 +73,8 @@ class PointSpread:
             size_m /= side
             step_px = self._camera.focal_length_px * size_m / np.maximum(depth_m, NEAREST_M)
             pixels = (pixels[:, None] + step_px[:, None, None] * _grid(side)).reshape(-1, 2)
-            electrons, depth_m = np.repeat(electrons / side**2, side**2), np.repeat(depth_m, side**2)
-            smear_px = np.repeat(smear_px, side**2, axis=0)
+            electrons, depth_m = (electrons / side**2).repeat(side**2), depth_m.repeat(side**2)
+            smear_px = smear_px.repeat(side**2, axis=0)
         cores = self._cores_of(size_m)
         levels = cores.levels(depth_m)
         pixels, electrons, smear_px = (np.ascontiguousarray(a, dtype=float) for a in (pixels, electrons, smear_px))
@@ -131,12 +131,9 @@ class _Cores:
 
     def levels(self, depth_m: Array) -> Array:
         """(n,) depths in steps of the tables; makes the cores around them."""
-        levels = np.nan_to_num(self._levels_m / np.maximum(depth_m, NEAREST_M))
-        middle = np.clip((levels + 0.5).astype(np.int64), 1, len(self._made) - 2)
-        for offset in (-1, 0, 1):
-            if not self._made[middle + offset].all():
-                for k in np.unique(middle + offset):
-                    self._make(int(k))
+        levels = self._levels_m / np.maximum(depth_m, NEAREST_M)
+        for k in missing_levels(levels, self._made):
+            self._make(int(k))
         return levels
 
     def _make(self, k: int) -> None:

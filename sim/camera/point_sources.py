@@ -84,17 +84,13 @@ class PointSources:
         """
         R_WC, p_WC = pose
         leds_W, intensity = self.leds_W(data), self._as_built.led_intensity_w_sr * led_factors
-        places_W, rates = [leds_W], [self._led_rates(data, pose, leds_W, intensity)]
-        sizes = [np.full(len(leds_W), self._sheets.leds.die_size_m)]
-        for p_W, electrons_m2_s, size_m in (
-            self._led_reflections(data, p_WC, leds_W, intensity),
-            self._glints(data, pose),
-        ):
-            p_C = (p_W - p_WC) @ R_WC
-            places_W.append(p_W)
-            rates.append(electrons_m2_s * self._per_area(p_C))
-            sizes.append(_rounded(size_m, self._as_built.camera.focal_length_px / np.maximum(p_C[:, 0], _NEAREST_M)))
-        p_C = (np.concatenate(places_W) - p_WC) @ R_WC
+        mirrored = self._led_reflections(data, p_WC, leds_W, intensity), self._glints(data, pose)
+        places_W, electrons_m2_s, size_m = (np.concatenate(each) for each in zip(*mirrored, strict=True))
+        p_C = (np.concatenate([leds_W, places_W]) - p_WC) @ R_WC
+        p_CL, p_CM = p_C[: len(leds_W)], p_C[len(leds_W) :]
+        rates = self._led_rates(data, pose, p_CL, intensity), electrons_m2_s * self._per_area(p_CM)
+        px_per_m = self._as_built.camera.focal_length_px / np.maximum(p_CM[:, 0], _NEAREST_M)
+        sizes = np.full(len(leds_W), self._sheets.leds.die_size_m), _rounded(size_m, px_per_m)
         return Sources(
             p_C=p_C,
             electrons=exposure_s * np.concatenate(rates),
@@ -112,11 +108,10 @@ class PointSources:
         clearance = self._sheets.leds.occlusion_clearance_m
         return np.logical_not(hidden(self._model, data, p_WC, self.leds_W(data), clearance))
 
-    def _led_rates(self, data: mujoco.MjData, pose: tuple[Array, Array], leds_W: Array, intensity: Array) -> Array:
-        """(n,) electrons per second of the LEDs themselves."""
+    def _led_rates(self, data: mujoco.MjData, pose: tuple[Array, Array], p_CL: Array, intensity: Array) -> Array:
+        """(n,) electrons per second of the LEDs themselves, at p_CL (n, 3) in camera axes."""
         R_WC, p_WC = pose
         axis_C = R_WC.T @ data.xmat[self._drogue].reshape(3, 3) @ _LED_AXIS_D
-        p_CL = (leds_W - p_WC) @ R_WC
         rates = led_electrons(self._response, self._sheets.leds, intensity, p_CL, axis_C, 1.0, self._extinction_1_m)
         return np.where(self.visible_leds(data, p_WC), rates, 0.0)
 

@@ -32,6 +32,16 @@ _SMEAR_STEPS = 4.0  # blobs per pixel of smear; the wings, smooth over w, need 1
 Tables: TypeAlias = tuple[NDArray[np.float32], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]
 
 
+@njit(cache=True)
+def missing_levels(levels: Array, made: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Return which of the tables that `splat` reads at these depths (n,) [levels] are not made yet, each once."""
+    wanted = np.zeros(made.shape[0], np.bool_)
+    for level in levels:
+        middle = _middle(level, made.shape[0])
+        wanted[middle - 1 : middle + 2] = True
+    return np.flatnonzero(wanted & ~made)
+
+
 @njit(cache=True, error_model="numpy")
 def splat(
     image: NDArray[np.float32],
@@ -60,7 +70,7 @@ def splat(
         (u, v), E = pixels[i], electrons[i]
         if not (E > 0.0 and math.isfinite(u) and math.isfinite(v)):
             continue
-        middle = min(max(int(levels[i] + 0.5), 1), half_widths.shape[0] - 2)
+        middle = _middle(levels[i], half_widths.shape[0])
         half = max(half_widths[middle - 1], half_widths[middle], half_widths[middle + 1])
         reach = max((wing[0] * E / FAINTEST_E) ** (1.0 / 3.0), _REACH_CORES * half)
         du, dv = smear[i]
@@ -75,6 +85,12 @@ def splat(
         for k in range(count):
             a = _along(k, count)
             _add_core(image, start, u + a * du, v + a * dv, E / count, levels[i], middle, half, tables)
+
+
+@njit(cache=True)
+def _middle(level: float, count: int) -> int:
+    """The middle one of the three levels that a depth is interpolated between; a NaN's is the first."""
+    return min(max(int(level + 0.5), 1), count - 2) if level > 0.0 else 1
 
 
 @njit(cache=True)

@@ -119,11 +119,11 @@ class Camera:
     def pixels_from_points(self, p_C: Array) -> Array:
         """(n, 2) pixels (u, v) of points p_C (n, 3) [m] in camera axes; NaN where x <= 0 (behind the camera)."""
         p_C = np.asarray(p_C, dtype=float).reshape(-1, 3)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            ab = np.where(p_C[:, :1] > 0.0, -p_C[:, 1:] / p_C[:, :1], np.nan)
+        x = p_C[:, :1]
+        ab = -p_C[:, 1:] / np.where(x > 0.0, x, np.nan)
         if self.distortion is not None:
             ab = _distort(ab, self.distortion)
-        return np.asarray(self.focal_length_px * ab + np.array(self.principal_point_px))
+        return np.asarray(self.focal_length_px * ab + self.principal_point_px)
 
     def rays_from_pixels(self, pixels: Array) -> Array:
         """(n, 3) unit vectors in camera axes toward pixels (n, 2) (u, v)."""
@@ -142,9 +142,10 @@ def _distort(ab: Array, coefficients: tuple[float, ...]) -> Array:
     a, b = ab[:, 0], ab[:, 1]
     r2 = a * a + b * b
     s = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
-    return np.column_stack(
-        [a * s + 2 * p1 * a * b + p2 * (r2 + 2 * a * a), b * s + p1 * (r2 + 2 * b * b) + 2 * p2 * a * b]
-    )
+    out = np.empty_like(ab)
+    out[:, 0] = a * s + 2 * p1 * a * b + p2 * (r2 + 2 * a * a)
+    out[:, 1] = b * s + p1 * (r2 + 2 * b * b) + 2 * p2 * a * b
+    return out
 
 
 @dataclass(frozen=True, slots=True)

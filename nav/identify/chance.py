@@ -1,0 +1,76 @@
+"""How likely a ring is an accident of clutter, and how likely one of its LEDs is.
+
+With N hypotheses looked up, clutter of rho candidates a square pixel and a tolerance t, a fit with m LEDs comes with
+the expected number of accidental rings like it,
+
+    NFA = N (5 over m - 3) p^(m - 3),   p = rho pi t^2                                    (1)
+
+(the "number of false alarms" of a-contrario detection, Desolneux, Moisan & Morel 2000). N counts the hypotheses that
+passed the shape's and the prior's gates, the true ones among them, so it errs on the safe side.
+
+A true ring may still count a blob as the LED that is hidden there. A member with residual d is an impostor with odds
+
+    o = h rho 2 pi s^2 exp(d^2 g / 2 s^2),   g = 2 m / (2 m - 6),   h = (9 - m) / 8       (2)
+
+against a normal residual of standard deviation s, g for what six fitted parameters take out of the residuals, h for
+the share of LEDs that are hidden. `expected_impostors` is their sum.
+
+rho is the larger of two densities, of all candidates over their box and of those that are no members within 1.6 radii:
+reflections crowd about the drogue.
+"""
+
+from math import comb
+
+import numpy as np
+
+from dockair.nav.identify.perspective import SLOTS, RingFit
+from dockair.rotations import Array
+
+_NEIGHBOURHOOD_RADII = 1.6
+_LARGEST_EXPONENT = 50.0
+
+
+def box_area_px2(points: Array) -> float:
+    """Area of the candidates' box, at least one pixel."""
+    return max(float(np.prod(np.ptp(points, axis=0))), 1.0)
+
+
+def log10_false_rings(tested: Array | int, count: Array | int, p: Array | float) -> Array:
+    """log10 of Eq. (1).
+
+    Args:
+        tested: N.
+        count: m, 3 to 8.
+        p: as above.
+    """
+    ways = np.array([comb(SLOTS - 3, k) for k in range(SLOTS - 2)])[np.asarray(count) - 3]
+    return np.asarray(np.log10(np.maximum(tested, 1) * ways) + (np.asarray(count) - 3) * np.log10(np.clip(p, 1e-12, 1.0)))
+
+
+def density_px2(points: Array, fit: RingFit) -> float:
+    """rho about a fitted ring."""
+    other = np.ones(len(points), bool)
+    other[fit.candidate[fit.candidate >= 0]] = False
+    reach = _NEIGHBOURHOOD_RADII * fit.radius_px
+    near = np.count_nonzero(((points[other] - fit.centre_px) ** 2).sum(axis=1) < reach * reach)
+    # a box that the ring fills holds at least the ring's own area
+    everywhere = max(len(points) - 3, 1) / max(box_area_px2(points), np.pi * fit.radius_px**2)
+    return max(everywhere, near / (np.pi * reach * reach))
+
+
+def member_odds(points: Array, fit: RingFit, density: float, tolerance_sigmas: float) -> Array:
+    """(8,) Eq. (2) of each slot's candidate; 0 for an empty slot.
+
+    Args:
+        points: (n, 2) candidates [px].
+        fit: of at least four of them.
+        density: rho [1/px^2].
+        tolerance_sigmas: t / s.
+    """
+    filled = fit.candidate >= 0
+    variance = (fit.tolerance_px / tolerance_sigmas) ** 2
+    squares = np.zeros(SLOTS)
+    squares[filled] = ((points[fit.candidate[filled]] - fit.slots_px[filled]) ** 2).sum(axis=1)
+    m = fit.count
+    exponent = np.minimum(squares / (2.0 * variance) * m / (m - 3), _LARGEST_EXPONENT)
+    return np.where(filled, (SLOTS + 1 - m) / SLOTS * density * 2.0 * np.pi * variance * np.exp(exponent), 0.0)

@@ -1,0 +1,198 @@
+"""The four panels of a still at 25 m with reflections: grey, binary and opened, labelled, identified.
+
+The source opened the aperture wider than in operation so that noise came in. Here: f/8 as flown, with the exposure that
+the camera itself sets; then f/2.8 and f/2 with an exposure of twice and four times what it would set there, so that
+reflections and the LEDs' surroundings come up to the LEDs' level. The Sun stands high behind and glints on the basket.
+
+The panels show the source's stages: a fixed threshold half way from the frame's median to the dimmest LED, as a person
+would set it, opening with a 3 x 3 square that spares small blobs, area and shape filters, three-point identification.
+The rows say beside it what the detector that flies makes of the same frame, which sets its thresholds itself.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dockair.calibration import Camera
+from dockair.nav.identify.ring import Identification, IdentificationStatus, identify
+from dockair.nav.image.detect import Blobs, DetectSettings, detect
+from dockair.nav.image.labelling import Runs, foreground_runs
+from dockair.nav.image.morphology import open_components, structuring_element
+from dockair.rotations import Array
+from dockair.scenarios.reproduce.frames import TrueFrame, matches, studio
+from dockair.scenarios.reproduce.image_grid import COLOURS
+from dockair.scenarios.reproduce.reference import picture_name, read_figure
+
+ID = "image/fig28"
+TITLE = "grey, binary, labelled, identified: a rendered still at 25 m with reflections, f/8 to f/2"
+_SOURCE = "[Yoon 2018, fig 28]"
+_RANGE_M = 25.0
+_REFLECTIONS = {"sun.azimuth_deg": 150.0, "sun.elevation_deg": 60.0}
+_WITHIN_PX = 2.0
+_CROP_PX = (320, 240)  # columns, rows that the panels show
+_ZOOM_RADII = 2.2
+_GAMMA = 0.5
+_SIZE_IN, _DPI = (13.0, 8.2), 110
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Still:
+    """One frame to take."""
+
+    title: str
+    settings: Mapping[str, Any] = field(default_factory=dict)
+
+
+def _opened(f_number: float, exposure_us: float) -> Still:
+    settings = {
+        "parameters.lens.f_number": f_number,
+        "camera.exposure": "fixed",
+        "parameters.exposure.exposure_s": 1e-6 * exposure_us,
+    }
+    return Still(title=f"f/{f_number:g}, {exposure_us:g} µs", settings=settings)
+
+
+STILLS = (Still(title="f/8, as flown"), _opened(2.8, 60.0), _opened(2.0, 60.0))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Stages:
+    """What the source's stages make of a frame."""
+
+    threshold_dn: int
+    raw: Runs  #: components of what is above the threshold
+    opened: Runs
+    blobs: Blobs  #: after the filters
+    ring: Identification
+
+
+def stages_of(taken: TrueFrame, camera: Camera) -> Stages:
+    """Run the stages one by one, with the settings of `detect`."""
+    frame, settings = taken.frame, DetectSettings(threshold_dn=_hand_set_threshold(taken))
+    assert settings.threshold_dn is not None
+    raw = foreground_runs(frame.pixels, settings.threshold_dn, settings.connectivity)
+    element = structuring_element(settings.element_shape, settings.element_size_px)
+    opened = open_components(raw, element, settings.spare_below_px, settings.connectivity)
+    blobs = detect(frame.pixels, settings, frame.window, gain_dn_per_electron=frame.gain)
+    ring = identify(blobs.centroids_px, camera=camera, brightness=blobs.flux)
+    return Stages(threshold_dn=settings.threshold_dn, raw=raw, opened=opened, blobs=blobs, ring=ring)
+
+
+def _hand_set_threshold(taken: TrueFrame) -> int:
+    pixels = taken.frame.pixels
+    peaks = [pixels[v - 1 : v + 2, u - 1 : u + 2].max() for u, v in np.round(taken.leds_px).astype(int)]
+    return round(0.5 * (float(np.median(pixels)) + float(min(peaks))))
+
+
+def reproduce(out: Path | None) -> dict[str, Any]:
+    """Take the stills; the panels in `out`."""
+    rows, pictures = [], []
+    for still in STILLS:
+        with studio({**_REFLECTIONS, **still.settings}) as made:
+            taken, camera = made.take(made.ahead(_RANGE_M)), made.parts.sheets.camera
+        stages = stages_of(taken, camera)
+        rows.append({"case": still.title, "ours": _figures(taken, stages, camera), "reference": _printed()})
+        pictures.append((still.title, taken, stages))
+    if out is not None:
+        _draw(pictures, out / picture_name(ID))
+    return {"id": ID, "source": _SOURCE, "rows": rows}
+
+
+def _printed() -> dict[str, float]:
+    """The distance, and that the ring was found."""
+    return read_figure("yoon_2018_image", "28")
+
+
+def _figures(taken: TrueFrame, stages: Stages, camera: Camera) -> dict[str, Any]:
+    frame = taken.frame
+    flying = detect(frame.pixels, None, frame.window, gain_dn_per_electron=frame.gain)
+    ring = identify(flying.centroids_px, camera=camera, brightness=flying.flux)
+    return {
+        "range_m": float(np.linalg.norm(taken.p_CD)),
+        "exposure_us": 1e6 * frame.exposure_s,
+        "background_dn": float(np.median(frame.pixels)),
+        "threshold_dn": stages.threshold_dn,
+        "blobs_binary": stages.raw.count,
+        "blobs_opened": stages.opened.count,
+        **_found("", taken, stages.blobs, stages.ring),
+        **_found("flying_", taken, flying, ring),
+    }
+
+
+def _found(prefix: str, taken: TrueFrame, blobs: Blobs, ring: Identification) -> dict[str, Any]:
+    on_led, found = matches(blobs.centroids_px, taken.leds_px[taken.visible], _WITHIN_PX)
+    return {
+        f"{prefix}leds_found": int(found.sum()),
+        f"{prefix}other_blobs": int((~on_led).sum()),
+        f"{prefix}ring": ring.status.value,
+        f"{prefix}ring_leds": int(on_led[ring.members].sum()),
+        f"{prefix}ring_others": int((~on_led[ring.members]).sum()),
+    }
+
+
+def _draw(pictures: list[tuple[str, TrueFrame, Stages]], path: Path) -> None:
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=_SIZE_IN, dpi=_DPI, layout="constrained")
+    for line, (title, taken, stages) in zip(figure.subplots(len(pictures), 4), pictures, strict=True):
+        _draw_line(line, title, taken, stages)
+    figure.savefig(path)
+
+
+def _draw_line(line: Any, title: str, taken: TrueFrame, stages: Stages) -> None:
+    centre = taken.leds_px.mean(axis=0)
+    left, top = (round(float(c) - 0.5 * size) for c, size in zip(centre, _CROP_PX, strict=True))
+    extent = (left - 0.5, left + _CROP_PX[0] - 0.5, top + _CROP_PX[1] - 0.5, top - 0.5)
+    crop = (slice(top, top + _CROP_PX[1]), slice(left, left + _CROP_PX[0]))
+    grey = (taken.frame.pixels / 255.0) ** _GAMMA
+    labels = _painted(stages.opened, taken.frame.pixels.shape)
+    style = {"extent": extent, "interpolation": "nearest"}
+    line[0].imshow(grey[crop], cmap="gray", vmin=0.0, vmax=1.0, **style)
+    line[1].imshow(labels[crop] > 0, cmap="gray", **style)
+    line[2].imshow(_coloured(labels[crop]), **style)
+    line[3].imshow(grey[crop], cmap="gray", vmin=0.0, vmax=1.0, **style)
+    line[2].plot(*stages.blobs.centroids_px.T, ".", ms=4.0, color="#ff2d2d")
+    _draw_ring(line[3], grey, taken, stages)
+    names = (f"(a) grey, {title}", "(b) binary, opened", f"(c) labelled, {len(stages.blobs)} blobs kept")
+    for axes, name in zip(line, (*names, f"(d) ring {stages.ring.status.value}"), strict=True):
+        axes.set_title(name, fontsize=9)
+        axes.set(xlim=extent[:2], ylim=extent[2:], xticks=[], yticks=[])
+
+
+def _draw_ring(axes: Any, grey: Array, taken: TrueFrame, stages: Stages) -> None:
+    """Box and members, with the ring magnified beside it."""
+    centre, half = taken.leds_px.mean(axis=0), _ZOOM_RADII * float(np.ptp(taken.leds_px[:, 0])) / 2.0
+    inset = axes.inset_axes((0.0, 0.0, 0.62, 0.62 * _CROP_PX[0] / _CROP_PX[1]))
+    inset.imshow(grey, cmap="gray", vmin=0.0, vmax=1.0, interpolation="nearest")
+    inset.set(
+        xlim=(centre[0] - half, centre[0] + half), ylim=(centre[1] + half, centre[1] - half), xticks=[], yticks=[]
+    )
+    for spine in inset.spines.values():
+        spine.set_color("#ff2d2d")
+    if stages.ring.status is IdentificationStatus.FOUND:
+        members = stages.blobs.centroids_px[stages.ring.members]
+        inset.plot(*members.T, "o", ms=9.0, mfc="none", mec="#34c759", mew=1.5)
+        low, high = members.min(axis=0) - 12.0, members.max(axis=0) + 12.0
+        corners = np.array([low, (high[0], low[1]), high, (low[0], high[1]), low])
+        for each in (axes, inset):
+            each.plot(*corners.T, color="#ff2d2d", lw=1.2)
+
+
+def _painted(runs: Runs, shape: tuple[int, ...]) -> NDArray[np.int32]:
+    """(rows, columns) label of each pixel, 0 for background."""
+    labels = np.zeros(shape, np.int32)
+    owner = np.repeat(np.arange(runs.count), np.diff(runs.offset)) + 1
+    for row, start, stop, label in zip(runs.row, runs.start, runs.stop, owner, strict=True):
+        labels[row, start:stop] = label
+    return labels
+
+
+def _coloured(labels: NDArray[np.int32]) -> Array:
+    from matplotlib.colors import to_rgb
+
+    palette = np.array([(0.0, 0.0, 0.0), *(to_rgb(colour) for colour in COLOURS[1:])])
+    return palette[np.where(labels > 0, (labels - 1) % (len(COLOURS) - 1) + 1, 0)]
