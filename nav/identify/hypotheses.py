@@ -5,10 +5,11 @@ perspective image judge them, because a tilted ring is no circle, and `chance` s
 
 Cost: triples of n candidates, each looked up at a cost that does not grow with n (beyond `few_candidates` only three
 patterns of slots are tried); the `_KEPT` least accidental ones compete for at most `max_fits` fits. A hypothesis that an
-earlier fit already contains is not fitted again, nor, after `_HOPELESS` of them, one with too few LEDs to be believed.
+earlier fit already contains is not fitted again, nor one with too few LEDs to be believed, but for `_HOPELESS` of them
+when there is nothing better.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,6 +46,7 @@ class IdentifySettings:
     tolerance_sigmas: float = 4.0  # one true LED in 3000 falls outside in either coordinate
     centre_tolerance_radii: float = 1.0  # of an expected centre without sigma, in ring radii
     radius_tolerance: float = 0.25  # of an expected radius, as a fraction
+    close_radius_tolerance: float = 0.15  # a ring this near to it is preferred to one that is not
     roll_tolerance_rad: float = np.deg2rad(15.0)  # beyond it a numbering is as far from the next, 22.5 being the middle
     predicted_radius_tolerance: float = 0.08  # of a tracked ring: 1.5 m/s toward it at 2 m for five frames
     predicted_roll_tolerance_rad: float = np.deg2rad(8.0)  # of a tracked ring: gyro, and an affine fit's 3 degrees
@@ -90,7 +92,8 @@ def ring_fits(
     scored: list[ScoredFit] = []
     hypotheses, hopeless = _ranked(points, octagons, sigma_px, most_false_rings, settings)
     fits = doubtful = 0
-    while len(hypotheses) and fits < settings.max_fits and doubtful < _HOPELESS:
+    believed = False
+    while len(hypotheses) and fits < settings.max_fits and doubtful < _HOPELESS and not (believed and hopeless[0]):
         fits, doubtful = fits + 1, doubtful + int(hopeless[0])
         fit = fit_ring(
             points, hypotheses[0], camera.focal_length_px, camera.principal_point_px,
@@ -100,6 +103,7 @@ def ring_fits(
         different = not any(_contained(one.fit.candidate, fit.candidate[None])[0] for one in scored)
         if fit.count >= MIN_LEDS and different and fit.tilt_rad <= settings.max_tilt_rad:
             scored.append(_scored(points, fit, octagons, settings))
+            believed |= scored[-1].log10_false_rings <= np.log10(most_false_rings)
         # a hypothesis with an impostor may lose the wrong LEDs in its fit: parts of it still get their own
         size = (hypotheses >= 0).sum(axis=1)
         repeated = _contained(hypotheses[0], hypotheses) & (size == size[0])
@@ -131,6 +135,18 @@ def _scored(points: Array, fit: RingFit, octagons: Octagons, settings: IdentifyS
         odds=member_odds(points, fit, density, settings.tolerance_sigmas),
         fit=fit,
     )
+
+
+def without_impostors(scored: ScoredFit, most: float) -> RingFit | None:
+    """The fit, or the fit less its most doubtful member, so that fewer impostors than `most` are expected; or None."""
+    if scored.odds.sum() <= most:
+        return scored.fit
+    worst = int(np.argmax(scored.odds))
+    if scored.fit.count <= MIN_LEDS or scored.odds.sum() - scored.odds[worst] > most:
+        return None
+    candidate = scored.fit.candidate.copy()
+    candidate[worst] = -1
+    return replace(scored.fit, candidate=candidate)
 
 
 def _contained(larger: NDArray[np.int64], smaller: NDArray[np.int64]) -> NDArray[np.bool_]:
@@ -177,4 +193,6 @@ def _ranked(
     best = best[np.lexsort((-trusted, accident[best]))]
     t2 = settings.tolerance_sigmas**2 * (sigma_px**2 + (settings.ring_sigma * octagons.radius_px[best]) ** 2)
     rings = log10_false_rings(_tested(octagons, octagons.count[best]), octagons.count[best], max(len(points) - 3, 1) * np.pi * t2 / area)
-    return octagons.candidate[best], rings > np.log10(most_false_rings)
+    hopeless = rings > np.log10(most_false_rings)
+    order = np.argsort(hopeless, kind="stable")
+    return octagons.candidate[best[order]], hopeless[order]

@@ -44,6 +44,19 @@ _CELLS = 32  # of the grid, a side
 _KEPT = 4096  # octagons at most, in the order of the triples
 
 
+
+def _inverse_edges() -> Array:
+    """(8, 8, 2, 2) inverse of the edges e_a - e_0, e_b - e_0 for every pattern (a, b)."""
+    e = np.column_stack([_COS, _SIN])
+    inverses = np.full((SLOTS, SLOTS, 2, 2), np.nan)
+    for a, b in ALL_PATTERNS:
+        inverses[a, b] = np.linalg.inv(np.column_stack([e[a] - e[0], e[b] - e[0]]))
+    return inverses
+
+
+_INVERSES = _inverse_edges()
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Octagons:
     """Hypotheses with at least four LEDs, one a row."""
@@ -88,7 +101,7 @@ def find_octagons(
     """
     f, (u, v, reach) = focal_length_px, centre_gate
     relative = np.ascontiguousarray(points - np.array(principal_point_px)) / f
-    inverses = np.array([np.linalg.inv(np.array([_e(a) - _e(0), _e(b) - _e(0)]).T) for a, b in patterns])
+    inverses = _INVERSES[patterns[:, 0], patterns[:, 1]]
     gates = (
         radius_range_px[0] / f, radius_range_px[1] / f, (u - principal_point_px[0]) / f, (v - principal_point_px[1]) / f,
         reach / f, *roll_gate, min_axis_ratio,
@@ -100,10 +113,6 @@ def find_octagons(
         triple=triple, count=count, candidate=candidate, radius_px=size[:, 0] * f, tolerance_px=size[:, 1] * f,
         tested_right_angles=int(tested[0]), tested=int(tested.sum()),
     )  # fmt: skip
-
-
-def _e(slot: int) -> Array:
-    return np.array([_COS[slot], _SIN[slot]])
 
 
 @njit(cache=True)
@@ -131,7 +140,7 @@ def _grid(points, reach):  # type: ignore[no-untyped-def]
     return u0, v0, size, first, entries
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _look_up(points, grid, ring, tolerance, found):  # type: ignore[no-untyped-def]
     """Fill the free slots of `found` with the nearest candidate inside the tolerance; number of slots filled in all.
 
@@ -160,7 +169,7 @@ def _look_up(points, grid, ring, tolerance, found):  # type: ignore[no-untyped-d
     return count
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _aim(points, i, j, k, turn, q):  # type: ignore[no-untyped-def]
     """Aim a camera at the middle of three points: its rotation from camera axes (depth, u, v), and what it sees."""
     u = (points[i, 0] + points[j, 0] + points[k, 0]) / 3.0
@@ -177,8 +186,8 @@ def _aim(points, i, j, k, turn, q):  # type: ignore[no-untyped-def]
         q[row, 1] = (turn[2, 0] + turn[2, 1] * u + turn[2, 2] * v) / depth
 
 
-@njit(cache=True)
-def _map(q, b, c, inverses, p, sign, m):  # type: ignore[no-untyped-def]
+@njit(cache=True, error_model="numpy")
+def _map(q, b, c, inverses, p, m):  # type: ignore[no-untyped-def]
     """Eq. (1) through q (3, 2) in slots 0, b, c with the depths of the last map in m, then Eq. (2); the radius k.
 
     m holds c, A and d: c_u, c_v, A_u0, A_u1, A_v0, A_v1, d_0, d_1.
@@ -199,10 +208,17 @@ def _map(q, b, c, inverses, p, sign, m):  # type: ignore[no-untyped-def]
     if ab > 0.0:
         d1 = -d1
     along = m[6] * d0 + m[7] * d1  # of the two, the one nearer to the last: each start keeps to its own solution
-    if along < 0.0 or (along == 0.0 and sign < 0.0):
+    if along < 0.0:
         d0, d1 = -d0, -d1
     m[6], m[7] = d0, d1
     return np.sqrt(k2)
+
+
+@njit(cache=True)
+def _facing(turn, m):  # type: ignore[no-untyped-def]
+    """k^2 times the cosine of the tilt against the camera's axis."""
+    aimed = m[2] * m[5] - m[3] * m[4]
+    return turn[0, 0] * aimed + turn[1, 0] * (m[4] * m[7] - m[6] * m[5]) + turn[2, 0] * (m[6] * m[3] - m[2] * m[7])
 
 
 @njit(cache=True)
@@ -221,7 +237,7 @@ def _ring(turn, m, ring):  # type: ignore[no-untyped-def]
         ring[2, i] = turn[0, i] * m[7] + turn[1, i] * m[3] + turn[2, i] * m[5]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _passes(ring, k, gates):  # type: ignore[no-untyped-def]
     """Whether a ring is as large, where and turned as the gates want it."""
     k_min, k_max, gate_u, gate_v, gate_r, roll, roll_tol, _ = gates
@@ -293,7 +309,7 @@ def _plausible(points, triples, patterns, inverses, gates):  # type: ignore[no-u
     return out[:n]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _find_octagons(points, triples, patterns, inverses, gates, tol, tol_k):  # type: ignore[no-untyped-def]
     out_triple = np.empty((_KEPT, 3), np.int64)
     out_count = np.empty(_KEPT, np.int64)
@@ -304,7 +320,7 @@ def _find_octagons(points, triples, patterns, inverses, gates, tol, tol_k):  # t
     largest = min(gates[1], 1.2 * extent)
     grid = _grid(points, tol + largest * (tol_k + _LEFT[0] * largest))
     found = np.empty(SLOTS, np.int64)
-    m, turn, ring, q = np.empty(8), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 2))
+    m, first, turn, ring, q = np.empty(8), np.empty(8), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 2))
     n, tested = 0, np.zeros(2, np.int64)
     last_i, last_j, last_k = -1, -1, -1
     plausible = _plausible(points, triples, patterns, inverses, gates)
@@ -314,19 +330,25 @@ def _find_octagons(points, triples, patterns, inverses, gates, tol, tol_k):  # t
             last_i, last_j, last_k = i, j, k
             _aim(points, i, j, k, turn, q)
         b, c = patterns[p, 0], patterns[p, 1]
-        for sign in (1.0, -1.0):
-            m[6] = m[7] = 0.0
-            radius = _map(q, b, c, inverses, p, sign, m)
-            tolerance = tol + tol_k * radius
-            # eps moves the octagon's points against each other by eps of its radius
-            alike = radius * max(abs(m[6]), abs(m[7])) < 0.25 * tolerance
+        m[6] = m[7] = 0.0
+        first_radius = _map(q, b, c, inverses, p, m)
+        tolerance = tol + tol_k * first_radius
+        # eps moves the octagon's points against each other by eps of its radius
+        alike = first_radius * max(abs(m[6]), abs(m[7])) < 0.25 * tolerance
+        first[:] = m
+        for solution in range(1 if alike else 2):
+            radius = first_radius
             if not alike:
+                if solution == 1:
+                    m[:] = first
+                    m[6], m[7] = -first[6], -first[7]
+                if _facing(turn, m) < _LOOSE**2 * gates[7] * radius * radius:
+                    continue
                 for _ in range(_STEPS):
-                    radius = _map(q, b, c, inverses, p, sign, m)
+                    radius = _map(q, b, c, inverses, p, m)
                 tolerance = _tolerance(radius, m, tol, tol_k)
             _ring(turn, m, ring)
-            facing = ring[1, 1] * ring[2, 2] - ring[1, 2] * ring[2, 1]
-            if (alike or facing >= _LOOSE * gates[7] * radius * radius) and _passes(ring, radius, gates):
+            if (alike or _facing(turn, m) >= _LOOSE * gates[7] * radius * radius) and _passes(ring, radius, gates):
                 tested[int(b % 2 == 1 or c % 2 == 1)] += 1
                 found[:] = -1
                 found[0], found[b], found[c] = i, j, k
@@ -337,6 +359,4 @@ def _find_octagons(points, triples, patterns, inverses, gates, tol, tol_k):  # t
                     out_slots[n] = found
                     out_size[n, 0], out_size[n, 1] = radius, tolerance
                     n += 1
-            if alike:
-                break
     return out_triple[:n].copy(), out_count[:n].copy(), out_slots[:n].copy(), out_size[:n].copy(), tested

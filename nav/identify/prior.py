@@ -78,7 +78,9 @@ def ring_from_leds(led_px: Array) -> tuple[Array, float, float]:
     centre = led_px.mean(axis=0)
     A = -2.0 * (led_px - centre).T @ np.column_stack([np.cos(angle), np.sin(angle)]) / 8
     roll = float(np.arctan2(A[1, 0] - A[0, 1], A[0, 0] + A[1, 1]))
-    return centre, float(np.linalg.norm(A, 2)), roll
+    square = 0.5 * (A**2).sum()
+    radius = np.sqrt(square + np.sqrt(max(square**2 - float(A[0, 0] * A[1, 1] - A[0, 1] * A[1, 0]) ** 2, 0.0)))
+    return centre, float(radius), roll
 
 
 def _finite(expectation: Expectation | None) -> Expectation | None:

@@ -25,7 +25,14 @@ from numpy.typing import NDArray
 from dockair.calibration import Camera
 from dockair.errors import DockairError
 from dockair.nav.identify.ellipse import MIN_POINTS, Ellipse, fit_ellipse, places_on_circle
-from dockair.nav.identify.hypotheses import METHODS, MIN_LEDS, IdentifySettings, ScoredFit, ring_fits
+from dockair.nav.identify.hypotheses import (
+    METHODS,
+    MIN_LEDS,
+    IdentifySettings,
+    ScoredFit,
+    ring_fits,
+    without_impostors,
+)
 from dockair.nav.identify.perspective import SLOTS, RingFit
 from dockair.nav.identify.prior import RingPrior, make_prior, ring_from_leds
 from dockair.rotations import Array
@@ -151,26 +158,41 @@ def _candidates(points: Array, prior: RingPrior, brightness: Array | None, most:
 
 
 def _decide(
-    fits: list[ScoredFit], prior: RingPrior, most_false_rings: float, settings: IdentifySettings
+    fits: list[ScoredFit],
+    prior: RingPrior,
+    most_false_rings: float,
+    settings: IdentifySettings,
 ) -> tuple[IdentificationStatus, RingFit | None]:
     """The one ring that is no accident, if there is one."""
     expected = [one for one in fits if _is_expected(one.fit, prior)]
     if not expected:
         return IdentificationStatus.NOT_FOUND, None
-    credible = [one.fit for one in expected if one.log10_false_rings <= np.log10(most_false_rings)]
-    # a ring whose roll is as expected beats one whose roll is not; if there is none, `_numbered` says AMBIGUOUS
-    rightly_rolled = [fit for fit in credible if _roll(fit, prior)[1] <= settings.roll_tolerance_rad]
-    credible = rightly_rolled or credible
+    credible = [one for one in expected if one.log10_false_rings <= np.log10(most_false_rings)]
+    # a ring as large and turned as expected beats one that is not; if there is none, `_numbered` says AMBIGUOUS
+    for is_better in (_is_close, _is_rightly_rolled):
+        credible = [one for one in credible if is_better(one.fit, prior, settings)] or credible
     if not credible:
         return IdentificationStatus.AMBIGUOUS, None
     best = credible[0]
-    mine = set(best.candidate[best.candidate >= 0].tolist())
+    mine = set(best.fit.candidate[best.fit.candidate >= 0].tolist())
     for rival in credible[1:]:
-        theirs = set(rival.candidate[rival.candidate >= 0].tolist())
+        theirs = set(rival.fit.candidate[rival.fit.candidate >= 0].tolist())
         # fewer LEDs, most of them the same: this ring seen less well. Anything else is another ring.
         if len(theirs) >= len(mine) or len(theirs & mine) < 3:
             return IdentificationStatus.AMBIGUOUS, None
-    return IdentificationStatus.FOUND, best
+    most = settings.max_impostors_with_prior if prior.has_centre else settings.max_impostors
+    fit = without_impostors(best, most)
+    return (IdentificationStatus.AMBIGUOUS, None) if fit is None else (IdentificationStatus.FOUND, fit)
+
+
+def _is_close(fit: RingFit, prior: RingPrior, settings: IdentifySettings) -> bool:
+    """Whether a fitted ring is nearly as large as expected; no when nothing is."""
+    return abs(fit.radius_px - prior.expected_radius_px) <= settings.close_radius_tolerance * prior.expected_radius_px
+
+
+def _is_rightly_rolled(fit: RingFit, prior: RingPrior, settings: IdentifySettings) -> bool:
+    """Whether a fitted ring is turned as expected."""
+    return _roll(fit, prior)[1] <= settings.roll_tolerance_rad
 
 
 def _is_expected(fit: RingFit, prior: RingPrior) -> bool:

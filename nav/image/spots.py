@@ -35,7 +35,7 @@ from dockair.nav.image.labelling import Runs
 from dockair.rotations import Array
 
 _REACH_PX = (4, 2, 8, 14)
-_ROW_STEP = (1, 1, 2, 4)
+_ROW_STEP = (2, 1, 3, 4)
 _SEGMENT = 64  # pixels that are passed over at once
 _CELL = 16  # of the grid that finds earlier spots; not less than the largest reach
 _SPARE = 8  # one pixel in so many of a ring may be as bright as it likes
@@ -60,6 +60,8 @@ def _ring(reach: int) -> NDArray[np.int32]:
 _RINGS = [_ring(reach) for reach in _REACH_PX]
 _RING_STEPS = np.concatenate(_RINGS)
 _RING_OFFSET = np.concatenate([[0], np.cumsum([len(r) for r in _RINGS])])
+import os
+_KAPPA=float(os.environ.get('KAPPA','1'))
 _RHO=.04
 _D2=np.zeros((20000,6))
 _D = np.zeros(3, np.int64)
@@ -95,7 +97,7 @@ def find_spots(
     )
 
 
-@njit(cache=True)
+@njit()
 def _contrast(centre, above, below, left, right, zero):  # type: ignore[no-untyped-def]
     """Largest contrast of a segment's pixels to the second brightest of their four neighbours at one reach.
 
@@ -106,11 +108,12 @@ def _contrast(centre, above, below, left, right, zero):  # type: ignore[no-untyp
         high_1, low_1 = max(above[k], below[k]), min(above[k], below[k])
         high_2, low_2 = max(left[k], right[k]), min(left[k], right[k])
         second = max(min(high_1, high_2), max(low_1, low_2))
-        best = max(best, centre.dtype.type(max(centre[k], second) - second))
+        raised = centre.dtype.type(min(second, 223) + (second >> 3))
+        best = max(best, centre.dtype.type(max(centre[k], raised) - raised))
     return best
 
 
-@njit(cache=True)
+@njit()
 def _climb(image, i, j, reach):  # type: ignore[no-untyped-def]
     """The local maximum above a pixel, at most 2 reach steps away."""
     rows, columns = image.shape
@@ -126,7 +129,7 @@ def _climb(image, i, j, reach):  # type: ignore[no-untyped-def]
     return i, j
 
 
-@njit(cache=True)
+@njit()
 def _extent(image, i, j, di, dj, level, reach):  # type: ignore[no-untyped-def]
     """Steps from (i, j) along (di, dj) over pixels above the level; more than 2 reach - 1 are not counted."""
     rows, columns = image.shape
@@ -139,7 +142,7 @@ def _extent(image, i, j, di, dj, level, reach):  # type: ignore[no-untyped-def]
     return n
 
 
-@njit(cache=True)
+@njit()
 def _middle(image, i, j, level, reach):  # type: ignore[no-untyped-def]
     """Middle of the pixels above the level along the column, then the row; row -1 if they are too many."""
     for _ in range(2):
@@ -154,7 +157,7 @@ def _middle(image, i, j, level, reach):  # type: ignore[no-untyped-def]
     return i, j
 
 
-@njit(cache=True)
+@njit()
 def _surroundings(image, i, j, ring, limit, brightest):  # type: ignore[no-untyped-def]
     """m and b of Eq. (1), with the spare brightest left out; m = -1 as soon as it is above the limit."""
     spare = len(ring) // _SPARE
@@ -177,7 +180,7 @@ def _surroundings(image, i, j, ring, limit, brightest):  # type: ignore[no-untyp
     return brightest[spare], total / (len(ring) - spare)
 
 
-@njit(cache=True)
+@njit()
 def _flood(image, i, j, ci, cj, level, reach, patch, stack):  # type: ignore[no-untyped-def]
     """Mark the pixels above the level that are connected to (i, j) in the patch around (ci, cj): 1 if they are a spot.
 
@@ -199,7 +202,11 @@ def _flood(image, i, j, ci, cj, level, reach, patch, stack):  # type: ignore[no-
                 u, v = a - ci, b - cj
                 if patch[u + reach, v + reach] or image[a, b] <= level:
                     continue
-                if u * u + v * v >= limit or image[a, b] > peak:
+                if u * u + v * v >= limit:
+                    if reach == 2:
+                        continue
+                    return False
+                if image[a, b] > peak:
                     return False
                 patch[u + reach, v + reach] = 1
                 stack[depth, 0], stack[depth, 1] = a, b
@@ -207,14 +214,14 @@ def _flood(image, i, j, ci, cj, level, reach, patch, stack):  # type: ignore[no-
     return True
 
 
-@njit(cache=True)
+@njit()
 def _grown(array):  # type: ignore[no-untyped-def]
     wide = np.empty(2 * len(array), array.dtype)
     wide[: len(array)] = array
     return wide
 
 
-@njit(cache=True)
+@njit()
 def _find(image, zero, least, wide, factor, share, gain, noise, reaches, steps, rings, ring_offset, debug, debug2,rho):  # type: ignore[no-untyped-def]
     rows, columns = image.shape
     row, start, stop = np.empty(512, np.int32), np.empty(512, np.int32), np.empty(512, np.int32)
@@ -247,7 +254,7 @@ def _find(image, zero, least, wide, factor, share, gain, noise, reaches, steps, 
                     a, b = np.int64(image[i - reach, j]), np.int64(image[i + reach, j])
                     c, d = np.int64(image[i, j - reach]), np.int64(image[i, j + reach])
                     second = max(min(max(a, b), max(c, d)), max(min(a, b), min(c, d)))
-                    if x - second < c_min:
+                    if x - second - (second>>3) < c_min:
                         continue
                     hits += 1
                     pi, pj = _climb(image, i, j, reach)
@@ -276,7 +283,7 @@ def _find(image, zero, least, wide, factor, share, gain, noise, reaches, steps, 
                     if m < 0:
                         continue
                     contrast = peak - m
-                    if contrast < factor * np.sqrt(gain * m + noise * noise+(rho*m)**2) or contrast < (m - b_):
+                    if contrast < factor * np.sqrt(gain * m + noise * noise+(rho*m)**2) or contrast < _KAPPA*(m - b_):
                         continue
                     fl += 1
                     lowest = b_ + max(factor * np.sqrt(gain * b_ + noise * noise+(.0*b_)**2), share * (peak - b_))

@@ -33,10 +33,11 @@ _SOURCE = "[Yoon 2018, fig 28]"
 _RANGE_M = 25.0
 _REFLECTIONS = {"sun.azimuth_deg": 150.0, "sun.elevation_deg": 60.0}
 _WITHIN_PX = 2.0
-_CROP_PX = (320, 240)  # columns, rows that the panels show
-_ZOOM_RADII = 2.2
+_ZOOM_RADII = 1.7
+_BOX_MARGIN_PX = 12.0
+_REDUCTION = 4
 _GAMMA = 0.5
-_SIZE_IN, _DPI = (13.0, 8.2), 110
+_SIZE_IN, _DPI = (17.0, 6.2), 110
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,26 +61,37 @@ STILLS = (Still(title="f/8, as flown"), _opened(2.8, 60.0), _opened(2.0, 60.0))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Outcome:
+    """What is left after the filters, and the ring in it."""
+
+    blobs: Blobs
+    ring: Identification
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Stages:
-    """What the source's stages make of a frame."""
+    """What the stages make of a frame."""
 
     threshold_dn: int
     raw: Runs  #: components of what is above the threshold
     opened: Runs
-    blobs: Blobs  #: after the filters
-    ring: Identification
+    outcome: Outcome
 
 
-def stages_of(taken: TrueFrame, camera: Camera) -> Stages:
-    """Run the stages one by one, with the settings of `detect`."""
-    frame, settings = taken.frame, DetectSettings(threshold_dn=_hand_set_threshold(taken))
-    assert settings.threshold_dn is not None
-    raw = foreground_runs(frame.pixels, settings.threshold_dn, settings.connectivity)
+def stages_of(taken: TrueFrame, camera: Camera, threshold_dn: int) -> Stages:
+    """Run the stages one by one at a threshold, and the detector and the identification with it."""
+    settings = DetectSettings(threshold_dn=threshold_dn)
+    raw = foreground_runs(taken.frame.pixels, threshold_dn, settings.connectivity)
     element = structuring_element(settings.element_shape, settings.element_size_px)
     opened = open_components(raw, element, settings.spare_below_px, settings.connectivity)
+    return Stages(threshold_dn=threshold_dn, raw=raw, opened=opened, outcome=outcome_of(taken, camera, settings))
+
+
+def outcome_of(taken: TrueFrame, camera: Camera, settings: DetectSettings) -> Outcome:
+    """Detect and identify."""
+    frame = taken.frame
     blobs = detect(frame.pixels, settings, frame.window, gain_dn_per_electron=frame.gain)
-    ring = identify(blobs.centroids_px, camera=camera, brightness=blobs.flux)
-    return Stages(threshold_dn=settings.threshold_dn, raw=raw, opened=opened, blobs=blobs, ring=ring)
+    return Outcome(blobs=blobs, ring=identify(blobs.centroids_px, camera=camera, brightness=blobs.flux))
 
 
 def _hand_set_threshold(taken: TrueFrame) -> int:
@@ -90,40 +102,35 @@ def _hand_set_threshold(taken: TrueFrame) -> int:
 
 def reproduce(out: Path | None) -> dict[str, Any]:
     """Take the stills; the panels in `out`."""
+    printed = read_figure("yoon_2018_image", "28")
     rows, pictures = [], []
     for still in STILLS:
         with studio({**_REFLECTIONS, **still.settings}) as made:
             taken, camera = made.take(made.ahead(_RANGE_M)), made.parts.sheets.camera
-        stages = stages_of(taken, camera)
-        rows.append({"case": still.title, "ours": _figures(taken, stages, camera), "reference": _printed()})
-        pictures.append((still.title, taken, stages))
+        stages = stages_of(taken, camera, _hand_set_threshold(taken))
+        flying = outcome_of(taken, camera, DetectSettings())
+        rows.append({"case": still.title, "ours": _figures(taken, stages, flying), "reference": printed})
+        pictures.append((still.title, taken, stages, flying))
     if out is not None:
         _draw(pictures, out / picture_name(ID))
     return {"id": ID, "source": _SOURCE, "rows": rows}
 
 
-def _printed() -> dict[str, float]:
-    """The distance, and that the ring was found."""
-    return read_figure("yoon_2018_image", "28")
-
-
-def _figures(taken: TrueFrame, stages: Stages, camera: Camera) -> dict[str, Any]:
-    frame = taken.frame
-    flying = detect(frame.pixels, None, frame.window, gain_dn_per_electron=frame.gain)
-    ring = identify(flying.centroids_px, camera=camera, brightness=flying.flux)
+def _figures(taken: TrueFrame, stages: Stages, flying: Outcome) -> dict[str, Any]:
     return {
         "range_m": float(np.linalg.norm(taken.p_CD)),
-        "exposure_us": 1e6 * frame.exposure_s,
-        "background_dn": float(np.median(frame.pixels)),
+        "exposure_us": 1e6 * taken.frame.exposure_s,
+        "background_dn": float(np.median(taken.frame.pixels)),
         "threshold_dn": stages.threshold_dn,
         "blobs_binary": stages.raw.count,
         "blobs_opened": stages.opened.count,
-        **_found("", taken, stages.blobs, stages.ring),
-        **_found("flying_", taken, flying, ring),
+        **_found("", taken, stages.outcome),
+        **_found("flying_", taken, flying),
     }
 
 
-def _found(prefix: str, taken: TrueFrame, blobs: Blobs, ring: Identification) -> dict[str, Any]:
+def _found(prefix: str, taken: TrueFrame, outcome: Outcome) -> dict[str, Any]:
+    blobs, ring = outcome.blobs, outcome.ring
     on_led, found = matches(blobs.centroids_px, taken.leds_px[taken.visible], _WITHIN_PX)
     return {
         f"{prefix}leds_found": int(found.sum()),
@@ -134,52 +141,76 @@ def _found(prefix: str, taken: TrueFrame, blobs: Blobs, ring: Identification) ->
     }
 
 
-def _draw(pictures: list[tuple[str, TrueFrame, Stages]], path: Path) -> None:
+def _draw(pictures: list[tuple[str, TrueFrame, Stages, Outcome]], path: Path) -> None:
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=_SIZE_IN, dpi=_DPI, layout="constrained")
-    for line, (title, taken, stages) in zip(figure.subplots(len(pictures), 4), pictures, strict=True):
-        _draw_line(line, title, taken, stages)
+    for line, picture in zip(figure.subplots(len(pictures), 5), pictures, strict=True):
+        _draw_line(line, *picture)
     figure.savefig(path)
 
 
-def _draw_line(line: Any, title: str, taken: TrueFrame, stages: Stages) -> None:
-    centre = taken.leds_px.mean(axis=0)
-    left, top = (round(float(c) - 0.5 * size) for c, size in zip(centre, _CROP_PX, strict=True))
-    extent = (left - 0.5, left + _CROP_PX[0] - 0.5, top + _CROP_PX[1] - 0.5, top - 0.5)
-    crop = (slice(top, top + _CROP_PX[1]), slice(left, left + _CROP_PX[0]))
+def _draw_line(line: Any, title: str, taken: TrueFrame, stages: Stages, flying: Outcome) -> None:
     grey = (taken.frame.pixels / 255.0) ** _GAMMA
     labels = _painted(stages.opened, taken.frame.pixels.shape)
-    style = {"extent": extent, "interpolation": "nearest"}
-    line[0].imshow(grey[crop], cmap="gray", vmin=0.0, vmax=1.0, **style)
-    line[1].imshow(labels[crop] > 0, cmap="gray", **style)
-    line[2].imshow(_coloured(labels[crop]), **style)
-    line[3].imshow(grey[crop], cmap="gray", vmin=0.0, vmax=1.0, **style)
-    line[2].plot(*stages.blobs.centroids_px.T, ".", ms=4.0, color="#ff2d2d")
-    _draw_ring(line[3], grey, taken, stages)
-    names = (f"(a) grey, {title}", "(b) binary, opened", f"(c) labelled, {len(stages.blobs)} blobs kept")
-    for axes, name in zip(line, (*names, f"(d) ring {stages.ring.status.value}"), strict=True):
+    binary, coloured = (labels > 0).astype(float), _coloured(labels)
+    kept = len(stages.outcome.blobs)
+    for axes, image, name in zip(
+        line,
+        (grey, binary, coloured, grey, grey),
+        (
+            f"(a) grey, {title}",
+            f"(b) over {stages.threshold_dn} DN, opened",
+            f"(c) labelled, {kept} of {stages.opened.count} kept",
+            f"(d) ring {stages.outcome.ring.status.value}",
+            f"as flown: {len(flying.blobs)} blobs, {flying.ring.status.value}",
+        ),
+        strict=True,
+    ):
+        axes.imshow(_reduced(image), cmap="gray", vmin=0.0, vmax=1.0, extent=_extent(image), interpolation="nearest")
         axes.set_title(name, fontsize=9)
-        axes.set(xlim=extent[:2], ylim=extent[2:], xticks=[], yticks=[])
+        axes.set(xticks=[], yticks=[])
+        inset = _magnified(axes, image, taken)
+        if axes is line[2]:
+            for each in (axes, inset):
+                each.plot(*stages.outcome.blobs.centroids_px.T, ".", ms=3.0, color="#ff2d2d")
+    _draw_ring(line[3], stages.outcome)
+    _draw_ring(line[4], flying)
 
 
-def _draw_ring(axes: Any, grey: Array, taken: TrueFrame, stages: Stages) -> None:
-    """Box and members, with the ring magnified beside it."""
-    centre, half = taken.leds_px.mean(axis=0), _ZOOM_RADII * float(np.ptp(taken.leds_px[:, 0])) / 2.0
-    inset = axes.inset_axes((0.0, 0.0, 0.62, 0.62 * _CROP_PX[0] / _CROP_PX[1]))
-    inset.imshow(grey, cmap="gray", vmin=0.0, vmax=1.0, interpolation="nearest")
-    inset.set(
-        xlim=(centre[0] - half, centre[0] + half), ylim=(centre[1] + half, centre[1] - half), xticks=[], yticks=[]
-    )
+def _magnified(axes: Any, image: Array, taken: TrueFrame) -> Any:
+    """The ring's surroundings in the panel's corner where there is only sky."""
+    centre, half = taken.leds_px.mean(axis=0), _ZOOM_RADII * 0.5 * float(np.ptp(taken.leds_px[:, 0]))
+    inset = axes.inset_axes((0.55, 0.2, 0.45, 0.8))
+    inset.imshow(image, cmap="gray", vmin=0.0, vmax=1.0, interpolation="nearest")
+    inset.set(xlim=(centre[0] - half, centre[0] + half), ylim=(centre[1] + half, centre[1] - half))
+    inset.set(xticks=[], yticks=[])
     for spine in inset.spines.values():
-        spine.set_color("#ff2d2d")
-    if stages.ring.status is IdentificationStatus.FOUND:
-        members = stages.blobs.centroids_px[stages.ring.members]
-        inset.plot(*members.T, "o", ms=9.0, mfc="none", mec="#34c759", mew=1.5)
-        low, high = members.min(axis=0) - 12.0, members.max(axis=0) + 12.0
-        corners = np.array([low, (high[0], low[1]), high, (low[0], high[1]), low])
-        for each in (axes, inset):
-            each.plot(*corners.T, color="#ff2d2d", lw=1.2)
+        spine.set_color("tab:orange")
+    return inset
+
+
+def _draw_ring(axes: Any, outcome: Outcome) -> None:
+    """Box and members, in the panel and magnified."""
+    if outcome.ring.status is not IdentificationStatus.FOUND:
+        return
+    members = outcome.blobs.centroids_px[outcome.ring.members]
+    low, high = members.min(axis=0) - _BOX_MARGIN_PX, members.max(axis=0) + _BOX_MARGIN_PX
+    corners = np.array([low, (high[0], low[1]), high, (low[0], high[1]), low])
+    for each in (axes, *axes.child_axes):
+        each.plot(*corners.T, color="#ff2d2d", lw=1.2)
+    axes.child_axes[0].plot(*members.T, "o", ms=8.0, mfc="none", mec="#34c759", mew=1.5)
+
+
+def _extent(image: Array) -> tuple[float, float, float, float]:
+    return -0.5, image.shape[1] - 0.5, image.shape[0] - 0.5, -0.5
+
+
+def _reduced(image: Array) -> Array:
+    """Brightest of each block, so that a far LED stays."""
+    rows, columns = (size // _REDUCTION for size in image.shape[:2])
+    blocks = image[: rows * _REDUCTION, : columns * _REDUCTION]
+    return np.asarray(blocks.reshape(rows, _REDUCTION, columns, _REDUCTION, -1).max(axis=(1, 3)).squeeze())
 
 
 def _painted(runs: Runs, shape: tuple[int, ...]) -> NDArray[np.int32]:

@@ -112,7 +112,7 @@ def _draw(scene: Scene, chosen: TrustedCircle, path: Path) -> None:
 
 
 def _draw_surface(axes: Any, centres: Array, T: Array) -> None:
-    """Largest trust in each cell of the image, from 0, as far from all others as the cap allows, to 1 at the highest."""
+    """Largest trust in each cell of the image, from 0, far from all others, to 1 at the highest."""
     cell = 8.0
     inside = ((centres >= 0.0) & (centres < np.array(SIZE_PX))).all(axis=1)
     columns, rows = (centres[inside] // cell).astype(int).T

@@ -61,9 +61,7 @@ def find_glints(
         light: the Sun's angular radius.
         ahead_W: (3,) the camera's axis, to leave out what lies behind the lens; None for all around.
     """
-    rows = _rows(data, mirrors, np.asarray(p_WC, dtype=float), np.asarray(s_W, dtype=float), surfaces, light)
-    if ahead_W is not None:
-        rows = rows[(rows[:, :3] - p_WC) @ ahead_W > 0.0]
+    rows = glint_rows(data, mirrors, p_WC, s_W, surfaces, light, ahead_W)
     seen, starts = starts_of_seen(model, data, p_WC, rows)
     kept = [i for i in np.flatnonzero(seen) if is_clear(model, data, starts[i], s_W, np.inf)]
     return Glints(p_W=rows[kept, :3], area_m2_sr=rows[kept, 6], size_m=rows[kept, 7])
@@ -87,11 +85,17 @@ def starts_of_seen(
     return (hit < 0.0) | (hit > distance - slack), starts
 
 
-def _rows(
-    data: mujoco.MjData, mirrors: Mirrors, p_WC: Array, s_W: Array, surfaces: SurfaceParameters, light: LightParameters
+def glint_rows(
+    data: mujoco.MjData,
+    mirrors: Mirrors,
+    p_WC: Array,
+    s_W: Array,
+    surfaces: SurfaceParameters,
+    light: LightParameters,
+    ahead_W: Array | None = None,
 ) -> Array:
-    """(n, ROW) glints, hidden ones among them."""
-    eye, sun = vector(p_WC), s_W[None]
+    """(n, ROW) glints, hidden ones among them; arguments as of `find_glints`."""
+    eye, sun = vector(p_WC), np.array(s_W, dtype=float, ndmin=2)
     xpos, xmat = data.geom_xpos, data.geom_xmat
     finish, variance = finishes(surfaces), 0.25 * light.sun_angular_radius_rad**2
     limits = (
@@ -110,4 +114,5 @@ def _rows(
     rows = np.empty((_MOST, ROW))
     count = spot_rows(spots[:n], sun, 0.0, variance, eye, finish, limits, rows, 0)
     count = facet_rows(mirrors.facets, (xpos, xmat), (vector(s_W), 0.0, variance), eye, finish, limits, rows, count)
-    return rows[:count]
+    rows = rows[:count]
+    return rows if ahead_W is None else rows[(rows[:, :3] - p_WC) @ ahead_W > 0.0]

@@ -67,6 +67,29 @@ def find_led_reflections(
         pattern_exponent: m of Eq. (1).
         surfaces: reflectances, side light, limits.
     """
+    rows, intensity = led_reflection_rows(
+        data, mirrors, p_WC, leds_W, axis_W, intensity_w_sr, pattern_exponent, surfaces
+    )
+    led = rows[:, 9].astype(np.intp)
+    seen, starts = starts_of_seen(model, data, p_WC, rows)
+    kept = [i for i in np.flatnonzero(seen) if is_lit(model, data, starts[i], leds_W[led[i]], surfaces.led_seat_m)]
+    return LedReflections(p_W=rows[kept, :3], intensity_w_sr=intensity[kept], led=led[kept])
+
+
+def led_reflection_rows(
+    data: mujoco.MjData,
+    mirrors: Mirrors,
+    p_WC: Array,
+    leds_W: Array,
+    axis_W: Array,
+    intensity_w_sr: Array,
+    pattern_exponent: float,
+    surfaces: SurfaceParameters,
+) -> tuple[Array, Array]:
+    """(n, ROW) reflections that are bright enough, hidden ones among them, and (n,) their intensities [W/sr].
+
+    Arguments as of `find_led_reflections`.
+    """
     p_WC, leds_W = np.asarray(p_WC, dtype=float), np.asarray(leds_W, dtype=float)
     limit = surfaces.faintest_reflection * float(np.max(intensity_w_sr, initial=0.0))
     wanted = _bound(data, mirrors, p_WC, leds_W, axis_W, surfaces) * np.asarray(intensity_w_sr)[:, None] >= limit
@@ -77,10 +100,7 @@ def find_led_reflections(
     pattern = np.maximum(np.maximum(ray @ axis_W / d1, 0.0) ** pattern_exponent, surfaces.led_side_light)
     intensity = np.asarray(intensity_w_sr)[led] * pattern * rows[:, 6] / d1**2
     bright = np.flatnonzero((intensity > 0.0) & (intensity >= limit))
-    rows, intensity, led = rows[bright], intensity[bright], led[bright]
-    seen, starts = starts_of_seen(model, data, p_WC, rows)
-    kept = [i for i in np.flatnonzero(seen) if _is_lit(model, data, starts[i], leds_W[led[i]], surfaces.led_seat_m)]
-    return LedReflections(p_W=rows[kept, :3], intensity_w_sr=intensity[kept], led=led[kept])
+    return rows[bright], intensity[bright]
 
 
 def _bound(
@@ -151,9 +171,10 @@ def _dot(a: Vector, b: Vector) -> float:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-def _is_lit(model: mujoco.MjModel, data: mujoco.MjData, start: Array, led_W: Array, seat_m: float) -> bool:
+def is_lit(model: mujoco.MjModel, data: mujoco.MjData, start: Array, led_W: Array, seat_m: float) -> bool:
+    """Say whether nothing stands between a place (3,) and an LED, but for its seat."""
     ray = led_W - start
-    distance = float(np.linalg.norm(ray))
+    distance = math.sqrt(ray @ ray)
     return is_clear(model, data, start, ray / distance, distance - seat_m)
 
 

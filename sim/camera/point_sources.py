@@ -19,10 +19,11 @@ from numpy.typing import NDArray
 
 from dockair.rotations import Array, skew
 from dockair.sim.as_built import AsBuilt
-from dockair.sim.camera.glints import find_glints
-from dockair.sim.camera.led_reflections import find_led_reflections
+from dockair.sim.camera.glints import glint_rows, starts_of_seen
+from dockair.sim.camera.led_reflections import is_lit, led_reflection_rows
+from dockair.sim.camera.lobes import ROW
 from dockair.sim.camera.mirrors import Mirrors
-from dockair.sim.camera.occlusion import hidden
+from dockair.sim.camera.occlusion import hidden, is_clear
 from dockair.sim.camera.radiometry import Responses, led_electrons
 from dockair.sim.camera.sun_view import SunView
 
@@ -84,16 +85,18 @@ class PointSources:
         """
         R_WC, p_WC = pose
         leds_W, intensity = self.leds_W(data), self._as_built.led_intensity_w_sr * led_factors
-        mirrored = self._led_reflections(data, p_WC, leds_W, intensity), self._glints(data, pose)
-        places_W, electrons_m2_s, size_m = (np.concatenate(each) for each in zip(*mirrored, strict=True))
+        axis_W = data.xmat[self._drogue].reshape(3, 3) @ _LED_AXIS_D
+        visible, places_W, electrons_m2_s, size_m = self._seen(data, pose, leds_W, axis_W, intensity)
         p_C = (np.concatenate([leds_W, places_W]) - p_WC) @ R_WC
         p_CL, p_CM = p_C[: len(leds_W)], p_C[len(leds_W) :]
-        rates = self._led_rates(data, pose, p_CL, intensity), electrons_m2_s * self._per_area(p_CM)
+        leds_s = led_electrons(
+            self._response, self._sheets.leds, intensity, p_CL, axis_W @ R_WC, 1.0, self._extinction_1_m
+        )
         px_per_m = self._as_built.camera.focal_length_px / np.maximum(p_CM[:, 0], _NEAREST_M)
         sizes = np.full(len(leds_W), self._sheets.leds.die_size_m), _rounded(size_m, px_per_m)
         return Sources(
             p_C=p_C,
-            electrons=exposure_s * np.concatenate(rates),
+            electrons=exposure_s * np.concatenate([leds_s * visible, electrons_m2_s * self._per_area(p_CM)]),
             size_m=np.concatenate(sizes),
             way_C_m=exposure_s * self._velocities_C(data, pose, p_C, leds_W),
         )
@@ -108,39 +111,29 @@ class PointSources:
         clearance = self._sheets.leds.occlusion_clearance_m
         return np.logical_not(hidden(self._model, data, p_WC, self.leds_W(data), clearance))
 
-    def _led_rates(self, data: mujoco.MjData, pose: tuple[Array, Array], p_CL: Array, intensity: Array) -> Array:
-        """(n,) electrons per second of the LEDs themselves, at p_CL (n, 3) in camera axes."""
-        R_WC, p_WC = pose
-        axis_C = R_WC.T @ data.xmat[self._drogue].reshape(3, 3) @ _LED_AXIS_D
-        rates = led_electrons(self._response, self._sheets.leds, intensity, p_CL, axis_C, 1.0, self._extinction_1_m)
-        return np.where(self.visible_leds(data, p_WC), rates, 0.0)
-
-    def _led_reflections(self, data: mujoco.MjData, p_WC: Array, leds_W: Array, intensity: Array) -> _Found:
-        """LEDs mirrored by basket and probe: their light has the LEDs' spectrum."""
-        axis_W = data.xmat[self._drogue].reshape(3, 3) @ _LED_AXIS_D
-        exponent, surfaces = self._sheets.leds.pattern_exponent, self._sheets.surfaces
-        found = find_led_reflections(
-            self._model, data, self._mirrors, p_WC, leds_W, axis_W, intensity, exponent, surfaces
+    def _seen(
+        self, data: mujoco.MjData, pose: tuple[Array, Array], leds_W: Array, axis_W: Array, intensity: Array
+    ) -> tuple[NDArray[np.bool_], Array, Array, Array]:
+        """What the lens sees, all rays at once: (m,) which LEDs, and of what mirrors them or the Sun (n, 3) places in W,
+        (n,) electrons per second times m^2, (n,) sizes.
+        """
+        leds, surfaces, response = self._sheets.leds, self._sheets.surfaces, self._response
+        direct = np.zeros((len(leds_W), ROW))
+        direct[:, :3], direct[:, 8] = leds_W, leds.occlusion_clearance_m
+        reflected, intensity_w_sr = led_reflection_rows(
+            data, self._mirrors, pose[1], leds_W, axis_W, intensity, leds.pattern_exponent, surfaces
         )
-        return found.p_W, self._response.led_e_m2_sr_w_s * found.intensity_w_sr, np.zeros(len(found.p_W))
-
-    def _glints(self, data: mujoco.MjData, pose: tuple[Array, Array]) -> _Found:
-        """The Sun mirrored by everything."""
-        sun = self._sun
-        if sun is None or sun.beam <= 0.0:
-            return np.empty((0, 3)), np.empty(0), np.empty(0)
-        found = find_glints(
-            self._model,
-            data,
-            self._mirrors,
-            pose[1],
-            sun.direction_W,
-            self._sheets.surfaces,
-            self._sheets.light,
-            pose[0][:, 0],
-        )
-        return found.p_W, self._response.glint_e_m2_s * sun.beam * found.area_m2_sr, found.size_m
-
+        rows = np.concatenate([direct, reflected, self._glint_rows(data, pose)])
+        seen, starts = starts_of_seen(self._model, data, pose[1], rows)
+        from_sun = len(direct) + len(reflected)
+        mirrored = np.flatnonzero(seen[len(direct) :]) + len(direct)
+        kept = [
+            i for i in mirrored
+            if (is_lit(self._model, data, starts[i], leds_W[int(rows[i, 9])], surfaces.led_seat_m) if i < from_sun
+                else is_clear(self._model, data, starts[i], self._sun.direction_W, np.inf))
+        ]
+        electrons_m2_s = np.concatenate([response.led_e_m2_sr_w_s * intensity_w_sr, self._glint_e_m2_s * rows[from_sun:, 6]])
+        return seen[: len(direct)], ...
     def _per_area(self, p_C: Array) -> Array:
         """(n,) cos t/r^2 with what is left of the light on its way [1/m^2]."""
         r = np.linalg.norm(p_C, axis=1)

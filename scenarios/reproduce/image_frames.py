@@ -1,0 +1,193 @@
+"""The frame set: hard light and weather, 2 to 30 m, several seeds; what detection and identification make of each frame.
+
+A frame is the default camera's, its exposure settled, with the ring anywhere about its nominal place and the receiver
+turned a little, both drawn from the seed together with hardware, clouds and noise. Two things are asked of the ring: to
+be found in the frame alone, and to be found and named where a prediction expects it, as in flight (a common shift and a
+change of size, each with its sigma). Wrong is what was found and holds a blob that is no LED, or a wrong name.
+
+Rates are of LEDs that nothing hides. There is nothing published to compare with: the source shows one still (Fig. 28).
+"""
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from dockair.calibration import Camera
+from dockair.nav.identify.ring import Identification, IdentificationStatus, identify
+from dockair.nav.image.detect import Blobs, detect
+from dockair.rotations import Array, exp
+from dockair.scenarios.reproduce.frames import Studio, TrueFrame, matches, studio
+from dockair.scenarios.reproduce.reference import picture_name
+
+ID = "image/frames"
+TITLE = "the frame set: Sun, clouds, glints, ghosts, night, haze, dirt at 2 to 30 m; LEDs and rings found"
+RANGES_M = (2.0, 3.0, 5.0, 8.0, 12.0, 16.0, 20.0, 25.0, 30.0)
+SEEDS = (1, 2)
+_SETTLING_FRAMES = 4
+_WITHIN_PX = 2.0
+_ACROSS_SIGMA = 0.03  # of the ring's place about its nominal one, of the range
+_TURN_SIGMA_RAD = np.array([0.05, 0.01, 0.02])  # receiver's roll, pitch, yaw
+_PREDICTED_SIGMA_PX, _PREDICTED_SIZE_SIGMA = 3.0, 0.01
+_FEWEST_LEDS = 4  # a ring with fewer is not asked for
+_SIZE_IN, _DPI = (15.0, 5.4), 110
+_OUTCOMES = ("found", "ambiguous", "not_found", "wrong")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Case:
+    """What differs from the default scenario."""
+
+    title: str
+    settings: Mapping[str, Any] = field(default_factory=dict)
+
+
+def _sun(azimuth_deg: float, elevation_deg: float, **more: Any) -> dict[str, Any]:
+    return {"sun.azimuth_deg": azimuth_deg, "sun.elevation_deg": elevation_deg, **more}
+
+
+_AHEAD = _sun(-10.0, 7.0)
+CASES = (
+    Case(title="Sun behind"),
+    Case(title="glints", settings=_sun(150.0, 60.0) | {"parameters.surfaces.metal_share": 0.6}),
+    Case(title="Sun in view", settings=_AHEAD),
+    Case(title="Sun in view, band-pass", settings=_AHEAD | {"camera.filter": "band_pass"}),
+    Case(
+        title="ghosts, five times as bright",
+        settings=_AHEAD | {"parameters.glare.ghost_share": [7.5e-5, 1e-4, 2.5e-4, 3e-4, 5e-4, 4e-4]},
+    ),
+    Case(title="cloud gaps, low Sun", settings=_sun(-8.0, 5.0) | {"weather.cloud_cover": 0.6}),
+    Case(title="night", settings={"weather.night": True}),
+    Case(title="haze, 150 m", settings={"weather.visibility_m": 150.0}),
+    Case(title="dirty window, Sun in view", settings=_AHEAD | {"faults": [{"kind": "dirty_window", "cover": 0.4}]}),
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Score:
+    """One frame."""
+
+    visible: int
+    found: int
+    others: int
+    alone: str  #: of _OUTCOMES; "" where too few LEDs are visible
+    predicted: str
+
+
+def scores_of(case: Case, seed: int, ranges_m: tuple[float, ...] = RANGES_M) -> list[Score]:
+    """Take the frames of one case and seed, far ones first."""
+    rng = np.random.default_rng([seed, CASES.index(case)])
+    scores = []
+    with studio(case.settings, seed) as made:
+        for range_m in reversed(ranges_m):
+            taken = made.take(made.seen_at(*_somewhere(made, range_m, rng)), _SETTLING_FRAMES)
+            scores.append(_score(taken, made.parts.sheets.camera, rng))
+    return scores[::-1]
+
+
+def _somewhere(made: Studio, range_m: float, rng: np.random.Generator) -> tuple[Array, Array]:
+    """R_CD and p_CD about the nominal place ahead of the probe."""
+    R_CD, p_CD = made.pose(made.ahead(max(range_m, _nearest_m(made))))
+    turned = exp(_TURN_SIGMA_RAD * rng.standard_normal(3))
+    across = _ACROSS_SIGMA * range_m * np.array([0.0, *rng.standard_normal(2)])
+    return turned @ R_CD, turned @ (range_m / np.linalg.norm(p_CD) * p_CD + across)
+
+
+def _nearest_m(made: Studio) -> float:
+    """Range at which the ring is at the probe's tip; nearer ones are put on the same line of sight."""
+    mounting = made.parts.as_built.mounting
+    return float(np.linalg.norm(mounting.p_BP - mounting.p_BC)) + 0.1
+
+
+def _score(taken: TrueFrame, camera: Camera, rng: np.random.Generator) -> Score:
+    frame, leds_px = taken.frame, taken.leds_px
+    blobs = detect(frame.pixels, None, frame.window, gain_dn_per_electron=frame.gain)
+    on_led, _ = matches(blobs.centroids_px, leds_px, _WITHIN_PX)
+    _, found = matches(blobs.centroids_px, leds_px[taken.visible], _WITHIN_PX)
+    alone = predicted = ""
+    if taken.visible.sum() >= _FEWEST_LEDS:
+        ring = identify(blobs.centroids_px, camera=camera, brightness=blobs.flux)
+        alone = _outcome(ring, blobs, taken, named=False)
+        centre = leds_px.mean(axis=0)
+        size = 1.0 + _PREDICTED_SIZE_SIGMA * rng.standard_normal()
+        expected_px = centre + size * (leds_px - centre) + _PREDICTED_SIGMA_PX * rng.standard_normal(2)
+        ring = identify(
+            blobs.centroids_px, camera=camera, brightness=blobs.flux, expected_led_px=expected_px,
+            expected_sigma_px=_PREDICTED_SIGMA_PX,
+        )  # fmt: skip
+        predicted = _outcome(ring, blobs, taken, named=True)
+    return Score(
+        visible=int(taken.visible.sum()), found=int(found.sum()), others=int((~on_led).sum()), alone=alone,
+        predicted=predicted,
+    )  # fmt: skip
+
+
+def _outcome(ring: Identification, blobs: Blobs, taken: TrueFrame, *, named: bool) -> str:
+    if ring.status is not IdentificationStatus.FOUND:
+        return ring.status.name.lower()
+    members = blobs.centroids_px[ring.members]
+    if named:
+        right = np.linalg.norm(members - taken.leds_px[ring.led_numbers], axis=1) < _WITHIN_PX
+    else:
+        right, _ = matches(members, taken.leds_px, _WITHIN_PX)
+    return "found" if right.all() else "wrong"
+
+
+def reproduce(out: Path | None) -> dict[str, Any]:
+    """Take the whole set; its tables in `out`."""
+    scores = {case.title: np.array([scores_of(case, seed) for seed in SEEDS], dtype=object) for case in CASES}
+    rows = [{"case": title, "ours": _rates(table.ravel().tolist()), "reference": {}} for title, table in scores.items()]
+    for k, range_m in enumerate(RANGES_M):
+        column = [score for table in scores.values() for score in table[:, k]]
+        rows.append({"case": f"all at {range_m:g} m", "ours": _rates(column), "reference": {}})
+    everything = [score for table in scores.values() for score in table.ravel()]
+    rows.append({"case": "all", "ours": _rates(everything), "reference": {}})
+    if out is not None:
+        _draw(scores, out / picture_name(ID))
+    return {"id": ID, "source": TITLE, "rows": rows}
+
+
+def _rates(scores: list[Score]) -> dict[str, float]:
+    visible = sum(score.visible for score in scores)
+    rates = {
+        "frames": len(scores),
+        "leds_visible": visible,
+        "detected_percent": _percent(sum(score.found for score in scores), visible),
+        "other_blobs_per_frame": sum(score.others for score in scores) / len(scores),
+    }
+    for name in ("alone", "predicted"):
+        outcomes = Counter(getattr(score, name) for score in scores)
+        asked = len(scores) - outcomes[""]
+        rates |= {f"{name}_{outcome}_percent": _percent(outcomes[outcome], asked) for outcome in _OUTCOMES}
+    return rates
+
+
+def _percent(part: int, whole: int) -> float:
+    return 100.0 * part / max(whole, 1)
+
+
+def _draw(scores: Mapping[str, Any], path: Path) -> None:
+    from matplotlib.figure import Figure
+
+    def table(value: str) -> Array:
+        return np.array([[_rates(column.tolist())[value] for column in of_case.T] for of_case in scores.values()])
+
+    figure = Figure(figsize=_SIZE_IN, dpi=_DPI, layout="constrained")
+    panels = (
+        ("LEDs detected [%]", table("detected_percent"), "RdYlGn", 100.0),
+        ("other blobs a frame", table("other_blobs_per_frame"), "Reds", 100.0),
+        ("ring found, frame alone [%]", table("alone_found_percent"), "RdYlGn", 100.0),
+        ("ring found and named, predicted [%]", table("predicted_found_percent"), "RdYlGn", 100.0),
+    )
+    for axes, (title, values, colours, most) in zip(figure.subplots(1, 4, sharey=True), panels, strict=True):
+        axes.imshow(values, cmap=colours, vmin=0.0, vmax=most, aspect="auto", alpha=0.8)
+        for (i, j), value in np.ndenumerate(values):
+            axes.text(j, i, f"{value:.0f}", ha="center", va="center", fontsize=8)
+        axes.set_title(title, fontsize=10)
+        axes.set_xticks(range(len(RANGES_M)), [f"{range_m:g}" for range_m in RANGES_M], fontsize=8)
+        axes.set_yticks(range(len(scores)), list(scores), fontsize=8)
+        axes.set_xlabel("range [m]")
+    figure.savefig(path)
