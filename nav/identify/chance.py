@@ -8,25 +8,31 @@ the expected number of accidental rings like it,
 (the "number of false alarms" of a-contrario detection, Desolneux, Moisan & Morel 2000). N counts the hypotheses that
 passed the shape's and the prior's gates, the true ones among them, so it errs on the safe side.
 
-A true ring may still count a blob as the LED that is hidden there. A member with residual d is an impostor with odds
+A true ring may still count a blob as the LED that is hidden there. With residual d against the standard deviation s
+and any number of visible LEDs as likely as another, a member is an impostor with odds
 
-    o = h rho 2 pi s^2 exp(d^2 g / 2 s^2),   g = 2 m / (2 m - 6),   h = (9 - m) / 8       (2)
+    o = (9 - m)/m rho 2 pi s^2 g exp(d^2 g / 2 s^2),   g = 2 m / (2 m - 6)                (2)
 
-against a normal residual of standard deviation s, g for what six fitted parameters take out of the residuals, h for
-the share of LEDs that are hidden. `expected_impostors` is their sum.
+where g makes of d and s those of a prediction from the other members: six parameters were fitted to all. The sum of o
+is the expected number of impostors.
 
-rho is the larger of two densities, of all candidates over their box and of those that are no members within 1.6 radii:
-reflections crowd about the drogue.
+rho of Eq. (1) is the larger of two densities, of all candidates but three over their box and of those that are no
+members within 1.6 radii: reflections crowd about the drogue. Eq. (2) counts no members in either, and a fifth of a blob
+more near by, so that a member may be the only blob there is.
 """
 
 from math import comb
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dockair.nav.identify.perspective import SLOTS, RingFit
 from dockair.rotations import Array
 
+Count = NDArray[np.int64] | int
+
 _NEIGHBOURHOOD_RADII = 1.6
+_UNSEEN = 0.2  # blobs
 _LARGEST_EXPONENT = 50.0
 
 
@@ -35,7 +41,7 @@ def box_area_px2(points: Array) -> float:
     return max(float(np.prod(np.ptp(points, axis=0))), 1.0)
 
 
-def log10_false_rings(tested: Array | int, count: Array | int, p: Array | float) -> Array:
+def log10_false_rings(tested: Count, count: Count, p: Array | float) -> Array:
     """log10 of Eq. (1).
 
     Args:
@@ -44,18 +50,21 @@ def log10_false_rings(tested: Array | int, count: Array | int, p: Array | float)
         p: as above.
     """
     ways = np.array([comb(SLOTS - 3, k) for k in range(SLOTS - 2)])[np.asarray(count) - 3]
-    return np.asarray(np.log10(np.maximum(tested, 1) * ways) + (np.asarray(count) - 3) * np.log10(np.clip(p, 1e-12, 1.0)))
+    return np.asarray(
+        np.log10(np.maximum(tested, 1) * ways) + (np.asarray(count) - 3) * np.log10(np.clip(p, 1e-12, 1.0))
+    )
 
 
-def density_px2(points: Array, fit: RingFit) -> float:
-    """rho about a fitted ring."""
+def densities_px2(points: Array, fit: RingFit) -> tuple[float, float]:
+    """Clutter by Eq. (1) and by Eq. (2), rho, about a fitted ring [1/px^2]."""
     other = np.ones(len(points), bool)
     other[fit.candidate[fit.candidate >= 0]] = False
-    reach = _NEIGHBOURHOOD_RADII * fit.radius_px
-    near = np.count_nonzero(((points[other] - fit.centre_px) ** 2).sum(axis=1) < reach * reach)
+    neighbourhood = np.pi * (_NEIGHBOURHOOD_RADII * fit.radius_px) ** 2
+    near = np.count_nonzero(np.pi * ((points[other] - fit.centre_px) ** 2).sum(axis=1) < neighbourhood)
     # a box that the ring fills holds at least the ring's own area
-    everywhere = max(len(points) - 3, 1) / max(box_area_px2(points), np.pi * fit.radius_px**2)
-    return max(everywhere, near / (np.pi * reach * reach))
+    area = max(box_area_px2(points), np.pi * fit.radius_px**2)
+    accident = max(max(len(points) - 3, 1) / area, near / neighbourhood)
+    return accident, max((len(points) - fit.count) / area, (near + _UNSEEN) / neighbourhood)
 
 
 def member_odds(points: Array, fit: RingFit, density: float, tolerance_sigmas: float) -> Array:
@@ -72,5 +81,6 @@ def member_odds(points: Array, fit: RingFit, density: float, tolerance_sigmas: f
     squares = np.zeros(SLOTS)
     squares[filled] = ((points[fit.candidate[filled]] - fit.slots_px[filled]) ** 2).sum(axis=1)
     m = fit.count
-    exponent = np.minimum(squares / (2.0 * variance) * m / (m - 3), _LARGEST_EXPONENT)
-    return np.where(filled, (SLOTS + 1 - m) / SLOTS * density * 2.0 * np.pi * variance * np.exp(exponent), 0.0)
+    g = m / (m - 3)
+    exponent = np.minimum(0.5 * g * squares / variance, _LARGEST_EXPONENT)
+    return np.where(filled, (SLOTS + 1 - m) / m * density * 2.0 * np.pi * variance * g * np.exp(exponent), 0.0)

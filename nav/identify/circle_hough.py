@@ -12,7 +12,8 @@ a coarse grid for a large ring, a fine one for a small ring, and radii stand in 
 does not depend on it: about 2 pi / cell votes a candidate times the band's width in cells.
 
 Bounded by the range of radii (give the prior's when there is one), the disc in which the centre can be, and the number
-of candidates. Fooled by any second ring of the same size; a tilted ring spreads its votes over the gate.
+of candidates; those too far from all others to be on a common circle do not vote. Fooled by any second ring of the same
+size; a tilted ring spreads its votes over the gate.
 """
 
 from dataclasses import dataclass
@@ -101,12 +102,11 @@ def find_circles(
         peaks: how many to return.
         min_votes: cells with fewer are no peaks.
     """
-    table = np.empty((0, 4))
-    if len(points):
-        lower = np.maximum(points.min(axis=0), np.array(centre_gate[:2]) - centre_gate[2])
-        upper = np.minimum(points.max(axis=0), np.array(centre_gate[:2]) + centre_gate[2])
-        if (upper >= lower).all():
-            table = _peaks(np.ascontiguousarray(points), radii, lower, upper, cell, gate, peaks, min_votes)
+    gate_centre = np.array(centre_gate[:2])
+    table = _peaks(
+        np.ascontiguousarray(points), radii, gate_centre - centre_gate[2], gate_centre + centre_gate[2],
+        cell, gate, peaks, min_votes,
+    )  # fmt: skip
     return Peaks(centre_px=table[:, :2], radius_px=table[:, 2], votes=table[:, 3].astype(np.int64))
 
 
@@ -132,11 +132,33 @@ def _insert(table, filled, u, v, r, votes, spacing):  # type: ignore[no-untyped-
 
 
 @njit(cache=True)
-def _peaks(points, radii, lower, upper, cell, gate, capacity, min_votes):  # type: ignore[no-untyped-def]
+def _in_company(points, reach, needed):  # type: ignore[no-untyped-def]
+    """Points with at least so many, themselves included, within reach."""
+    keep = np.zeros(len(points), np.bool_)
+    for i in range(len(points)):
+        near = 0
+        for j in range(len(points)):
+            near += (points[i, 0] - points[j, 0]) ** 2 + (points[i, 1] - points[j, 1]) ** 2 <= reach * reach
+        keep[i] = near >= needed
+    return points[keep]
+
+
+@njit(cache=True)
+def _peaks(all_points, radii, gate_lower, gate_upper, cell, gate, capacity, min_votes):  # type: ignore[no-untyped-def]
     table = np.zeros((capacity, 4))
     filled = 0
     for r in radii:
         width = cell * r
+        # all that vote for a cell lie within the band's outer diameter: the lonely need not vote
+        points = _in_company(all_points, 2.0 * (1.0 + gate) * r, min_votes)
+        if len(points) == 0:
+            continue
+        lower, upper = np.empty(2), np.empty(2)
+        for axis in range(2):
+            lower[axis] = max(points[:, axis].min(), gate_lower[axis])
+            upper[axis] = min(points[:, axis].max(), gate_upper[axis])
+        if lower[0] > upper[0] or lower[1] > upper[1]:
+            continue
         # the centre of a ring of which at least four LEDs are seen may lie outside their box, by less than a radius
         u0, v0 = lower[0] - r, lower[1] - r
         rows = int((upper[1] - lower[1] + 2.0 * r) / width) + 1

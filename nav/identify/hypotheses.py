@@ -4,19 +4,20 @@ Both methods of the source propose triples of candidates; the octagon look-up an
 perspective image judge them, because a tilted ring is no circle, and `chance` says how likely each is an accident.
 
 Cost: triples of n candidates, each looked up at a cost that does not grow with n (beyond `few_candidates` only three
-patterns of slots are tried); the `_KEPT` least accidental ones compete for at most `max_fits` fits. A hypothesis that an
-earlier fit already contains is not fitted again, nor one with too few LEDs to be believed, but for `_HOPELESS` of them
-when there is nothing better.
+patterns of slots are tried); of different ones the `_KEPT` least accidental compete for at most `max_fits` fits. A
+hypothesis that an earlier fit already contains is not fitted again, nor one with too few LEDs to be believed, but for
+`_HOPELESS` of them when there is nothing better.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dockair.calibration import Camera
-from dockair.nav.identify.chance import box_area_px2, density_px2, log10_false_rings, member_odds
+from dockair.nav.identify.chance import box_area_px2, densities_px2, log10_false_rings, member_odds
 from dockair.nav.identify.circle_hough import find_circles, radius_row
+from dockair.nav.identify.code import CodeSettings
 from dockair.nav.identify.octagon import ALL_PATTERNS, RIGHT_ANGLES, Octagons, find_octagons
 from dockair.nav.identify.perspective import SLOTS, RingFit, fit_ring
 from dockair.nav.identify.prior import RingPrior
@@ -36,7 +37,7 @@ _EXTRAPOLATION = 2.5  # how much three LEDs blow up their errors at the other pl
 class IdentifySettings:
     """Settings of the identification; lengths in pixels."""
 
-    radius_range_px: tuple[float, float] = (12.0, 700.0)  # 0.5 m ring at 60 m and at 1 m, 2909 px focal length
+    radius_range_px: tuple[float, float] = (12.0, 560.0)  # 0.5 m ring at 60 m and 1.3 m, where it overfills the frame
     max_tilt_rad: float = np.deg2rad(40.0)  # more, and four LEDs of a frontal ring pass for four of a tilted one
     max_candidates: int = 60  # 34 220 triples
     few_candidates: int = 24  # up to here every three LEDs propose a ring, beyond it only those at right angles
@@ -52,11 +53,12 @@ class IdentifySettings:
     predicted_roll_tolerance_rad: float = np.deg2rad(8.0)  # of a tracked ring: gyro, and an affine fit's 3 degrees
     predicted_shape_tolerance: float = 0.02  # of a tracked ring, in radii: a tilt of 20 deg may change by 4 deg
     predicted_shape_sigmas: float = 4.0  # of a centroid, beside it
-    max_false_rings: float = 1e-3  # accidental rings a frame of pure clutter may show, see `chance` Eq. (1)
+    max_false_rings: float = 3e-4  # accidental rings a frame of pure clutter may show, see `chance` Eq. (1)
     max_false_rings_with_prior: float = 1e-2  # one that is also where, and as large as, the ring should be
     max_false_rings_predicted: float = 5e-2  # one that moreover is turned as it should be: few hypotheses are left
-    max_impostors: float = 5e-4  # expected among the members of a ring, see `chance` Eq. (2)
+    max_impostors: float = 1e-3  # expected among the members of a ring, see `chance` Eq. (2)
     max_impostors_with_prior: float = 5e-3
+    code: CodeSettings = field(default_factory=CodeSettings)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -99,6 +101,7 @@ def ring_fits(
             points, hypotheses[0], camera.focal_length_px, camera.principal_point_px,
             tolerance_px=settings.tolerance_sigmas * sigma_px,
             tolerance_per_radius=settings.tolerance_sigmas * settings.ring_sigma,
+            max_tilt_rad=settings.max_tilt_rad,
         )  # fmt: skip
         different = not any(_contained(one.fit.candidate, fit.candidate[None])[0] for one in scored)
         if fit.count >= MIN_LEDS and different and fit.tilt_rad <= settings.max_tilt_rad:
@@ -128,11 +131,11 @@ def _octagons(
 
 
 def _scored(points: Array, fit: RingFit, octagons: Octagons, settings: IdentifySettings) -> ScoredFit:
-    density = density_px2(points, fit)
-    p = density * np.pi * fit.tolerance_px**2
+    accident, impostor = densities_px2(points, fit)
+    p = accident * np.pi * fit.tolerance_px**2
     return ScoredFit(
         log10_false_rings=float(log10_false_rings(_tested(octagons, fit.count), fit.count, p)),
-        odds=member_odds(points, fit, density, settings.tolerance_sigmas),
+        odds=member_odds(points, fit, impostor, settings.tolerance_sigmas),
         fit=fit,
     )
 
@@ -175,6 +178,13 @@ def _tested(octagons: Octagons, count: NDArray[np.int64] | int) -> NDArray[np.in
     return np.where(np.asarray(count) > MIN_LEDS, octagons.tested_right_angles, octagons.tested)
 
 
+def _keys(candidate: NDArray[np.int64]) -> NDArray[np.uint64]:
+    """(m,) hash of who is next to whom in hypotheses (m, 8): the same for those alike up to the ring's symmetry."""
+    mixed = (candidate + 2).astype(np.uint64) * np.uint64(0x9E3779B97F4A7C15)
+    mixed = (mixed ^ (mixed >> np.uint64(29))) * np.uint64(0xBF58476D1CE4E5B9)
+    return np.asarray((mixed * (np.roll(mixed, 1, axis=1) >> np.uint64(17))).sum(axis=1, dtype=np.uint64))
+
+
 def _ranked(
     points: Array, octagons: Octagons, sigma_px: float, most_false_rings: float, settings: IdentifySettings
 ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
@@ -187,12 +197,15 @@ def _ranked(
     area = box_area_px2(points)
     p = len(points) * np.pi * octagons.tolerance_px**2 / area
     accident = np.round((octagons.count - 3) * np.log(np.clip(p, 1e-12, 0.5)), 6)
-    best = np.argsort(accident, kind="stable")[:_KEPT]
+    best = np.argsort(accident, kind="stable")
+    best = best[np.sort(np.unique(_keys(octagons.candidate[best]), return_index=True)[1])][:_KEPT]
     centres, radii = circles_through(points, octagons.triple[best])
     trusted = trust(centres, radii, cap_px=RADIUS_GATE * float(np.median(radii)))
     best = best[np.lexsort((-trusted, accident[best]))]
-    t2 = settings.tolerance_sigmas**2 * (sigma_px**2 + (settings.ring_sigma * octagons.radius_px[best]) ** 2)
-    rings = log10_false_rings(_tested(octagons, octagons.count[best]), octagons.count[best], max(len(points) - 3, 1) * np.pi * t2 / area)
+    count, radius = octagons.count[best], octagons.radius_px[best]
+    t2 = settings.tolerance_sigmas**2 * (sigma_px**2 + (settings.ring_sigma * radius) ** 2)
+    p = max(len(points) - 3, 1) * np.pi * t2 / area
+    rings = log10_false_rings(_tested(octagons, count), count, p)
     hopeless = rings > np.log10(most_false_rings)
     order = np.argsort(hopeless, kind="stable")
     return octagons.candidate[best[order]], hopeless[order]

@@ -13,9 +13,8 @@ a coincidence to be looked for, where a circle through three points [Yoon 2018, 
 
 A triple is tried with the patterns of slots it may take. `RIGHT_ANGLES` are the three whose slots are 90, 90 and 180
 degrees apart: of any five LEDs three have slots of the same parity, so that no ring of five or more escapes them. All
-21 (`ALL_PATTERNS`) are needed for four. Maps that are no view of a circle (ratio of axes below the cosine of the
-largest tilt, with room for what eps does to it) drop out first. Candidates stand in a grid of cells, so that a look-up
-costs the same however many there are.
+21 (`ALL_PATTERNS`) are needed for four. Maps that are no view of a circle drop out first (`triangles`). Candidates
+stand in a grid of cells, so that a look-up costs the same however many there are.
 
 Slots count in the sense of the LEDs' numbers (left, up, right, down in the image); which one is LED 0 is not decided
 here.
@@ -27,6 +26,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from dockair.nav.identify.triangles import plausible_maps
 from dockair.rotations import Array
 
 SLOTS = 8
@@ -41,8 +41,7 @@ _STEPS = 2  # of Eq. (1)
 _LEFT = (0.7, 0.04, 1.4)
 _LOOSE = 0.9  # of the least ratio of axes: what eps may do to it
 _CELLS = 32  # of the grid, a side
-_KEPT = 4096  # octagons at most, in the order of the triples
-
+_KEPT = 2048  # octagons at most, in the order of the triples
 
 
 def _inverse_edges() -> Array:
@@ -102,12 +101,12 @@ def find_octagons(
     f, (u, v, reach) = focal_length_px, centre_gate
     relative = np.ascontiguousarray(points - np.array(principal_point_px)) / f
     inverses = _INVERSES[patterns[:, 0], patterns[:, 1]]
-    gates = (
-        radius_range_px[0] / f, radius_range_px[1] / f, (u - principal_point_px[0]) / f, (v - principal_point_px[1]) / f,
-        reach / f, *roll_gate, min_axis_ratio,
-    )  # fmt: skip
+    k_min, k_max = radius_range_px[0] / f, radius_range_px[1] / f
+    gate = (u - principal_point_px[0]) / f, (v - principal_point_px[1]) / f, reach / f
+    gates = (k_min, k_max, *gate, *roll_gate, min_axis_ratio)
+    plausible = plausible_maps(relative, triples, inverses, k_min, k_max, min_axis_ratio)
     triple, count, candidate, size, tested = _find_octagons(
-        relative, triples, patterns, inverses, gates, tolerance_px / f, tolerance_per_radius
+        relative, plausible, patterns, inverses, gates, tolerance_px / f, tolerance_per_radius
     )
     return Octagons(
         triple=triple, count=count, candidate=candidate, radius_px=size[:, 0] * f, tolerance_px=size[:, 1] * f,
@@ -254,63 +253,8 @@ def _passes(ring, k, gates):  # type: ignore[no-untyped-def]
     return abs(turns - np.round(turns)) * _ANGLE[1] <= roll_tol
 
 
-@njit(cache=True)
-def _least_ratio(square, min_ratio):  # type: ignore[no-untyped-def]
-    """Least ratio of axes of a ring seen off the optical axis, `square` being 4 tan^2 of half that angle."""
-    half = 0.25 * square
-    cosine = (min_ratio * (1.0 - half) - np.sqrt(1.0 - min_ratio**2) * 2.0 * np.sqrt(half)) / (1.0 + half)
-    return _LOOSE * max(cosine, 0.1)
-
-
-@njit(cache=True)
-def _flattened(points):  # type: ignore[no-untyped-def]
-    """Candidates on a map of the field of view that keeps small shapes (stereographic): needs no aimed camera."""
-    flat = np.empty_like(points)
-    for i in range(len(points)):
-        stretch = 2.0 / (1.0 + np.sqrt(1.0 + points[i, 0] ** 2 + points[i, 1] ** 2))
-        flat[i, 0], flat[i, 1] = points[i, 0] * stretch, points[i, 1] * stretch
-    return flat
-
-
-@njit(cache=True)
-def _plausible(points, triples, patterns, inverses, gates):  # type: ignore[no-untyped-def]
-    """(m, 4) triples, going round in the sense of the LEDs' numbers, and patterns whose map may be a ring's view."""
-    k_min, k_max, min_ratio = gates[0], gates[1], gates[7]
-    # trace of A'A = x e.e + y f.f + z e.f for edges e and f, |det A| = w |e x f|
-    x, y = (inverses[:, 0] ** 2).sum(axis=1), (inverses[:, 1] ** 2).sum(axis=1)
-    z = 2.0 * (inverses[:, 0] * inverses[:, 1]).sum(axis=1)
-    w = np.abs(inverses[:, 0, 0] * inverses[:, 1, 1] - inverses[:, 0, 1] * inverses[:, 1, 0])
-    # k^2 is between half the trace and the trace, but for what eps does
-    trace_min, trace_max = 0.7 * k_min * k_min, 3.0 * k_max * k_max
-    flat = _flattened(points)
-    ratio = _least_ratio((flat**2).sum(axis=1).max(), min_ratio)
-    loosest = ratio / (1.0 + ratio * ratio)  # |det A| / trace at that ratio of axes
-    out = np.empty((len(triples) * len(patterns), 4), np.int64)
-    n = 0
-    for t in range(len(triples)):
-        i, j, k = triples[t, 0], triples[t, 1], triples[t, 2]
-        iu, iv = flat[i, 0], flat[i, 1]
-        eu, ev, fu, fv = flat[j, 0] - iu, flat[j, 1] - iv, flat[k, 0] - iu, flat[k, 1] - iv
-        cross = eu * fv - fu * ev
-        if cross < 0.0:
-            j, k, eu, ev, fu, fv, cross = k, j, fu, fv, eu, ev, -cross
-        ee, ff, ef = eu * eu + ev * ev, fu * fu + fv * fv, eu * fu + ev * fv
-        limit = 0.0
-        for p in range(len(patterns)):
-            trace = x[p] * ee + y[p] * ff + z[p] * ef
-            if w[p] * cross < loosest * trace or trace < trace_min or trace > trace_max:
-                continue
-            if limit == 0.0:
-                ratio = _least_ratio((iu + (eu + fu) / 3.0) ** 2 + (iv + (ev + fv) / 3.0) ** 2, min_ratio)
-                limit = ratio / (1.0 + ratio * ratio)
-            if w[p] * cross >= limit * trace:
-                out[n, 0], out[n, 1], out[n, 2], out[n, 3] = i, j, k, p
-                n += 1
-    return out[:n]
-
-
 @njit(cache=True, error_model="numpy")
-def _find_octagons(points, triples, patterns, inverses, gates, tol, tol_k):  # type: ignore[no-untyped-def]
+def _find_octagons(points, plausible, patterns, inverses, gates, tol, tol_k):  # type: ignore[no-untyped-def]
     out_triple = np.empty((_KEPT, 3), np.int64)
     out_count = np.empty(_KEPT, np.int64)
     out_slots = np.empty((_KEPT, SLOTS), np.int64)
@@ -322,10 +266,9 @@ def _find_octagons(points, triples, patterns, inverses, gates, tol, tol_k):  # t
     found = np.empty(SLOTS, np.int64)
     m, first, turn, ring, q = np.empty(8), np.empty(8), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 2))
     n, tested = 0, np.zeros(2, np.int64)
-    last_i, last_j, last_k = -1, -1, -1
-    plausible = _plausible(points, triples, patterns, inverses, gates)
+    last_i, last_j, last_k = np.int64(-1), np.int64(-1), np.int64(-1)
     for t in range(len(plausible)):
-        i, j, k, p = plausible[t, 0], plausible[t, 1], plausible[t, 2], plausible[t, 3]
+        i, j, k, p = np.int64(plausible[t, 0]), np.int64(plausible[t, 1]), np.int64(plausible[t, 2]), plausible[t, 3]
         if i != last_i or j != last_j or k != last_k:
             last_i, last_j, last_k = i, j, k
             _aim(points, i, j, k, turn, q)

@@ -40,12 +40,20 @@ class RingFit:
     radius_px: float  #: f over the centre's depth: the radius of the ring's image if it were frontal
     tilt_rad: float  #: between the ring's axis and the camera's
     tolerance_px: float  #: largest residual allowed
+    pose: Array  #: (3, 3) rows p, a, b of Eq. (1), in radii
+    focal_length_px: float
+    principal_point_px: tuple[float, float]
     rms_px: float  #: root of the squared residuals over the degrees of freedom; 0 when there are none
 
     @property
     def count(self) -> int:
         """Number of LEDs."""
         return int(np.count_nonzero(self.candidate >= 0))
+
+    def image_px(self, angle_rad: Array) -> Array:
+        """(n, 2) image of the ring's points at angles (n,), slot s standing at 45 s."""
+        X = self.pose[0] + np.column_stack([np.cos(angle_rad), np.sin(angle_rad)]) @ self.pose[1:]
+        return np.asarray(np.array(self.principal_point_px) - self.focal_length_px * X[:, 1:] / X[:, :1])
 
 
 def fit_ring(
@@ -56,6 +64,7 @@ def fit_ring(
     *,
     tolerance_px: float,
     tolerance_per_radius: float,
+    max_tilt_rad: float = np.pi,
 ) -> RingFit:
     """Fit Eq. (1).
 
@@ -66,22 +75,25 @@ def fit_ring(
         principal_point_px: (u, v).
         tolerance_px: largest residual; to it comes, root of the sum of squares,
         tolerance_per_radius: for the LEDs' own position errors [px/px].
+        max_tilt_rad: of the two poses one beyond it gives way.
     """
     cu, cv = principal_point_px
     relative = np.ascontiguousarray(points - np.array([cu, cv])) / focal_length_px
     chosen, pose, squares, tolerance = _fit_ring(
-        relative, candidate, tolerance_px / focal_length_px, tolerance_per_radius
+        relative, candidate, tolerance_px / focal_length_px, tolerance_per_radius, float(np.cos(max_tilt_rad))
     )
     image = _project(pose) * focal_length_px + np.array([cu, cv])
     freedom = 2 * int(np.count_nonzero(chosen >= 0)) - 6
-    facing = pose[1, 1] * pose[2, 2] - pose[1, 2] * pose[2, 1]  # of the ring's axis along the camera's
     return RingFit(
         candidate=chosen,
         slots_px=image[:SLOTS],
         centre_px=image[SLOTS],
         radius_px=float(focal_length_px / pose[0, 0]),
-        tilt_rad=float(np.arccos(np.clip(facing, -1.0, 1.0))),
+        tilt_rad=float(np.arccos(np.clip(_facing(pose), -1.0, 1.0))),
         tolerance_px=float(tolerance * focal_length_px),
+        pose=pose,
+        focal_length_px=focal_length_px,
+        principal_point_px=principal_point_px,
         rms_px=float(np.sqrt(squares / freedom) * focal_length_px) if freedom > 0 else 0.0,
     )
 
@@ -251,10 +263,17 @@ def _mirrored(pose):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _best_pose(points, candidate):  # type: ignore[no-untyped-def]
+def _facing(pose):  # type: ignore[no-untyped-def]
+    """Cosine of the tilt against the camera's axis."""
+    return pose[1, 1] * pose[2, 2] - pose[1, 2] * pose[2, 1]
+
+
+@njit(cache=True)
+def _best_pose(points, candidate, min_facing):  # type: ignore[no-untyped-def]
     pose, squares = _refine(points, candidate, _start_pose(_affine(points, candidate)))
     other, other_squares = _refine(points, candidate, _mirrored(pose))
-    if other_squares < squares:
+    faces, other_faces = _facing(pose) >= min_facing, _facing(other) >= min_facing
+    if other_squares < squares if faces == other_faces else other_faces:
         return other, other_squares
     return pose, squares
 
@@ -274,7 +293,9 @@ def _collect(points, image, tolerance):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _drop_outliers(points, candidate, pose, squares, tolerance, tolerance_per_radius):  # type: ignore[no-untyped-def]
+def _drop_outliers(  # type: ignore[no-untyped-def]
+    points, candidate, pose, squares, tolerance, tolerance_per_radius, min_facing
+):
     """Without the worst candidate, and again, until all are inside the tolerance or three are left."""
     while True:
         limit = np.sqrt(tolerance**2 + (tolerance_per_radius / pose[0, 0]) ** 2)
@@ -288,21 +309,21 @@ def _drop_outliers(points, candidate, pose, squares, tolerance, tolerance_per_ra
         if worst < 0 or (candidate >= 0).sum() <= 3:
             return candidate, pose, squares, limit
         candidate[worst] = -1
-        pose, squares = _best_pose(points, candidate)
+        pose, squares = _best_pose(points, candidate, min_facing)
 
 
 @njit(cache=True)
-def _fit_ring(points, first_candidate, tolerance, tolerance_per_radius):  # type: ignore[no-untyped-def]
+def _fit_ring(points, first_candidate, tolerance, tolerance_per_radius, min_facing):  # type: ignore[no-untyped-def]
     candidate = first_candidate.copy()
-    pose, squares = _best_pose(points, candidate)
+    pose, squares = _best_pose(points, candidate, min_facing)
     for look in (_FIRST_LOOK, 1.0):
         candidate, pose, squares, limit = _drop_outliers(
-            points, candidate, pose, squares, look * tolerance, look * tolerance_per_radius
+            points, candidate, pose, squares, look * tolerance, look * tolerance_per_radius, min_facing
         )
         if (candidate >= 0).sum() <= 3:
             break
         collected = _collect(points, _project(pose), limit)
         if (collected != candidate).any() and (collected >= 0).sum() >= 4:
             candidate = collected
-            pose, squares = _best_pose(points, candidate)
-    return _drop_outliers(points, candidate, pose, squares, tolerance, tolerance_per_radius)
+            pose, squares = _best_pose(points, candidate, min_facing)
+    return _drop_outliers(points, candidate, pose, squares, tolerance, tolerance_per_radius, min_facing)

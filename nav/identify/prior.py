@@ -16,6 +16,7 @@ from dockair.rotations import Array
 
 Expectation = TypeVar("Expectation", Array, float)
 
+_EVEN = np.column_stack([np.cos(np.arange(8) * np.pi / 4), np.sin(np.arange(8) * np.pi / 4)])
 _ANYWHERE_PX = 1e6  # radius of a gate that lets everything pass
 
 
@@ -69,18 +70,21 @@ class RingPrior:
         return float(np.abs(theirs - similarity * mine).max())
 
 
-def ring_from_leds(led_px: Array) -> tuple[Array, float, float]:
+def ring_from_leds(led_px: Array, angle_rad: Array | None = None) -> tuple[Array, float, float]:
     """Centre (2,), radius (larger semi-axis) and roll of eight LEDs (8, 2): Eq. (1) for a tilted ring.
 
-    The offsets are -(A_0 cos 45 k + A_1 sin 45 k) in the least-squares sense; roll is the rotation part of [A_0 A_1].
+    The offsets are -(A_0 cos theta_k + A_1 sin theta_k) in the least-squares sense; roll is the rotation part of
+    [A_0 A_1]. Angles theta (8,) are 45 k when not given.
     """
-    angle = 2.0 * np.pi * np.arange(8) / 8
-    centre = led_px.mean(axis=0)
-    A = -2.0 * (led_px - centre).T @ np.column_stack([np.cos(angle), np.sin(angle)]) / 8
-    roll = float(np.arctan2(A[1, 0] - A[0, 1], A[0, 0] + A[1, 1]))
+    if angle_rad is None:
+        centre, A = led_px.mean(axis=0), -0.25 * led_px.T @ _EVEN  # the columns are orthogonal, squares 4
+    else:
+        columns = np.column_stack([np.ones(8), -np.cos(angle_rad), -np.sin(angle_rad)])
+        solution = np.linalg.lstsq(columns, led_px, rcond=None)[0]
+        centre, A = solution[0], solution[1:].T
     square = 0.5 * (A**2).sum()
     radius = np.sqrt(square + np.sqrt(max(square**2 - float(A[0, 0] * A[1, 1] - A[0, 1] * A[1, 0]) ** 2, 0.0)))
-    return centre, float(radius), roll
+    return centre, float(radius), float(np.arctan2(A[1, 0] - A[0, 1], A[0, 0] + A[1, 1]))
 
 
 def _finite(expectation: Expectation | None) -> Expectation | None:
@@ -96,6 +100,7 @@ def make_prior(
     roll_rad: float | None,
     led_px: Array | None,
     sigma_px: float | None,
+    led_angle_rad: Array | None = None,
 ) -> RingPrior:
     """Gates from whatever is expected; an expectation that is not finite is none (a prediction behind the camera).
 
@@ -108,6 +113,7 @@ def make_prior(
         roll_rad: expected roll, or None.
         led_px: (8, 2) expected LEDs, or None: stands for those of the three above that are None.
         sigma_px: of the expected centre, or None.
+        led_angle_rad: (8,) where the LEDs stand on the ring; None for every 45 degrees.
 
     Raises:
         DockairError: wrong shapes.
@@ -118,7 +124,7 @@ def make_prior(
         led_px = np.asarray(led_px, dtype=float)
         if led_px.shape != (8, 2):
             raise DockairError("identify.expected_led_px", expected="an array of shape (8, 2)", got=led_px.shape)
-        centre, radius, roll = ring_from_leds(led_px)
+        centre, radius, roll = ring_from_leds(led_px, led_angle_rad)
         centre_px = centre if centre_px is None else centre_px
         radius_px = radius if radius_px is None else radius_px
         roll_rad = roll if roll_rad is None else roll_rad

@@ -16,15 +16,12 @@ Cost is bounded: at most `max_candidates` (nearest to the prior, else the bright
 `max_fits` exact fits.
 """
 
-from dataclasses import dataclass
-from enum import Enum
-
 import numpy as np
 from numpy.typing import NDArray
 
-from dockair.calibration import Camera
+from dockair.calibration import Camera, LedRing
 from dockair.errors import DockairError
-from dockair.nav.identify.ellipse import MIN_POINTS, Ellipse, fit_ellipse, places_on_circle
+from dockair.nav.identify.code import code_of
 from dockair.nav.identify.hypotheses import (
     METHODS,
     MIN_LEDS,
@@ -33,40 +30,13 @@ from dockair.nav.identify.hypotheses import (
     ring_fits,
     without_impostors,
 )
+from dockair.nav.identify.numbering import numbered, roll_of
 from dockair.nav.identify.perspective import SLOTS, RingFit
-from dockair.nav.identify.prior import RingPrior, make_prior, ring_from_leds
+from dockair.nav.identify.prior import RingPrior, make_prior
+from dockair.nav.identify.result import Identification, IdentificationStatus, nothing
 from dockair.rotations import Array
 
-
-class IdentificationStatus(Enum):
-    """Outcome of an identification."""
-
-    FOUND = "found"
-    AMBIGUOUS = "ambiguous"  #: several rings, or a ring whose numbers the roll prior cannot settle
-    NOT_FOUND = "not found"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Identification:
-    """The ring among the candidates. Without a ring `members` is empty and positions are NaN."""
-
-    status: IdentificationStatus
-    members: NDArray[np.int64]  #: (m,) indices of the LEDs among the candidates
-    led_numbers: NDArray[np.int64]  #: (m,) 0-7, see the module; -1 when AMBIGUOUS
-    centre_px: Array  #: (2,) image of the ring's centre (not the ellipse's centre)
-    radius_px: float  #: the radius a frontal ring would have at the centre's depth
-    roll_rad: float  #: of LED 0 in the image; NaN when AMBIGUOUS
-    led_pixels_px: Array  #: (8, 2) where each numbered LED is or, hidden, should be
-    ellipse: Ellipse | None
-    rms_px: float  #: of the fit's residuals
-
-
-def _nothing(status: IdentificationStatus) -> Identification:
-    empty = np.empty(0, np.int64)
-    return Identification(
-        status=status, members=empty, led_numbers=empty, centre_px=np.full(2, np.nan), radius_px=np.nan,
-        roll_rad=np.nan, led_pixels_px=np.full((SLOTS, 2), np.nan), ellipse=None, rms_px=np.nan,
-    )  # fmt: skip
+__all__ = ["METHODS", "Identification", "IdentificationStatus", "IdentifySettings", "identify"]
 
 
 def identify(
@@ -75,6 +45,7 @@ def identify(
     settings: IdentifySettings | None = None,
     *,
     camera: Camera | None = None,
+    ring: LedRing | None = None,
     sigma_px: float | None = None,
     brightness: Array | None = None,
     expected_centre_px: Array | None = None,
@@ -90,8 +61,10 @@ def identify(
         method: "three_point" or "circle_hough".
         settings: None for the defaults.
         camera: for its focal length, principal point and distortion; None for the default one.
+        ring: for its code, if it has one; None for the default one, which has none.
         sigma_px: of a candidate's coordinate, in place of the settings'.
-        brightness: (n,) any measure; decides who stays when there are too many candidates and no prior.
+        brightness: (n,) fluxes, any unit; decides who stays when there are too many candidates and no prior, and reads
+            the code of a ring that has one.
         expected_centre_px: (2,) where the ring's centre should be.
         expected_radius_px: what its radius should be.
         expected_roll_rad: what its roll should be, as the module defines it.
@@ -99,10 +72,12 @@ def identify(
         expected_sigma_px: standard deviation of the expected centre.
 
     Raises:
-        DockairError: unknown method, wrong shapes.
+        DockairError: unknown method, wrong shapes, a ring of other than eight LEDs.
     """
     settings = settings or IdentifySettings()
-    camera = camera or Camera()
+    camera, ring = camera or Camera(), ring or LedRing()
+    if ring.count != SLOTS:
+        raise DockairError("identify.ring", expected=f"a ring of {SLOTS} LEDs", got=ring.count)
     if method not in METHODS:
         raise DockairError("identify.method", expected="a method", got=method, exists=METHODS)
     points = np.asarray(centroids_px, dtype=float)
@@ -110,11 +85,11 @@ def identify(
         raise DockairError("identify.centroids_px", expected="an array of shape (n, 2)", got=points.shape)
     prior = make_prior(
         settings.radius_range_px, settings.centre_tolerance_radii, settings.radius_tolerance,
-        expected_centre_px, expected_radius_px, expected_roll_rad, expected_led_px, expected_sigma_px,
+        expected_centre_px, expected_radius_px, expected_roll_rad, expected_led_px, expected_sigma_px, ring.angles_rad,
     )  # fmt: skip
     index = _candidates(points, prior, brightness, settings.max_candidates)
     if len(index) < MIN_LEDS:
-        return _nothing(IdentificationStatus.NOT_FOUND)
+        return nothing(IdentificationStatus.NOT_FOUND)
     chosen = _undistorted(points[index], camera)
     sigma = settings.sigma_px if sigma_px is None else sigma_px
     status, fit = IdentificationStatus.NOT_FOUND, None
@@ -131,8 +106,10 @@ def identify(
         fits = ring_fits(chosen, method, prior, camera, sigma, settings, limit)
         status, fit = _decide(fits, prior, limit, settings)
     if fit is None:
-        return _nothing(status)
-    return _numbered(chosen, index, fit, prior, camera, settings)
+        return nothing(status)
+    flux = None if brightness is None else np.asarray(brightness, dtype=float)[index]
+    code = code_of(ring, settings.code)
+    return numbered(chosen, index, flux, fit, prior, camera, code, settings.roll_tolerance_rad)
 
 
 def _undistorted(points: Array, camera: Camera) -> Array:
@@ -168,7 +145,7 @@ def _decide(
     if not expected:
         return IdentificationStatus.NOT_FOUND, None
     credible = [one for one in expected if one.log10_false_rings <= np.log10(most_false_rings)]
-    # a ring as large and turned as expected beats one that is not; if there is none, `_numbered` says AMBIGUOUS
+    # a ring as large and turned as expected beats one that is not; if there is none, `numbered` says AMBIGUOUS
     for is_better in (_is_close, _is_rightly_rolled):
         credible = [one for one in credible if is_better(one.fit, prior, settings)] or credible
     if not credible:
@@ -192,7 +169,7 @@ def _is_close(fit: RingFit, prior: RingPrior, settings: IdentifySettings) -> boo
 
 def _is_rightly_rolled(fit: RingFit, prior: RingPrior, settings: IdentifySettings) -> bool:
     """Whether a fitted ring is turned as expected."""
-    return _roll(fit, prior)[1] <= settings.roll_tolerance_rad
+    return roll_of(fit, prior)[1] <= settings.roll_tolerance_rad
 
 
 def _is_expected(fit: RingFit, prior: RingPrior) -> bool:
@@ -204,64 +181,4 @@ def _is_expected(fit: RingFit, prior: RingPrior) -> bool:
 def _shape_error(points: Array, fit: RingFit, prior: RingPrior) -> float:
     """How far [px] the LEDs depart from a prediction's shape."""
     filled = np.flatnonzero(fit.candidate >= 0)
-    return prior.shape_error_px(points[fit.candidate[filled]], (filled - _roll(fit, prior)[0]) % SLOTS)
-
-
-def _roll(fit: RingFit, prior: RingPrior) -> tuple[int, float]:
-    """Slot of LED 0, and how far [rad] the roll then is from the expected one (0 when none is expected)."""
-    spacing = 2.0 * np.pi / SLOTS
-    wanted = 0.0 if np.isnan(prior.roll_rad) else prior.roll_rad
-    turns = (wanted - ring_from_leds(fit.slots_px)[2]) / spacing
-    slot = int(np.round(turns))
-    return slot, 0.0 if np.isnan(prior.roll_rad) else abs(turns - slot) * spacing
-
-
-def _numbered(
-    points: Array,
-    index: NDArray[np.int64],
-    fit: RingFit,
-    prior: RingPrior,
-    camera: Camera,
-    settings: IdentifySettings,
-) -> Identification:
-    """Numbers for the LEDs of a fit, from the roll prior or the convention, checked on the ellipse's circle."""
-    filled = np.flatnonzero(fit.candidate >= 0)
-    members = fit.candidate[filled]
-    # with five LEDs on a short arc the ellipse is loose; the fit's own eight places always make one
-    ellipse = fit_ellipse(points[members]) if len(members) > MIN_POINTS else fit_ellipse(fit.slots_px)
-    slot_of_led_0, roll_error = _roll(fit, prior)
-    certain = roll_error <= settings.roll_tolerance_rad and _ellipse_agrees(points[members], filled, ellipse)
-    numbers = (filled - slot_of_led_0) % SLOTS
-    order = np.argsort(numbers)
-    led_pixels = np.roll(fit.slots_px, -slot_of_led_0, axis=0)
-    roll = ring_from_leds(led_pixels)[2]
-    if camera.distortion is not None:
-        led_pixels = camera.pixels_from_points(_rays(led_pixels, camera))
-        centre = camera.pixels_from_points(_rays(fit.centre_px[None], camera))[0]
-    else:
-        centre = fit.centre_px
-    return Identification(
-        status=IdentificationStatus.FOUND if certain else IdentificationStatus.AMBIGUOUS,
-        members=index[members[order]],
-        led_numbers=numbers[order] if certain else np.full(len(numbers), -1),
-        centre_px=centre,
-        radius_px=fit.radius_px,
-        roll_rad=roll if certain else np.nan,
-        led_pixels_px=led_pixels if certain else np.full((SLOTS, 2), np.nan),
-        ellipse=ellipse,
-        rms_px=fit.rms_px,
-    )
-
-
-def _rays(pixels: Array, camera: Camera) -> Array:
-    """(n, 3) points at depth 1 of a camera without distortion."""
-    ab = (pixels - np.array(camera.principal_point_px)) / camera.focal_length_px
-    return np.column_stack([np.ones(len(ab)), -ab])
-
-
-def _ellipse_agrees(points: Array, slots: NDArray[np.int64], ellipse: Ellipse | None) -> bool:
-    """Whether the places on the ellipse's circle have the same order and gaps as the fit's slots."""
-    if ellipse is None:
-        return False
-    places = places_on_circle(ellipse.to_circle(points), SLOTS).slot
-    return bool(((places - slots) % SLOTS == (places[0] - slots[0]) % SLOTS).all())
+    return prior.shape_error_px(points[fit.candidate[filled]], (filled - roll_of(fit, prior)[0]) % SLOTS)

@@ -1,23 +1,30 @@
-"""Grey frame to blobs: threshold, components, opening, filters, weighted centres.
+"""Grey frame to blobs: binarisation, components, opening, filters, weighted centres.
 
-    frame ► statistics ► threshold ► components (runs) ► opening ► area, shape ► centroid
+    local:  frame ► spots, each with its threshold (runs)           ► opening ► area, shape ► centroid
+    frame:  frame ► statistics ► threshold ► components (runs)      ► opening ► area, shape ► centroid
+
+The local method (see `spots`) flies: it finds LEDs in the Sun's veil, in front of the sea and beside the canopy, where
+one threshold for the frame (see `binarise`) is above the LEDs or below the background. A fixed threshold is taken as
+it is, like one of the frame.
 
 Components come before opening, not after as in [Yoon 2018, Fig 2]: the result is the same (see `morphology`), and on a
 dark frame nothing but the blobs is ever touched. Whatever is wider than an LED can be (the Sun, broad reflections)
 falls to the area filter before it is opened or measured.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dockair.errors import DockairError
 from dockair.messages import Window
-from dockair.nav.image.binarise import Image, adaptive_threshold, check_image, frame_statistics
-from dockair.nav.image.centroid import NoiseModel, measure_blobs
+from dockair.nav.image.binarise import Image, Mask, adaptive_threshold, check_image, frame_statistics
+from dockair.nav.image.centroid import BlobMeasurements, NoiseModel, measure_blobs
 from dockair.nav.image.labelling import Runs, foreground_runs
-from dockair.nav.image.morphology import open_components, structuring_element
+from dockair.nav.image.morphology import open_and_trace, structuring_element
+from dockair.nav.image.spots import SpotLimits, find_spots
 from dockair.rotations import Array
 
 _QUANTISATION_VARIANCE = 1.0 / 12.0  # of a rounded level [DN^2]
@@ -27,25 +34,35 @@ _QUANTISATION_VARIANCE = 1.0 / 12.0  # of a rounded level [DN^2]
 class DetectSettings:
     """Settings of the image stages; levels are in DN of the frame."""
 
-    threshold_dn: int | None = None  # fixed threshold; None for the adaptive one
-    noise_factor: float = 8.0  # k: in 2.2 million pixels of normal noise none passes
+    method: Literal["local", "frame"] = "local"
+    threshold_dn: int | None = None  # fixed threshold, in place of either method's
+    spot_contrast_dn: float = 4.0  # an LED at 20 m in 14 us (the Sun in view) has 6
+    wide_spot_contrast_dn: float = 48.0  # of spots wider than 7 px: an LED as near as that is bright
+    spot_noise_factor: float = 5.0  # and three pixels have to be above it
+    spot_share: float = 0.1  # of the peak that a spot's pixels are above: the skirt below it is measured as it touches
+    texture: float = 0.04  # rms of sea, cloud and canopy within a ring, in shares of their level
+    noise_factor: float = 8.0  # of "frame": in 2.2 million pixels of normal noise none passes
     min_contrast_dn: float = 8.0  # above sunlit cloud (5 DN at f/8, 20 us); a spot of peak 60 DN keeps 6 pixels
     max_contrast_dn: float = 40.0  # half of a mean LED's peak at 10 m (80 DN)
-    connectivity: int = 8  # as the source recommends
+    connectivity: int = 8  # as the source recommends; spots always have 8
     element_shape: str = "square"  # the source's structuring element
     element_size_px: int = 3  # 1 switches opening off
     spare_below_px: int = 13  # smaller blobs are not opened, see `morphology`
     min_area_px: int = 3  # a far LED has four pixels, with one to spare; two hot pixels side by side are none
     max_area_px: int = 400  # the Sun's disc has 570; a clipped LED at 2 m about 200
     max_elongation: float = 3.5  # ratio of axes; streaks and edges are longer, a row of three pixels is 3.0
+    centroid: Literal["windowed", "weighted"] = "windowed"  # the source's is the second, see `centroid`
     local_background: bool = True
     gain_dn_per_electron: float = 255.0 / 13500.0  # 8 bit over the full well; a frame's own gain replaces it
     noise_dn: float = 0.25  # 13 e- of read noise; quantisation is added, and the frame may show more
+    response_spread: float = 0.01  # of the pixels, as their maker states it
     saturation_dn: int | None = None  # None for the data type's largest level
-    sigma_floor_px: float = 0.005  # phase error of a sampled spot, from the tests' frames
-    clipped_sigma_floor_px: float = 0.05  # of a clipped one
+    sigma_floor_px: float = 0.001  # phase error of a sampled spot, from the tests' frames
+    clipped_sigma_floor_px: float = 0.19  # of a clipped one of one pixel, falls with the root of the area
 
     def __post_init__(self) -> None:
+        if self.method not in ("local", "frame"):
+            raise DockairError("detect.method", expected="a method", got=self.method, exists=["local", "frame"])
         if not 1 <= self.min_area_px <= self.max_area_px:
             raise DockairError(
                 "detect.min_area_px", expected=f"1 to max_area_px = {self.max_area_px}", got=self.min_area_px
@@ -62,7 +79,8 @@ class Blobs:
     sigma_px: Array  #: (n,) standard deviation of each coordinate
     clipped: NDArray[np.bool_]  #: (n,) touches the saturation level
     flux: Array  #: (n,) sum above the background [DN]
-    threshold_dn: int  #: the threshold that was used
+    threshold_dn: int  #: the fixed one or the frame's; of spots the lowest, -1 if there are none
+    thresholds_dn: NDArray[np.int64]  #: (n,) the level that each one's pixels are above
 
     def __len__(self) -> int:
         return len(self.area_px)
@@ -91,61 +109,141 @@ def detect(
     if window is not None and window.shape != image.shape:
         raise DockairError("image", expected=f"the window's shape {window.shape}", got=image.shape)
     image = np.ascontiguousarray(image)
-    threshold, background, noise_dn = _levels(image, settings)
-    runs = _components(image, threshold, settings)
-    largest = int(np.iinfo(image.dtype).max)
+    if gain_dn_per_electron is None:
+        gain_dn_per_electron = settings.gain_dn_per_electron
+    if settings.method == "local" and settings.threshold_dn is None:
+        found = _spots(image, settings, gain_dn_per_electron)
+    else:
+        found = _above_one_threshold(image, settings)
+    found = _opened(found, settings)
     noise = NoiseModel(
-        gain_dn_per_electron=settings.gain_dn_per_electron if gain_dn_per_electron is None else gain_dn_per_electron,
-        noise_dn=noise_dn,
-        saturation_dn=largest if settings.saturation_dn is None else settings.saturation_dn,
+        gain_dn_per_electron=gain_dn_per_electron,
+        noise_dn=found.noise_dn,
+        saturation_dn=(1 << 8 * image.dtype.itemsize) - 1 if settings.saturation_dn is None else settings.saturation_dn,
         floor_px=settings.sigma_floor_px,
         clipped_floor_px=settings.clipped_sigma_floor_px,
+        response_spread=settings.response_spread,
     )
     measured = measure_blobs(
-        image, runs, threshold, noise, background_dn=background, local_background=settings.local_background
+        image,
+        found.runs,
+        found.thresholds_dn,
+        noise,
+        background_dn=found.backgrounds_dn,
+        local_background=settings.local_background,
+        windowed=settings.centroid == "windowed",
     )
-    keep = measured.elongation <= settings.max_elongation
-    origin = np.zeros(2) if window is None else np.array([window.column_start, window.row_start], dtype=float)
-    return Blobs(
-        centroids_px=measured.centroids_px[keep] + origin,
-        area_px=runs.area_px[keep],
-        peak=measured.peak[keep],
-        sigma_px=measured.sigma_px[keep],
-        clipped=measured.clipped[keep],
-        flux=measured.flux[keep],
+    return _blobs(found, measured, measured.elongation <= settings.max_elongation, window)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Components:
+    """Components, each with its threshold and background (n,) and all with the noise [DN]."""
+
+    runs: Runs
+    area_px: NDArray[np.int64]
+    thresholds_dn: NDArray[np.int64]
+    backgrounds_dn: Array
+    noise_dn: float
+    threshold_dn: int | None  # that all were made with
+
+    def select(self, keep: Mask) -> "_Components":
+        return replace(
+            self,
+            runs=self.runs.select(keep),
+            area_px=self.area_px[keep],
+            thresholds_dn=self.thresholds_dn[keep],
+            backgrounds_dn=self.backgrounds_dn[keep],
+        )
+
+
+def _spots(image: Image, settings: DetectSettings, gain: float) -> _Components:
+    noise_dn = float(np.sqrt(settings.noise_dn**2 + _QUANTISATION_VARIANCE))
+    limits = SpotLimits(
+        min_contrast_dn=settings.spot_contrast_dn,
+        wide_contrast_dn=settings.wide_spot_contrast_dn,
+        noise_factor=settings.spot_noise_factor,
+        min_share=settings.spot_share,
+        texture=settings.texture,
+        gain_dn_per_electron=gain,
+        noise_dn=noise_dn,
+    )
+    spots = find_spots(image, limits)
+    return _Components(
+        runs=spots.runs,
+        area_px=spots.runs.area_px,
+        thresholds_dn=spots.threshold_dn,
+        backgrounds_dn=spots.background_dn,
+        noise_dn=noise_dn,
+        threshold_dn=None,
+    )
+
+
+def _above_one_threshold(image: Image, settings: DetectSettings) -> _Components:
+    threshold, background, noise_dn = _levels(image, settings)
+    runs = foreground_runs(image, threshold, settings.connectivity)
+    return _Components(
+        runs=runs,
+        area_px=runs.area_px,
+        thresholds_dn=np.full(runs.count, threshold),
+        backgrounds_dn=np.full(runs.count, background),
+        noise_dn=noise_dn,
         threshold_dn=threshold,
     )
 
 
 def _levels(image: Image, settings: DetectSettings) -> tuple[int, float, float]:
-    """Threshold, background and noise [DN]."""
+    """Threshold, background and noise of the whole frame [DN]."""
     sensor_noise = float(np.sqrt(settings.noise_dn**2 + _QUANTISATION_VARIANCE))
     if image.size == 0:
         return settings.threshold_dn or 0, 0.0, sensor_noise
     statistics = frame_statistics(image)
-    # the interpolated histogram spreads every level over its width, which adds a rounding error's variance once more
-    noise = float(np.sqrt(max(statistics.noise_dn**2 - _QUANTISATION_VARIANCE, sensor_noise**2)))
     if settings.threshold_dn is not None:
-        return settings.threshold_dn, statistics.background_dn, noise
+        return settings.threshold_dn, statistics.background_dn, sensor_noise
     threshold = adaptive_threshold(
         statistics,
         noise_factor=settings.noise_factor,
         min_contrast_dn=settings.min_contrast_dn,
         max_contrast_dn=settings.max_contrast_dn,
     )
-    return threshold, statistics.background_dn, noise
+    return threshold, statistics.background_dn, sensor_noise
 
 
-def _components(image: Image, threshold: int, settings: DetectSettings) -> Runs:
-    runs = foreground_runs(image, threshold, settings.connectivity)
-    runs = _of_right_area(runs, settings)
-    if settings.element_size_px > 1 and runs.count:
-        element = structuring_element(settings.element_shape, settings.element_size_px)
-        runs = open_components(runs, element, settings.spare_below_px, settings.connectivity)
-        runs = _of_right_area(runs, settings)
-    return runs
+def _opened(found: _Components, settings: DetectSettings) -> _Components:
+    """Components of the right area, and those that opening leaves of them."""
+    found = _of_right_area(found, settings)
+    if settings.element_size_px == 1 or found.area_px.max(initial=0) < settings.spare_below_px:
+        return found
+    element = structuring_element(settings.element_shape, settings.element_size_px)
+    # spots are made with 8 neighbours, whatever the setting
+    runs, origin = open_and_trace(found.runs, element, settings.spare_below_px, settings.connectivity)
+    opened = _Components(
+        runs=runs,
+        area_px=runs.area_px,
+        thresholds_dn=found.thresholds_dn[origin],
+        backgrounds_dn=found.backgrounds_dn[origin],
+        noise_dn=found.noise_dn,
+        threshold_dn=found.threshold_dn,
+    )
+    return _of_right_area(opened, settings)
 
 
-def _of_right_area(runs: Runs, settings: DetectSettings) -> Runs:
-    area = runs.area_px
-    return runs.select((area >= settings.min_area_px) & (area <= settings.max_area_px))
+def _of_right_area(found: _Components, settings: DetectSettings) -> _Components:
+    keep = (found.area_px >= settings.min_area_px) & (found.area_px <= settings.max_area_px)
+    return found if keep.all() else found.select(keep)
+
+
+def _blobs(found: _Components, measured: BlobMeasurements, keep: Mask, window: Window | None) -> Blobs:
+    origin = np.zeros(2) if window is None else np.array([window.column_start, window.row_start], dtype=float)
+    thresholds = found.thresholds_dn[keep]
+    lowest = int(thresholds.min()) if len(thresholds) else -1
+    return Blobs(
+        centroids_px=measured.centroids_px[keep] + origin,
+        area_px=found.area_px[keep],
+        peak=measured.peak[keep],
+        sigma_px=measured.sigma_px[keep],
+        clipped=measured.clipped[keep],
+        flux=measured.flux[keep],
+        threshold_dn=lowest if found.threshold_dn is None else found.threshold_dn,
+        thresholds_dn=thresholds,
+    )

@@ -46,8 +46,9 @@ class Runs:
     @property
     def area_px(self) -> NDArray[np.int64]:
         """(count,) pixels of each component."""
-        total = np.concatenate([[0], np.cumsum(self.stop - self.start, dtype=np.int64)])
-        return np.diff(total[self.offset])
+        if self.count == 0:
+            return np.zeros(0, np.int64)
+        return np.add.reduceat(self.stop - self.start, self.offset[:-1], dtype=np.int64)
 
     def select(self, keep: Mask) -> "Runs":
         """The components for which `keep` (count,) is true, in the same order."""

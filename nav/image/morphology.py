@@ -88,10 +88,17 @@ def open_components(runs: Runs, element: Element, spare_below_px: int, connectiv
         spare_below_px: area under which a component is left as it is.
         connectivity: 8 or 4, as the components were made with.
     """
-    row, start, stop, offset = _open_components(
+    return open_and_trace(runs, element, spare_below_px, connectivity)[0]
+
+
+def open_and_trace(
+    runs: Runs, element: Element, spare_below_px: int, connectivity: int = 8
+) -> tuple[Runs, NDArray[np.int32]]:
+    """Components after opening, and for each the component (n,) that it is of; arguments as `open_components`."""
+    row, start, stop, offset, origin = _open_components(
         runs.row, runs.start, runs.stop, runs.offset, element, spare_below_px, connectivity == 8
     )
-    return Runs(row=row, start=start, stop=stop, offset=offset)
+    return Runs(row=row, start=start, stop=stop, offset=offset), origin
 
 
 @njit(cache=True)
@@ -156,13 +163,14 @@ def _open_components(row, start, stop, offset, element, spare_below, corners):  
     # opening can cut a run into pieces, but never into more than it has pixels
     capacity = int((stop - start).sum())
     out = np.empty((3, capacity), np.int32)
-    out_offset = np.zeros(capacity + 1, np.int32)
+    out_offset, origin = np.zeros(capacity + 1, np.int32), np.empty(capacity, np.int32)
     n, count = 0, 0
     for c in range(len(offset) - 1):
         r, a, b = row[offset[c] : offset[c + 1]], start[offset[c] : offset[c + 1]], stop[offset[c] : offset[c + 1]]
         area = (b - a).sum()
         if area < spare_below:
             out[0, n : n + len(r)], out[1, n : n + len(r)], out[2, n : n + len(r)] = r, a, b
+            origin[count] = c
             n, count = n + len(r), count + 1
             out_offset[count] = n
             continue
@@ -180,6 +188,13 @@ def _open_components(row, start, stop, offset, element, spare_below, corners):  
                     _mark_piece(patch, r[k] - top, j, pieces + 1, corners, stack)
         for piece in range(pieces):
             n = _append_piece(out, n, patch, top, left, piece + 2, r, a, b)
+            origin[count] = c
             count += 1
             out_offset[count] = n
-    return out[0, :n].copy(), out[1, :n].copy(), out[2, :n].copy(), out_offset[: count + 1].copy()
+    return (
+        out[0, :n].copy(),
+        out[1, :n].copy(),
+        out[2, :n].copy(),
+        out_offset[: count + 1].copy(),
+        origin[:count].copy(),
+    )

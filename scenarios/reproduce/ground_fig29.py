@@ -2,8 +2,8 @@
 
 The complete chain on rendered frames at 50 Hz, without gyro, hose or flight: detect, identify, track, pose by
 Levenberg-Marquardt. A frame's start is the pose of the frame before. A flat ring has two poses that look nearly alike,
-mirror images in pitch and yaw; the other one is taken when the chi2 of the last 0.2 s speaks for it by 3 sigma. Beyond
-about 12 m a frame hardly tells them apart, and without gyro the wrong one is followed at times.
+mirror images in pitch and yaw, and beyond about 12 m one frame hardly tells them apart; the other one is taken when the
+chi2 of the last 0.2 s speaks for it by 3 sigma.
 
 Truth is the hardware as built and the navigation has its nominal sheets, so that calibration errors count: an LED ring
 larger than its sheet is seen nearer by as much. The source prints the distances, the duration and its rate; it measured
@@ -23,6 +23,7 @@ from dockair.calibration import NavigationSheets
 from dockair.messages import CameraFrame, Window
 from dockair.nav.identify.ring import IdentificationStatus, identify
 from dockair.nav.image.detect import detect
+from dockair.nav.navigator import NavigatorSettings
 from dockair.nav.pose.estimate import PoseEstimate, PoseStatus, solve_pose
 from dockair.nav.track import RingTracker
 from dockair.rotations import Array, matrix_from_yaw_pitch_roll, yaw_pitch_roll_from_matrix
@@ -35,7 +36,6 @@ _SOURCE = "[Yoon 2018, fig 29]"
 _START_M, _END_M, _DURATION_S, _RATE_HZ = 15.0, 6.0, 16.0, 50
 _BANDS_M = ((12.0, 15.1), (9.0, 12.0), (5.9, 9.0))
 _MOMENT_S = 1e-4  # between two places that give a velocity
-_LED_SIGMA_M = 3e-4  # place of an LED on the ring, as built
 _FLIP_CHI2 = 9.0
 _MEMORY = 0.9  # a frame, of what spoke for the mirrored pose: 0.2 s at 50 Hz
 _MIRRORED_DEG = 5.0  # an attitude so far off is the mirrored one's
@@ -118,7 +118,7 @@ class PixelChain:
         if found.status is not IdentificationStatus.FOUND:
             return None
         self._roll_rad = found.roll_rad
-        misplaced_px = _LED_SIGMA_M / (0.5 * self._sheets.ring.diameter_m) * found.radius_px
+        misplaced_px = NavigatorSettings().led_position_sigma_m / (0.5 * self._sheets.ring.diameter_m) * found.radius_px
         pose = solve_pose(
             blobs.centroids_px[found.members],
             self._sheets.ring.positions_D[found.led_numbers],
@@ -150,7 +150,7 @@ class Carried:
     time_s: Array
     true: Array  #: (n, 6) p_CD [m], roll, pitch, yaw [rad]
     solved: Array  #: (n, 6)
-    chain_s: Array  #: (n,) time that the chain took
+    chain_s: Array  #: (n,) processor time that the chain took
     pixels: Array  #: (n,) read
     scale: float  #: what nominal focal length and ring make of a range, over the range
 
@@ -163,9 +163,9 @@ def carry(seed: int = 3, duration_s: float = _DURATION_S) -> Carried:
         chain, scale = PixelChain(made.parts.sheets), _scale(made)
         for time_s in times:
             taken = _moving(made, float(time_s), chain.window)
-            began = time.perf_counter()
+            began = time.process_time()  # of all threads: what one core would take
             pose = chain.step(taken.frame)
-            took = time.perf_counter() - began
+            took = time.process_time() - began
             solved = np.full(6, np.nan) if pose is None else _six(pose.R_CD, pose.p_CD)
             rows.append((_six(taken.R_CD, taken.p_CD), solved, took, taken.frame.pixels.size))
     true, solved_rows, chain_s, pixels = (np.array(column) for column in zip(*rows, strict=True))
@@ -199,7 +199,7 @@ def reproduce(out: Path | None) -> dict[str, Any]:
         "from_m": float(run.true[0, 0]),
         "to_m": float(run.true[-1, 0]),
         "duration_s": float(len(run.time_s) / _RATE_HZ),
-        "frames_per_second": float(solved.sum() / run.chain_s.sum()),
+        "frames_per_second": float(len(run.time_s) / run.chain_s.sum()),
         "frames": len(run.time_s),
         "frames_with_pose": int(solved.sum()),
         "frames_mirrored": int((np.abs(error[solved, 4:]) > np.radians(_MIRRORED_DEG)).any(axis=1).sum()),

@@ -1,4 +1,4 @@
-"""The frame set: hard light and weather, 2 to 30 m, several seeds; what detection and identification make of each frame.
+"""The frame set: hard light and weather, 2 to 30 m, several seeds; what detection and identification make of it.
 
 A frame is the default camera's, its exposure settled, with the ring anywhere about its nominal place and the receiver
 turned a little, both drawn from the seed together with hardware, clouds and noise. Two things are asked of the ring: to
@@ -33,7 +33,7 @@ _ACROSS_SIGMA = 0.03  # of the ring's place about its nominal one, of the range
 _TURN_SIGMA_RAD = np.array([0.05, 0.01, 0.02])  # receiver's roll, pitch, yaw
 _PREDICTED_SIGMA_PX, _PREDICTED_SIZE_SIGMA = 3.0, 0.01
 _FEWEST_LEDS = 4  # a ring with fewer is not asked for
-_SIZE_IN, _DPI = (15.0, 5.4), 110
+_SIZE_IN, _DPI = (18.0, 5.4), 110
 _OUTCOMES = ("found", "ambiguous", "not_found", "wrong")
 
 
@@ -73,6 +73,8 @@ class Score:
     visible: int
     found: int
     others: int
+    error2_px2: float  #: squared distance of the blobs found from their LEDs, summed
+    error2_sigmas: float  #: the same, each over its blob's variance
     alone: str  #: of _OUTCOMES; "" where too few LEDs are visible
     predicted: str
 
@@ -106,7 +108,7 @@ def _score(taken: TrueFrame, camera: Camera, rng: np.random.Generator) -> Score:
     frame, leds_px = taken.frame, taken.leds_px
     blobs = detect(frame.pixels, None, frame.window, gain_dn_per_electron=frame.gain)
     on_led, _ = matches(blobs.centroids_px, leds_px, _WITHIN_PX)
-    _, found = matches(blobs.centroids_px, leds_px[taken.visible], _WITHIN_PX)
+    error2_px2, error2_sigmas = _squared_errors(blobs, leds_px[taken.visible])
     alone = predicted = ""
     if taken.visible.sum() >= _FEWEST_LEDS:
         ring = identify(blobs.centroids_px, camera=camera, brightness=blobs.flux)
@@ -120,9 +122,20 @@ def _score(taken: TrueFrame, camera: Camera, rng: np.random.Generator) -> Score:
         )  # fmt: skip
         predicted = _outcome(ring, blobs, taken, named=True)
     return Score(
-        visible=int(taken.visible.sum()), found=int(found.sum()), others=int((~on_led).sum()), alone=alone,
-        predicted=predicted,
+        visible=int(taken.visible.sum()), found=len(error2_px2), others=int((~on_led).sum()),
+        error2_px2=float(error2_px2.sum()), error2_sigmas=float(error2_sigmas.sum()), alone=alone, predicted=predicted,
     )  # fmt: skip
+
+
+def _squared_errors(blobs: Blobs, leds_px: Array) -> tuple[Array, Array]:
+    """Of the LEDs that have a blob, (n,) squared distances from the nearest, and over its variance."""
+    distance = np.linalg.norm(blobs.centroids_px[:, None] - leds_px[None], axis=2)
+    if len(blobs) == 0:
+        return np.empty(0), np.empty(0)
+    nearest = distance.argmin(axis=0)
+    found = distance.min(axis=0) < _WITHIN_PX
+    squared = distance.min(axis=0)[found] ** 2
+    return squared, squared / blobs.sigma_px[nearest[found]] ** 2
 
 
 def _outcome(ring: Identification, blobs: Blobs, taken: TrueFrame, *, named: bool) -> str:
@@ -151,11 +164,14 @@ def reproduce(out: Path | None) -> dict[str, Any]:
 
 
 def _rates(scores: list[Score]) -> dict[str, float]:
-    visible = sum(score.visible for score in scores)
+    visible, found = sum(score.visible for score in scores), sum(score.found for score in scores)
+    coordinates = 2 * max(found, 1)
     rates = {
         "frames": len(scores),
         "leds_visible": visible,
-        "detected_percent": _percent(sum(score.found for score in scores), visible),
+        "detected_percent": _percent(found, visible),
+        "centroid_rms_px": float(np.sqrt(sum(score.error2_px2 for score in scores) / coordinates)),
+        "centroid_rms_sigmas": float(np.sqrt(sum(score.error2_sigmas for score in scores) / coordinates)),
         "other_blobs_per_frame": sum(score.others for score in scores) / len(scores),
     }
     for name in ("alone", "predicted"):
@@ -177,15 +193,19 @@ def _draw(scores: Mapping[str, Any], path: Path) -> None:
 
     figure = Figure(figsize=_SIZE_IN, dpi=_DPI, layout="constrained")
     panels = (
-        ("LEDs detected [%]", table("detected_percent"), "RdYlGn", 100.0),
-        ("other blobs a frame", table("other_blobs_per_frame"), "Reds", 100.0),
-        ("ring found, frame alone [%]", table("alone_found_percent"), "RdYlGn", 100.0),
-        ("ring found and named, predicted [%]", table("predicted_found_percent"), "RdYlGn", 100.0),
+        ("LEDs detected [%]", "detected_percent", "RdYlGn", 100.0, ".0f"),
+        ("other blobs a frame", "other_blobs_per_frame", "Reds", 100.0, ".0f"),
+        ("centroid error [px rms]", "centroid_rms_px", "Reds", 0.5, ".2f"),
+        ("ring found, frame alone [%]", "alone_found_percent", "RdYlGn", 100.0, ".0f"),
+        ("ring found and named, predicted [%]", "predicted_found_percent", "RdYlGn", 100.0, ".0f"),
     )
-    for axes, (title, values, colours, most) in zip(figure.subplots(1, 4, sharey=True), panels, strict=True):
+    for axes, (title, name, colours, most, form) in zip(figure.subplots(1, 5, sharey=True), panels, strict=True):
+        values = table(name)
+        if name == "centroid_rms_px":
+            values[table("detected_percent") == 0.0] = np.nan  # no LED, no error
         axes.imshow(values, cmap=colours, vmin=0.0, vmax=most, aspect="auto", alpha=0.8)
         for (i, j), value in np.ndenumerate(values):
-            axes.text(j, i, f"{value:.0f}", ha="center", va="center", fontsize=8)
+            axes.text(j, i, "" if np.isnan(value) else format(value, form), ha="center", va="center", fontsize=8)
         axes.set_title(title, fontsize=10)
         axes.set_xticks(range(len(RANGES_M)), [f"{range_m:g}" for range_m in RANGES_M], fontsize=8)
         axes.set_yticks(range(len(scores)), list(scores), fontsize=8)

@@ -4,9 +4,10 @@ The source opened the aperture wider than in operation so that noise came in. He
 the camera itself sets; then f/2.8 and f/2 with an exposure of twice and four times what it would set there, so that
 reflections and the LEDs' surroundings come up to the LEDs' level. The Sun stands high behind and glints on the basket.
 
-The panels show the source's stages: a fixed threshold half way from the frame's median to the dimmest LED, as a person
-would set it, opening with a 3 x 3 square that spares small blobs, area and shape filters, three-point identification.
-The rows say beside it what the detector that flies makes of the same frame, which sets its thresholds itself.
+The panels show the source's stages: a fixed threshold a little below the dimmest LED, as a person would set it, opening
+with a 3 x 3 square that spares small blobs, an upper limit of area, three-point identification. At 25 m an LED has one
+to four pixels over such a threshold. The last panel shows the detector that flies on the same frame; it sets its
+thresholds itself.
 """
 
 from collections.abc import Mapping
@@ -33,6 +34,7 @@ _SOURCE = "[Yoon 2018, fig 28]"
 _RANGE_M = 25.0
 _REFLECTIONS = {"sun.azimuth_deg": 150.0, "sun.elevation_deg": 60.0}
 _WITHIN_PX = 2.0
+_THRESHOLD_SHARE = 0.8  # of the way from the background to the dimmest LED: "a little lower"
 _ZOOM_RADII = 1.7
 _BOX_MARGIN_PX = 12.0
 _REDUCTION = 4
@@ -80,7 +82,7 @@ class Stages:
 
 def stages_of(taken: TrueFrame, camera: Camera, threshold_dn: int) -> Stages:
     """Run the stages one by one at a threshold, and the detector and the identification with it."""
-    settings = DetectSettings(threshold_dn=threshold_dn)
+    settings = DetectSettings(threshold_dn=threshold_dn, min_area_px=1)
     raw = foreground_runs(taken.frame.pixels, threshold_dn, settings.connectivity)
     element = structuring_element(settings.element_shape, settings.element_size_px)
     opened = open_components(raw, element, settings.spare_below_px, settings.connectivity)
@@ -97,7 +99,8 @@ def outcome_of(taken: TrueFrame, camera: Camera, settings: DetectSettings) -> Ou
 def _hand_set_threshold(taken: TrueFrame) -> int:
     pixels = taken.frame.pixels
     peaks = [pixels[v - 1 : v + 2, u - 1 : u + 2].max() for u, v in np.round(taken.leds_px).astype(int)]
-    return round(0.5 * (float(np.median(pixels)) + float(min(peaks))))
+    background = float(np.median(pixels))
+    return round(background + _THRESHOLD_SHARE * (float(min(peaks)) - background))
 
 
 def reproduce(out: Path | None) -> dict[str, Any]:
@@ -172,8 +175,9 @@ def _draw_line(line: Any, title: str, taken: TrueFrame, stages: Stages, flying: 
         axes.set(xticks=[], yticks=[])
         inset = _magnified(axes, image, taken)
         if axes is line[2]:
+            style = {"ls": "none", "marker": ".", "ms": 3.0, "color": "#ff2d2d", "scalex": False, "scaley": False}
             for each in (axes, inset):
-                each.plot(*stages.outcome.blobs.centroids_px.T, ".", ms=3.0, color="#ff2d2d")
+                each.plot(*stages.outcome.blobs.centroids_px.T, **style)
     _draw_ring(line[3], stages.outcome)
     _draw_ring(line[4], flying)
 

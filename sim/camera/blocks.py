@@ -237,7 +237,8 @@ def _lines_around(
     for node in range(max(i, held[0] + 2), i + 2):
         line, spread = nodes[node], two_lines[node % 2]
         for c in range(spread.shape[0]):
-            a = line[left[c]]
-            spread[c] = a + right[c] * (line[left[c] + 1] - a)
+            k = np.uint32(left[c])  # unsigned: spares the test for indices that count from the end
+            a = line[k]
+            spread[c] = a + right[c] * (line[k + np.uint32(1)] - a)
     held[0] = i
     return two_lines[i % 2], two_lines[(i + 1) % 2], down[r]

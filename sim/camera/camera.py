@@ -312,7 +312,8 @@ class NearInfraredCamera:
             electrons = electrons * dirt.at(pixels)
         width_px = size * camera.focal_length_px / p_C[:, 0]
         wide = width_px >= WIDE_PX
-        add_patches(image, start, pixels[wide], electrons[wide], width_px[wide] / _SQUARE_SIGMAS)
+        if wide.any():
+            add_patches(image, start, pixels[wide], electrons[wide], width_px[wide] / _SQUARE_SIGMAS)
         for size_m in sorted(set(size[~wide].tolist())):
             of = np.flatnonzero((size == size_m) & ~wide)
             self._spread.splat(image, start, pixels[of], electrons[of], p_C[of, 0], size_m, smear[of])

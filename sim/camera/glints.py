@@ -17,17 +17,19 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from dockair.rotations import Array
 from dockair.sim.camera.curved_mirrors import ellipsoid_spots, rim_spots
 from dockair.sim.camera.lobes import ROW, SPOT, facet_rows, spot_rows
-from dockair.sim.camera.mirrors import METAL, Mirrors, finishes, vector
+from dockair.sim.camera.mirrors import METAL, Mirrors, Vector, finishes, vector
 from dockair.sim.camera.occlusion import first_hits, is_clear
 from dockair.sim.camera.round_mirrors import round_spots
 from dockair.sim.camera.sheets import LightParameters, SurfaceParameters
 
 _MOST = 1024  # glints before any is found hidden
+_TINY_M = 1e-300  # keeps a direction finite
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -75,14 +77,34 @@ def starts_of_seen(
     Their middles are on the surface to second order only, and the drawn rim has corners: what the line of sight meets
     within a sixth of a patch of the middle is the surface itself.
     """
-    ray = rows[:, :3] - p_WC
-    distance = np.linalg.norm(ray, axis=1)
-    direction = ray / np.maximum(distance, np.finfo(float).tiny)[:, None]
-    hit = first_hits(model, data, p_WC, direction, float(distance.max(initial=0.0) + 1.0))
-    slack = rows[:, 8] + rows[:, 7] / 6.0
-    on_surface = np.where((hit >= 0.0) & (np.abs(hit - distance) < slack), hit, distance)
-    starts = p_WC + on_surface[:, None] * direction + rows[:, 8:9] * rows[:, 3:6]
-    return (hit < 0.0) | (hit > distance - slack), starts
+    eye, directions, distances = vector(p_WC), np.empty((len(rows), 3)), np.empty(len(rows))
+    _aim(eye, rows, directions, distances)
+    hits = first_hits(model, data, p_WC, directions, float(distances.max(initial=0.0) + 1.0))
+    seen, starts = np.empty(len(rows), dtype=np.bool_), directions
+    _judge(eye, rows, distances, hits, seen, starts)
+    return seen, starts
+
+
+@njit(cache=True)
+def _aim(eye: Vector, rows: Array, directions: Array, distances: Array) -> None:
+    """Fill (n, 3) unit vectors and (n,) distances from the lens to patches."""
+    for i in range(len(rows)):
+        x, y, z = rows[i, 0] - eye[0], rows[i, 1] - eye[1], rows[i, 2] - eye[2]
+        distances[i] = math.sqrt(x * x + y * y + z * z)
+        d = max(distances[i], _TINY_M)
+        directions[i, 0], directions[i, 1], directions[i, 2] = x / d, y / d, z / d
+
+
+@njit(cache=True)
+def _judge(eye: Vector, rows: Array, distances: Array, hits: Array, seen: NDArray[np.bool_], starts: Array) -> None:
+    """Fill what `starts_of_seen` returns; `starts` holds the lines of sight's unit vectors."""
+    for i in range(len(rows)):
+        slack = rows[i, 8] + rows[i, 7] / 6.0
+        meets_surface = hits[i] >= 0.0 and abs(hits[i] - distances[i]) < slack
+        along = hits[i] if meets_surface else distances[i]
+        seen[i] = hits[i] < 0.0 or hits[i] > distances[i] - slack
+        for k in range(3):
+            starts[i, k] = eye[k] + along * starts[i, k] + rows[i, 8] * rows[i, 3 + k]
 
 
 def glint_rows(

@@ -94,13 +94,23 @@ def led_reflection_rows(
     limit = surfaces.faintest_reflection * float(np.max(intensity_w_sr, initial=0.0))
     wanted = _bound(data, mirrors, p_WC, leds_W, axis_W, surfaces) * np.asarray(intensity_w_sr)[:, None] >= limit
     rows = _rows(data, mirrors, p_WC, leds_W, wanted, surfaces)
-    led = rows[:, 9].astype(np.intp)
-    ray = rows[:, :3] - leds_W[led]
-    d1 = np.linalg.norm(ray, axis=1)
-    pattern = np.maximum(np.maximum(ray @ axis_W / d1, 0.0) ** pattern_exponent, surfaces.led_side_light)
-    intensity = np.asarray(intensity_w_sr)[led] * pattern * rows[:, 6] / d1**2
+    intensity = np.empty(len(rows))
+    _reflect(rows, leds_W, vector(axis_W), intensity_w_sr, (pattern_exponent, surfaces.led_side_light), intensity)
     bright = np.flatnonzero((intensity > 0.0) & (intensity >= limit))
     return rows[bright], intensity[bright]
+
+
+@njit(cache=True)
+def _reflect(
+    rows: Array, leds_W: Array, axis: Vector, intensity_w_sr: Array, pattern: tuple[float, float], out: Array
+) -> None:
+    """Fill (n,) I_ref of Eq. (1); `pattern` is m and the side light."""
+    for i in range(len(rows)):
+        j = int(rows[i, 9])
+        ray = (rows[i, 0] - leds_W[j, 0], rows[i, 1] - leds_W[j, 1], rows[i, 2] - leds_W[j, 2])
+        d2 = _dot(ray, ray)
+        cos_psi = max(_dot(ray, axis) / math.sqrt(d2), 0.0)
+        out[i] = intensity_w_sr[j] * max(cos_psi ** pattern[0], pattern[1]) * rows[i, 6] / d2
 
 
 def _bound(

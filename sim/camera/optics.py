@@ -102,8 +102,9 @@ class PointSpread:
 
 def _grid(side: int) -> Array:
     """(side^2, 2) places in a square grid of step 1 about 0."""
-    along = np.arange(side) - 0.5 * (side - 1)
-    return np.stack(np.meshgrid(along, along), axis=-1).reshape(-1, 2)
+    along, out = np.arange(side) - 0.5 * (side - 1), np.empty((side, side, 2))
+    out[..., 0], out[..., 1] = along, along[:, None]
+    return out.reshape(-1, 2)
 
 
 class _Cores:

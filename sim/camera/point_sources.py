@@ -10,11 +10,13 @@ it.
 Not modelled: the way of a glint over its surface; what hides an LED in a part of the exposure.
 """
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import mujoco
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from dockair.rotations import Array, skew
@@ -33,9 +35,8 @@ if TYPE_CHECKING:  # the camera imports this module
 _SMALLEST_PX = 0.5  # of a patch that is not a point
 WIDE_PX = 8.0  #: side of a patch that is so much wider than the lens's blur that it is drawn without it
 _NEAREST_M = 1e-3
+_SUN = -1.0  # in the place of an LED's number
 _LED_AXIS_D = np.array([-1.0, 0.0, 0.0])  # [docs/notation.md]: LEDs shine aft
-
-_Found = tuple[Array, Array, Array]  # places in W (n, 3), electrons per second times m^2 (n,), sizes (n,)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -85,19 +86,22 @@ class PointSources:
         """
         R_WC, p_WC = pose
         leds_W, intensity = self.leds_W(data), self._as_built.led_intensity_w_sr * led_factors
-        axis_W = data.xmat[self._drogue].reshape(3, 3) @ _LED_AXIS_D
-        visible, places_W, electrons_m2_s, size_m = self._seen(data, pose, leds_W, axis_W, intensity)
-        p_C = (np.concatenate([leds_W, places_W]) - p_WC) @ R_WC
-        p_CL, p_CM = p_C[: len(leds_W)], p_C[len(leds_W) :]
-        leds_s = led_electrons(
-            self._response, self._sheets.leds, intensity, p_CL, axis_W @ R_WC, 1.0, self._extinction_1_m
-        )
-        px_per_m = self._as_built.camera.focal_length_px / np.maximum(p_CM[:, 0], _NEAREST_M)
-        sizes = np.full(len(leds_W), self._sheets.leds.die_size_m), _rounded(size_m, px_per_m)
+        axis_W, count = data.xmat[self._drogue].reshape(3, 3) @ _LED_AXIS_D, len(leds_W)
+        mirrored, electrons_m2_s, size_m = self._mirrored(data, pose, leds_W, axis_W, intensity)
+        seen, starts = starts_of_seen(self._model, data, p_WC, np.concatenate([self._led_rows(leds_W), mirrored]))
+        kept = [
+            i for i in np.flatnonzero(seen[count:]) if self._is_lit(data, starts[count + i], mirrored[i, 9], leds_W)
+        ]
+        p_C = (np.concatenate([leds_W, mirrored[kept, :3]]) - p_WC) @ R_WC
+        p_CL, p_CM = p_C[:count], p_C[count:]
+        leds, response = self._sheets.leds, self._response
+        led_rates = led_electrons(response, leds, intensity, p_CL, axis_W @ R_WC, 1.0, self._extinction_1_m)
+        mirrored_rates, sizes = electrons_m2_s[kept], size_m[kept]
+        _as_received(p_CM, self._extinction_1_m, self._as_built.camera.focal_length_px, mirrored_rates, sizes)
         return Sources(
             p_C=p_C,
-            electrons=exposure_s * np.concatenate([leds_s * visible, electrons_m2_s * self._per_area(p_CM)]),
-            size_m=np.concatenate(sizes),
+            electrons=exposure_s * np.concatenate([led_rates * seen[:count], mirrored_rates]),
+            size_m=np.concatenate([np.full(count, leds.die_size_m), sizes]),
             way_C_m=exposure_s * self._velocities_C(data, pose, p_C, leds_W),
         )
 
@@ -111,54 +115,74 @@ class PointSources:
         clearance = self._sheets.leds.occlusion_clearance_m
         return np.logical_not(hidden(self._model, data, p_WC, self.leds_W(data), clearance))
 
-    def _seen(
+    def _led_rows(self, leds_W: Array) -> Array:
+        """(n, ROW) the LEDs as patches for `starts_of_seen`."""
+        rows = np.zeros((len(leds_W), ROW))
+        rows[:, :3], rows[:, 8] = leds_W, self._sheets.leds.occlusion_clearance_m
+        return rows
+
+    def _mirrored(
         self, data: mujoco.MjData, pose: tuple[Array, Array], leds_W: Array, axis_W: Array, intensity: Array
-    ) -> tuple[NDArray[np.bool_], Array, Array, Array]:
-        """What the lens sees, all rays at once: (m,) which LEDs, and of what mirrors them or the Sun (n, 3) places in W,
-        (n,) electrons per second times m^2, (n,) sizes.
+    ) -> tuple[Array, Array, Array]:
+        """What may mirror the LEDs, then the Sun, hidden places among them.
+
+        Returns:
+            (n, ROW) patches, the last column which LED or _SUN; (n,) electrons per second times m^2; (n,) sizes [m].
         """
+        (R_WC, p_WC), sun = pose, self._sun
         leds, surfaces, response = self._sheets.leds, self._sheets.surfaces, self._response
-        direct = np.zeros((len(leds_W), ROW))
-        direct[:, :3], direct[:, 8] = leds_W, leds.occlusion_clearance_m
-        reflected, intensity_w_sr = led_reflection_rows(
-            data, self._mirrors, pose[1], leds_W, axis_W, intensity, leds.pattern_exponent, surfaces
+        reflections, intensity_w_sr = led_reflection_rows(
+            data, self._mirrors, p_WC, leds_W, axis_W, intensity, leds.pattern_exponent, surfaces
         )
-        rows = np.concatenate([direct, reflected, self._glint_rows(data, pose)])
-        seen, starts = starts_of_seen(self._model, data, pose[1], rows)
-        from_sun = len(direct) + len(reflected)
-        mirrored = np.flatnonzero(seen[len(direct) :]) + len(direct)
-        kept = [
-            i for i in mirrored
-            if (is_lit(self._model, data, starts[i], leds_W[int(rows[i, 9])], surfaces.led_seat_m) if i < from_sun
-                else is_clear(self._model, data, starts[i], self._sun.direction_W, np.inf))
-        ]
-        electrons_m2_s = np.concatenate([response.led_e_m2_sr_w_s * intensity_w_sr, self._glint_e_m2_s * rows[from_sun:, 6]])
-        return seen[: len(direct)], ...
-    def _per_area(self, p_C: Array) -> Array:
-        """(n,) cos t/r^2 with what is left of the light on its way [1/m^2]."""
-        r = np.linalg.norm(p_C, axis=1)
-        return np.asarray(np.clip(p_C[:, 0] / r, 0.0, 1.0) * np.exp(-self._extinction_1_m * r) / r**2)
+        reflected_e_m2_s, points = response.led_e_m2_sr_w_s * intensity_w_sr, np.zeros(len(reflections))
+        if sun is None or sun.beam <= 0.0:
+            return reflections, reflected_e_m2_s, points
+        glints = glint_rows(
+            data, self._mirrors, p_WC, sun.direction_W, surfaces, self._sheets.light, np.ascontiguousarray(R_WC[:, 0])
+        )
+        glints[:, 9] = _SUN
+        glint_e_m2_s = response.glint_e_m2_s * sun.beam * glints[:, 6]
+        return (
+            np.concatenate([reflections, glints]),
+            np.concatenate([reflected_e_m2_s, glint_e_m2_s]),
+            np.concatenate([points, glints[:, 7]]),
+        )
+
+    def _is_lit(self, data: mujoco.MjData, start: Array, light: float, leds_W: Array) -> bool:
+        """Whether the way from a place (3,) to the Sun, or to an LED, is clear."""
+        if light == _SUN:
+            assert self._sun is not None
+            return is_clear(self._model, data, start, self._sun.direction_W, np.inf)
+        return is_lit(self._model, data, start, leds_W[int(light)], self._sheets.surfaces.led_seat_m)
 
     def _velocities_C(self, data: mujoco.MjData, pose: tuple[Array, Array], p_C: Array, leds_W: Array) -> Array:
         """(n, 3) Eq. (1): the LEDs, which come first, move with the drogue; what mirrors is taken to stand still."""
         R_WC, p_WC = pose
-        v_lens = self._point_velocities(data, self._receiver, p_WC[None])
-        velocity_W = np.broadcast_to(-v_lens, p_C.shape).copy()
-        velocity_W[: len(leds_W)] += self._point_velocities(data, self._drogue, leds_W)
         w_C = R_WC.T @ data.cvel[self._receiver, :3]
-        return np.asarray(velocity_W @ R_WC + p_C @ skew(w_C))  # p x w = -w x p
+        velocity_C = p_C @ skew(w_C) - self._point_velocities(data, self._receiver, p_WC) @ R_WC  # p x w = -w x p
+        velocity_C[: len(leds_W)] += self._point_velocities(data, self._drogue, leds_W) @ R_WC
+        return np.asarray(velocity_C)
 
     def _point_velocities(self, data: mujoco.MjData, body: int, points_W: Array) -> Array:
-        """(n, 3) velocity in W of points of a body [m/s]; MuJoCo keeps that of the tree's centre of mass."""
+        """(..., 3) velocity in W of points of a body [m/s]; MuJoCo keeps that of the tree's centre of mass."""
         root = data.subtree_com[self._model.body_rootid[body]]
         return np.asarray(data.cvel[body, 3:] - (points_W - root) @ skew(data.cvel[body, :3]))
 
 
-def _rounded(size_m: Array, px_per_m: Array) -> Array:
-    """(n,) sizes in powers of two of a millimetre, so that few spread functions serve all.
+@njit(cache=True)
+def _as_received(p_C: Array, extinction_1_m: float, focal_length_px: float, rates: Array, size_m: Array) -> None:
+    """Turn (n,) electrons per second times m^2 into electrons per second, and round (n,) sizes, in place.
 
-    Patches under half a pixel are points; those from WIDE_PX on keep their size, for they are drawn without the lens.
+    The first with cos t/r^2 and what is left of the light on its way; the second to powers of two of a millimetre, so
+    that few spread functions serve all. Patches under half a pixel are points; those from WIDE_PX on keep their size,
+    for they are drawn without the lens.
     """
-    width_px = size_m * px_per_m
-    rounded = 1e-3 * 2.0 ** np.round(np.log2(np.maximum(size_m, _NEAREST_M) / 1e-3))
-    return np.where(width_px < _SMALLEST_PX, 0.0, np.where(width_px >= WIDE_PX, size_m, rounded))
+    for i in range(len(p_C)):
+        x = p_C[i, 0]
+        r = math.sqrt(x * x + p_C[i, 1] * p_C[i, 1] + p_C[i, 2] * p_C[i, 2])
+        rates[i] *= min(max(x / r, 0.0), 1.0) * math.exp(-extinction_1_m * r) / r**2
+        width_px = size_m[i] * focal_length_px / max(x, _NEAREST_M)
+        if width_px < _SMALLEST_PX:
+            size_m[i] = 0.0
+        elif width_px < WIDE_PX:
+            size_m[i] = 1e-3 * 2.0 ** round(math.log2(max(size_m[i], _NEAREST_M) / 1e-3))

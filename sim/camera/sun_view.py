@@ -43,6 +43,7 @@ class SunView:
 
     Attributes:
         direction_W: (3,) unit vector toward the Sun.
+        beam: part of the sunlight that comes through the clouds.
     """
 
     def __init__(
@@ -53,11 +54,7 @@ class SunView:
         self._radius_px = camera.focal_length_px * float(np.tan(radius_rad)) + margin_px
         self._disc_W = _disc_directions(sun_W, radius_rad)
         self._dimmed = sky.beam(self._disc_W)
-
-    @property
-    def beam(self) -> float:
-        """Part of the sunlight that comes through the clouds."""
-        return float(self._dimmed.mean())
+        self.beam = float(self._dimmed.mean())
 
     def visible(self, data: mujoco.MjData, p_WC: Array) -> float:
         """Part of the disc that the lens sees, Eq. (1)."""

@@ -120,7 +120,7 @@ class Camera:
         """(n, 2) pixels (u, v) of points p_C (n, 3) [m] in camera axes; NaN where x <= 0 (behind the camera)."""
         p_C = np.asarray(p_C, dtype=float).reshape(-1, 3)
         x = p_C[:, :1]
-        ab = -p_C[:, 1:] / np.where(x > 0.0, x, np.nan)
+        ab: Array = -p_C[:, 1:] / np.where(x > 0.0, x, np.nan)
         if self.distortion is not None:
             ab = _distort(ab, self.distortion)
         return np.asarray(self.focal_length_px * ab + self.principal_point_px)
@@ -142,7 +142,7 @@ def _distort(ab: Array, coefficients: tuple[float, ...]) -> Array:
     a, b = ab[:, 0], ab[:, 1]
     r2 = a * a + b * b
     s = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
-    out = np.empty_like(ab)
+    out: Array = np.empty_like(ab)
     out[:, 0] = a * s + 2 * p1 * a * b + p2 * (r2 + 2 * a * a)
     out[:, 1] = b * s + p1 * (r2 + 2 * b * b) + 2 * p2 * a * b
     return out
@@ -150,19 +150,34 @@ def _distort(ab: Array, coefficients: tuple[float, ...]) -> Array:
 
 @dataclass(frozen=True, slots=True)
 class LedRing:
-    """LEDs on the drogue's rim: in the drogue's y-z plane, LED k at 45 deg k from +y toward +z, shining aft (-x)."""
+    """LEDs on the drogue's rim: in the drogue's y-z plane, LED k at 45 deg k from +y toward +z, shining aft (-x).
+
+    Two optional keys tell its numbering from its image: LEDs off their even places, or of unlike brightness.
+    """
 
     diameter_m: float = 0.5
     count: int = 8
+    angles_deg: tuple[float, ...] | None = None  #: (count,) each within 0.4 spacings of its even place, from +y
+    brightness: tuple[float, ...] | None = None  #: (count,) relative, any unit
 
     LIMITS: ClassVar[Mapping[str, tuple[float, float, str]]] = {
         "diameter_m": (0.05, 5.0, "m"),
         "count": (3, 64, "LEDs"),
     }
-    OPTIONAL: ClassVar[tuple[str, ...]] = ()
+    OPTIONAL: ClassVar[tuple[str, ...]] = ("angles_deg", "brightness")
 
     def __post_init__(self) -> None:
         _check_limits(self, "ring")
+        if self.angles_deg is not None:
+            _check_vector(self.angles_deg, self.count, 400.0, "ring.angles_deg", f"{self.count} angles [deg]")
+            spacing = 360.0 / self.count
+            if not (np.abs(np.array(self.angles_deg) - spacing * np.arange(self.count)) <= 0.4 * spacing).all():
+                words = f"LED k within {0.4 * spacing:g} deg of {spacing:g} k deg"
+                raise DockairError("ring.angles_deg", expected=words, got=self.angles_deg)
+        if self.brightness is not None:
+            _check_vector(self.brightness, self.count, 1e6, "ring.brightness", f"{self.count} relative brightnesses")
+            if not (np.array(self.brightness) > 0.0).all():
+                raise DockairError("ring.brightness", expected="numbers above 0", got=self.brightness)
 
     @classmethod
     def from_toml(cls, path: str | Path) -> Self:
@@ -170,9 +185,16 @@ class LedRing:
         return _from_toml(cls, path)  # type: ignore[no-any-return]
 
     @property
+    def angles_rad(self) -> Array:
+        """(count,) angle of each LED from +y toward +z."""
+        if self.angles_deg is not None:
+            return np.asarray(np.deg2rad(np.array(self.angles_deg, dtype=float)))
+        return np.asarray(2.0 * np.pi * np.arange(self.count) / self.count)
+
+    @property
     def positions_D(self) -> Array:
         """(count, 3) LED positions in drogue axes [m]."""
-        angle = 2.0 * np.pi * np.arange(self.count) / self.count
+        angle: Array = self.angles_rad
         radius = 0.5 * self.diameter_m
         return np.column_stack([np.zeros(self.count), radius * np.cos(angle), radius * np.sin(angle)])
 

@@ -1,6 +1,7 @@
 import cv2
 import numpy as np
 import pytest
+import scipy.linalg
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -74,6 +75,67 @@ def test_noisy_points_give_opencv_s_direct_fit(arc_deg):
         scale = 1e-3 * axes[0] if arc_deg == 360 else 2e-2 * axes[0]
         np.testing.assert_allclose(ours.centre_px, [u, v], atol=scale)
         np.testing.assert_allclose(ours.semi_axes_px, np.sort(diameters)[::-1] / 2, atol=scale)
+
+
+def conic_by_generalised_eigenvectors(points):
+    """Fitzgibbon, Pilu & Fisher 1999 as printed: D'D A = lambda C A, six by six; no partition, no inverse of a part."""
+    mean = points.mean(axis=0)
+    scale = np.sqrt(((points - mean) ** 2).sum(axis=1).mean())
+    x, y = ((points - mean) / scale).T
+    D = np.column_stack([x * x, x * y, y * y, x, y, np.ones_like(x)])
+    C = np.zeros((6, 6))
+    C[0, 2] = C[2, 0] = 2.0
+    C[1, 1] = -1.0
+    # mu = 1 / lambda: the inverse problem C A = mu D'D A is definite on the right
+    mu, A = scipy.linalg.eigh(C, D.T @ D)
+    conic = A[:, np.argmax(mu)]
+    conic = conic / np.sqrt(conic @ C @ conic) * np.sign(conic[0] + conic[2])
+    T = np.array([[1, 0, -mean[0]], [0, 1, -mean[1]], [0, 0, scale]]) / scale  # pixels to normalised
+    a, b, c, d, e, f = conic
+    Q = T.T @ np.array([[a, b / 2, d / 2], [b / 2, c, e / 2], [d / 2, e / 2, f]]) @ T
+    conic = np.array([Q[0, 0], 2 * Q[0, 1], Q[1, 1], 2 * Q[0, 2], 2 * Q[1, 2], Q[2, 2]])
+    return conic / np.sqrt(4.0 * conic[0] * conic[2] - conic[1] ** 2)
+
+
+@pytest.mark.parametrize(
+    ("kind", "ratio", "arc_deg", "offset_px"),
+    [
+        ("random", (0.3, 0.95), 360.0, 1e3),
+        ("near-circular", (0.999, 1.0), 360.0, 1e3),
+        ("tiny arc", (0.5, 0.95), 25.0, 1e3),
+        ("far off centre", (0.3, 0.95), 360.0, 1e5),
+    ],
+)
+def test_the_conic_is_that_of_an_independent_solver(kind, ratio, arc_deg, offset_px):
+    """Noisy points, so that the problem is not singular; compared as points of the plane, where F is in pixels."""
+    rng = np.random.default_rng(17)
+    for _ in range(100):
+        a = rng.uniform(20.0, 400.0)
+        phase = rng.uniform(0, 6) + np.deg2rad(arc_deg) * np.linspace(0, 1, 24, endpoint=False)
+        centre = offset_px * rng.uniform(-1, 1, 2)
+        points = on_ellipse(centre, a * np.array([1.0, rng.uniform(*ratio)]), rng.uniform(-1.5, 1.5), phase)
+        points += (0.02 if arc_deg < 90.0 else 0.5) * rng.standard_normal(points.shape)
+        ours, theirs = fit_ellipse(points), ellipse_from_conic(conic_by_generalised_eigenvectors(points))
+        assert (ours is None) == (theirs is None)
+        tolerance = 1e-5 * theirs.semi_axes_px[0] * (20.0 if arc_deg < 90.0 else 1.0)
+        np.testing.assert_allclose(ours.centre_px, theirs.centre_px, rtol=1e-9, atol=tolerance)
+        np.testing.assert_allclose(ours.semi_axes_px, theirs.semi_axes_px, rtol=1e-9, atol=tolerance)
+        aspect = 1.0 - theirs.semi_axes_px[1] / theirs.semi_axes_px[0]
+        assert angle_between(ours.angle_rad, theirs.angle_rad) < 1e-5 / aspect
+
+
+def test_the_printed_constraint_gives_a_hyperbola():
+    """[Yoon 2018, eq 16] b^2 - 4ac = 1 on the points of an ellipse: its least-squares conic is no ellipse at all."""
+    rng = np.random.default_rng(18)
+    points = on_ellipse((0.0, 0.0), (1.5, 0.8), 0.4, rng.uniform(0, 6, 20)) + 0.02 * rng.standard_normal((20, 2))
+    x, y = points.T
+    D = np.column_stack([x * x, x * y, y * y, x, y, np.ones_like(x)])
+    C = np.zeros((6, 6))
+    C[0, 2] = C[2, 0] = -2.0
+    C[1, 1] = 1.0
+    mu, A = scipy.linalg.eigh(C, D.T @ D)
+    assert ellipse_from_conic(A[:, np.argmax(mu)]) is None
+    assert fit_ellipse(points) is not None
 
 
 def test_the_fit_minimises_the_algebraic_distance_under_its_constraint():

@@ -6,8 +6,16 @@ import numpy as np
 import pytest
 
 from dockair.calibration import Camera
-from dockair.nav.identify.hypotheses import METHODS, IdentifySettings, _contained, _triples_of, ring_fits
-from dockair.nav.identify.octagon import find_octagons
+from dockair.nav.identify.hypotheses import (
+    METHODS,
+    IdentifySettings,
+    _contained,
+    _keys,
+    _octagons,
+    _triples_of,
+    ring_fits,
+    without_impostors,
+)
 from dockair.nav.identify.prior import make_prior
 
 SETTINGS = IdentifySettings()
@@ -16,7 +24,7 @@ both_methods = pytest.mark.parametrize("method", METHODS)
 
 
 def fits_of(points, method="three_point"):
-    return ring_fits(points, method, OPEN, Camera(), 0.1, SETTINGS)
+    return ring_fits(points, method, OPEN, Camera(), 0.1, SETTINGS, 1e-3)
 
 
 @both_methods
@@ -40,18 +48,48 @@ def test_a_true_ring_comes_first_and_only_once(method, ring_scene):
 
 
 def test_the_expected_number_of_accidental_rings_is_the_formulas(ring_scene):
-    """Eq. (1) by hand, from the fit's own tolerance and the number of hypotheses that were looked up."""
+    """Eq. (1) of `chance` by hand, from the fit's own tolerance and the number of hypotheses that were looked up."""
     scene = ring_scene(np.random.default_rng(43), visible=6, clutter=12, range_m=(5.0, 8.0))
     best = fits_of(scene.points)[0]
     assert best.fit.count == 6
-    tested = find_octagons(
-        scene.points, _triples_of(scene.points, "three_point", OPEN), radius_range_px=OPEN.radius_range_px,
-        centre_gate=OPEN.gate, roll_gate=OPEN.roll_gate, min_axis_ratio=np.cos(SETTINGS.max_tilt_rad),
-        tolerance_px=1.0, tolerance_per_radius=0.0, perspective_per_radius_squared=0.0, capacity=1,
-    ).tested  # fmt: skip
-    area = np.prod(np.ptp(scene.points, axis=0))
-    p = (18 - 3) * np.pi * best.fit.tolerance_px**2 / area
+    tested = _octagons(scene.points, "three_point", OPEN, Camera(), 0.1, SETTINGS).tested_right_angles
+    distance = np.hypot(*(scene.points - best.fit.centre_px).T)
+    near = np.count_nonzero(distance[scene.numbers < 0] < 1.6 * best.fit.radius_px)
+    crowd = near / (np.pi * (1.6 * best.fit.radius_px) ** 2)
+    p = max((18 - 3) / np.prod(np.ptp(scene.points, axis=0)), crowd) * np.pi * best.fit.tolerance_px**2
     assert best.log10_false_rings == pytest.approx(np.log10(tested * comb(5, 3) * p**3), abs=1e-6)
+
+
+def test_two_rings_of_eight_are_both_fitted(ring_scene):
+    """Each has 56 triples that find it whole: without telling the same from another one would crowd the other out."""
+    rng = np.random.default_rng(44)
+    for _ in range(10):
+        first, second = (ring_scene(rng, range_m=(8.0, 30.0)) for _ in range(2))
+        if np.hypot(*(first.centre_px - second.centre_px)) < 1.2 * (first.radius_px + second.radius_px):
+            continue
+        fits = fits_of(np.vstack([first.points, second.points]))
+        assert sorted(one.fit.count for one in fits)[-2:] == [8, 8]
+
+
+def test_hypotheses_have_one_key_exactly_when_they_are_the_same_up_to_the_symmetry():
+    rng = np.random.default_rng(45)
+    rows = np.array([rng.permutation(np.r_[rng.choice(60, 5, replace=False), -1, -1, -1]) for _ in range(2000)])
+    keys = _keys(rows)
+    assert len(np.unique(keys)) == len(
+        np.unique([min(np.roll(row, k).tolist() for k in range(8)) for row in rows], axis=0)
+    )
+    for turn in range(8):
+        np.testing.assert_array_equal(_keys(np.roll(rows, turn, axis=1)), keys)
+
+
+def test_a_doubtful_member_is_left_out_and_two_are_too_many(ring_scene):
+    best = fits_of(ring_scene(np.random.default_rng(46)).points)[0]
+    worst = int(np.argmax(best.odds))
+    most = float(best.odds.sum())
+    assert without_impostors(best, most) is best.fit
+    fewer = without_impostors(best, most - 0.5 * best.odds[worst])
+    assert fewer.count == 7 and fewer.candidate[worst] == -1
+    assert without_impostors(best, 0.1 * most) is None
 
 
 def test_a_hypothesis_lies_in_another_up_to_the_rings_symmetry():

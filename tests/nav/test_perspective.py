@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from dockair.calibration import Camera
+from dockair.calibration import Camera, LedRing
 from dockair.nav.identify.perspective import _normal_equations, _orthonormalise, _project, fit_ring
-from dockair.rotations import exp
+from dockair.rotations import exp, matrix_from_yaw_pitch_roll
 
 CAMERA = Camera()
 TOLERANCES = {"tolerance_px": 0.5, "tolerance_per_radius": 0.005}
@@ -68,3 +68,33 @@ def test_the_normal_equations_hold_the_derivative_of_the_image():
     h = 1e-5 * np.eye(6)
     slope = np.array([(squares(e) - squares(-e)) / 2e-5 for e in h])
     np.testing.assert_allclose(-2.0 * g[:, 0], slope, rtol=1e-4, atol=1e-9)
+
+
+def test_points_between_the_slots_lie_on_the_image_of_the_same_circle(ring_scene):
+    """`image_px` at the slots' angles gives the slots; between them points of the ring in space, by the camera."""
+    rng = np.random.default_rng(34)
+    scene = ring_scene(rng, visible=8, sigma_px=0.0, range_m=(2.5, 6.0))
+    found = fit(scene.points, np.argsort(scene.numbers))
+    np.testing.assert_allclose(found.image_px(np.arange(8) * np.pi / 4), found.slots_px, atol=1e-9)
+    angle = rng.uniform(0.0, 2.0 * np.pi, 5)
+    p_DL = 0.25 * np.column_stack([np.zeros(5), np.cos(angle), np.sin(angle)])
+    np.testing.assert_allclose(
+        found.image_px(angle), CAMERA.pixels_from_points(scene.p_CD + p_DL @ scene.R_CD.T), atol=5e-3
+    )
+
+
+def test_of_two_poses_alike_the_one_within_the_tilt_is_taken():
+    """18 deg off the axis, tilted 30 deg the other way, the mirrored pose is tilted by 66: noise must not choose it."""
+    rng = np.random.default_rng(35)
+    limit, number = np.deg2rad(40.0), np.array([0, 1, 2, 4, 7])
+    p_CL = 28.0 * np.array([1.0, 0.33, 0.0]) + LedRing().positions_D @ matrix_from_yaw_pitch_roll(-0.52, 0.0, 0.4).T
+    slots = np.full(8, -1)
+    slots[number] = np.arange(5)
+    free, bounded = [], []
+    for _ in range(100):
+        points = CAMERA.pixels_from_points(p_CL)[number] + 0.1 * rng.standard_normal((5, 2))
+        free.append(fit(points, slots).tilt_rad)
+        camera = CAMERA.focal_length_px, CAMERA.principal_point_px
+        bounded.append(fit_ring(points, slots, *camera, **TOLERANCES, max_tilt_rad=limit).tilt_rad)
+    assert (np.array(free) > limit).sum() >= 5  # the limit is needed
+    assert (np.array(bounded) <= limit).sum() >= 90

@@ -1,0 +1,125 @@
+"""A coded ring's numbering without a prior: an LED off its 45 degree place, or LEDs of unlike brightness.
+
+The ring is found by the LEDs at their places. For each of the eight numberings the sheet then says where the displaced
+LEDs must be and how bright each LED is:
+
+    places:      no displaced LED's own place may be filled, and its true one should be; most filled wins
+    brightness:  chi^2 = sum (ln f_i - ln b_k(i) - mean)^2 / sigma^2; least wins, by a margin               (1)
+
+with fluxes f, the sheet's relative brightnesses b and sigma for the LEDs' bins (2:1 is 0.2), pattern and clipping. The
+mean takes out range and exposure. A numbering is settled when one is left by both; chance hits of displaced LEDs are
+weighed by the clutter about (`chance`).
+
+Left out: flux is not corrected for the pattern's fall with the angle, which all LEDs share but for perspective.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dockair.calibration import LedRing
+from dockair.nav.identify.perspective import SLOTS, RingFit
+from dockair.rotations import Array
+
+_PLACE = 2.0 * np.pi / SLOTS
+_DISPLACED_RAD = np.deg2rad(1.0)  # less, and an LED counts as in its place
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CodeSettings:
+    """Settings of the code."""
+
+    brightness_sigma: float = 0.35  # of ln f
+    brightness_margin: float = 6.0  # of Eq. (1) between the best numbering and any other that is ruled out
+    reach: float = 2.0  # tolerances of the fit within which a displaced LED is looked for: its place is extrapolated
+    max_chance_hits: float = 3e-3  # displaced LEDs that clutter may feign
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Code:
+    """What the sheet says beside eight equal LEDs at 45 degrees."""
+
+    offset_rad: Array  #: (8,) of each LED from its place, 0 when it is there
+    log_brightness: Array | None  #: (8,)
+    settings: CodeSettings
+
+    @property
+    def displaced(self) -> NDArray[np.int64]:
+        """Numbers of the LEDs off their place."""
+        return np.flatnonzero(self.offset_rad)
+
+    @property
+    def says_something(self) -> bool:
+        """Whether there is a code at all."""
+        return len(self.displaced) > 0 or self.log_brightness is not None
+
+
+def code_of(ring: LedRing, settings: CodeSettings) -> Code:
+    """The code of a sheet of eight LEDs."""
+    offset = ring.angles_rad - _PLACE * np.arange(SLOTS)
+    bright = None if ring.brightness is None else np.log(np.asarray(ring.brightness, dtype=float))
+    if bright is not None and np.ptp(bright) == 0.0:
+        bright = None
+    return Code(
+        offset_rad=np.where(np.abs(offset) > _DISPLACED_RAD, offset, 0.0), log_brightness=bright, settings=settings
+    )
+
+
+def displaced_leds(points: Array, fit: RingFit, code: Code, slot_of_led_0: int) -> dict[int, int]:
+    """Candidate of each displaced LED that is seen, by number, if LED 0 is in this slot."""
+    found = {}
+    free = np.ones(len(points), bool)
+    free[fit.candidate[fit.candidate >= 0]] = False
+    for k in code.displaced:
+        place = fit.image_px(np.array([_PLACE * (slot_of_led_0 + k) + code.offset_rad[k]]))[0]
+        distance = np.where(free, np.hypot(*(points - place).T), np.inf)
+        nearest = int(np.argmin(distance))
+        if distance[nearest] <= code.settings.reach * fit.tolerance_px:
+            found[int(k)] = nearest
+    return found
+
+
+def possible_slots(
+    points: Array, brightness: Array | None, fit: RingFit, code: Code, density_px2: float
+) -> NDArray[np.int64]:
+    """Slots that LED 0 may have: all eight when the code says nothing, one when it settles the numbering.
+
+    Args:
+        points: (n, 2) candidates, undistorted [px].
+        brightness: (n,) their fluxes, any unit, or None.
+        fit: the ring.
+        code: of its sheet.
+        density_px2: of clutter about the ring.
+    """
+    slots = _by_place(points, fit, code, density_px2)
+    if brightness is None or code.log_brightness is None:
+        return slots
+    return np.intersect1d(slots, _by_brightness(np.asarray(brightness, dtype=float), fit, code.log_brightness, code))
+
+
+def _by_place(points: Array, fit: RingFit, code: Code, density: float) -> NDArray[np.int64]:
+    displaced = code.displaced
+    every = np.arange(SLOTS)
+    if not len(displaced):
+        return every
+    free = [j for j in every if (fit.candidate[(j + displaced) % SLOTS] < 0).all()]
+    hits = np.array([len(displaced_leds(points, fit, code, int(j))) for j in free])
+    chance = density * np.pi * (code.settings.reach * fit.tolerance_px) ** 2 * SLOTS * len(displaced)
+    if not len(hits) or hits.max() == 0 or chance > code.settings.max_chance_hits:
+        return np.array(free, np.int64)
+    return np.array(free, np.int64)[hits == hits.max()]
+
+
+def _by_brightness(flux: Array, fit: RingFit, log_brightness: Array, code: Code) -> NDArray[np.int64]:
+    every = np.arange(SLOTS)
+    filled = np.flatnonzero(fit.candidate >= 0)
+    flux = flux[fit.candidate[filled]]
+    usable = np.isfinite(flux) & (flux > 0.0)
+    if np.count_nonzero(usable) < 2:
+        return every
+    slots, measured = filled[usable], np.log(flux[usable])
+    residual = measured - log_brightness[(slots - every[:, None]) % SLOTS]  # a row for each slot of LED 0
+    residual -= residual.mean(axis=1, keepdims=True)
+    chi2 = (residual**2).sum(axis=1) / code.settings.brightness_sigma**2
+    return every[chi2 <= chi2.min() + code.settings.brightness_margin]

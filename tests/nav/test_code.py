@@ -1,0 +1,135 @@
+"""Rings whose numbering can be read from the image: an LED off its place, or one of another brightness."""
+
+import numpy as np
+import pytest
+
+from dockair.calibration import Camera, LedRing
+from dockair.errors import DockairError
+from dockair.nav.identify.ring import IdentificationStatus, identify
+from dockair.rotations import matrix_from_yaw_pitch_roll
+
+CAMERA = Camera()
+UNEVEN = LedRing(angles_deg=(0.0, 45.0, 90.0, 135.0, 180.0, 225.0, 270.0, 327.0))
+BRIGHT = LedRing(brightness=(4.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0))
+FOUND, AMBIGUOUS = IdentificationStatus.FOUND, IdentificationStatus.AMBIGUOUS
+
+
+class Coded:
+    """A ring of any roll at 3 to 20 m, all LEDs but some seen, clutter about; `numbers` says who is who."""
+
+    def __init__(self, rng, ring, hidden=(), clutter=6):
+        distance = rng.uniform(3.0, 20.0)
+        R_CD = matrix_from_yaw_pitch_roll(*np.deg2rad(rng.uniform(-18, 18, 2)), rng.uniform(-np.pi, np.pi))
+        p_CD = distance * np.array([1.0, rng.uniform(-0.25, 0.25), rng.uniform(-0.08, 0.08)])
+        self.led_px = CAMERA.pixels_from_points(p_CD + ring.positions_D @ R_CD.T)
+        seen = np.setdiff1d(np.arange(8), hidden)
+        noisy = self.led_px[seen] + 0.1 * rng.standard_normal((len(seen), 2))
+        self.points = np.vstack([noisy, rng.uniform(0, [2047, 1087], (clutter, 2))])
+        self.numbers = np.concatenate([seen, np.full(clutter, -1)])
+        relative = np.ones(8) if ring.brightness is None else np.array(ring.brightness)
+        bins = rng.uniform(0.75, 1.5, len(seen))  # 2:1
+        self.flux = 3e4 / distance**2 * np.concatenate([relative[seen] * bins, rng.uniform(0.1, 5.0, clutter)])
+
+
+def names_are_true(scene, result):
+    return result.status is FOUND and (scene.numbers[result.members] == result.led_numbers).all()
+
+
+@pytest.mark.parametrize("hidden", [(), (2,), (0, 4), (1, 6)])
+def test_a_displaced_led_numbers_the_ring_absolutely_and_is_a_member(hidden):
+    """With three out of place a far ring may be AMBIGUOUS: the displaced LED is clutter to the even ones."""
+    rng = np.random.default_rng(61)
+    settled = 0
+    for _ in range(25):
+        scene = Coded(rng, UNEVEN, hidden)
+        result = identify(scene.points, ring=UNEVEN)
+        if result.status is AMBIGUOUS and len(hidden) > 1:
+            continue
+        assert names_are_true(scene, result) and result.absolute
+        assert 7 in result.led_numbers
+        np.testing.assert_allclose(result.led_pixels_px, scene.led_px, atol=1.5)
+        settled += 1
+    assert settled >= 20
+
+
+@pytest.mark.parametrize("hidden", [(), (3,), (5, 6)])
+def test_a_brighter_led_numbers_the_ring_absolutely(hidden):
+    """Bins are 2:1, the coded LED is 4:1: of 75 cases none is misnamed, and nearly all are settled."""
+    rng = np.random.default_rng(62)
+    settled = 0
+    for _ in range(25):
+        scene = Coded(rng, BRIGHT, hidden)
+        result = identify(scene.points, ring=BRIGHT, brightness=scene.flux)
+        assert result.status is FOUND
+        assert not result.absolute or names_are_true(scene, result)
+        settled += result.absolute
+    assert settled >= 22
+
+
+def test_a_hidden_code_leaves_the_numbers_relative():
+    """The displaced LED and one more are hidden: two places may be the displaced one's."""
+    rng = np.random.default_rng(63)
+    for _ in range(15):
+        scene = Coded(rng, UNEVEN, (7, 2))
+        result = identify(scene.points, ring=UNEVEN)
+        assert result.status is FOUND and not result.absolute
+        assert len(np.unique((scene.numbers[result.members] - result.led_numbers) % 8)) == 1
+
+
+def test_the_one_empty_place_is_the_displaced_leds_even_when_it_is_hidden():
+    scene = Coded(np.random.default_rng(64), UNEVEN, (7,))
+    result = identify(scene.points, ring=UNEVEN)
+    assert names_are_true(scene, result) and result.absolute
+
+
+def test_a_code_that_contradicts_the_roll_prior_is_ambiguous():
+    rng = np.random.default_rng(65)
+    for _ in range(15):
+        scene = Coded(rng, UNEVEN)
+        roll = identify(scene.points, ring=UNEVEN).roll_rad
+        assert identify(scene.points, ring=UNEVEN, expected_roll_rad=roll + 0.1).status is FOUND
+        contradicted = identify(scene.points, ring=UNEVEN, expected_roll_rad=roll + np.pi / 2)
+        assert contradicted.status is AMBIGUOUS and (contradicted.led_numbers == -1).all()
+
+
+def test_a_prediction_of_an_uneven_ring_is_no_less_good_than_of_an_even_one():
+    rng = np.random.default_rng(66)
+    for _ in range(25):
+        scene = Coded(rng, UNEVEN)
+        result = identify(scene.points, ring=UNEVEN, expected_led_px=scene.led_px, expected_sigma_px=1.0)
+        assert names_are_true(scene, result) and len(result.members) == 8
+
+
+def test_an_even_ring_says_whether_its_numbers_are_absolute():
+    scene = Coded(np.random.default_rng(67), LedRing())
+    assert not identify(scene.points).absolute
+    assert identify(scene.points, expected_led_px=scene.led_px, expected_sigma_px=2.0).absolute
+
+
+def test_a_ring_of_another_number_of_leds_is_refused():
+    with pytest.raises(DockairError, match="ring"):
+        identify(np.zeros((5, 2)), ring=LedRing(count=6))
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("angles_deg", (0.0, 45.0)),
+        ("angles_deg", (0.0, 45.0, 90.0, 135.0, 180.0, 225.0, 270.0, 340.0)),
+        ("brightness", (1.0,) * 7),
+        ("brightness", (1.0,) * 7 + (0.0,)),
+    ],
+)
+def test_a_sheet_whose_code_cannot_be_is_refused(field, value):
+    with pytest.raises(DockairError, match=f"ring.{field}"):
+        LedRing(**{field: value})
+
+
+def test_a_sheet_may_leave_the_code_out_or_have_it(tmp_path):
+    plain, coded = tmp_path / "plain.toml", tmp_path / "coded.toml"
+    plain.write_text("diameter_m = 0.5\ncount = 8\n")
+    coded.write_text(plain.read_text() + "angles_deg = [0, 45, 90, 135, 180, 225, 270, 327]\n")
+    assert LedRing.from_toml(plain) == LedRing()
+    ring = LedRing.from_toml(coded)
+    np.testing.assert_allclose(ring.positions_D, UNEVEN.positions_D)
+    np.testing.assert_allclose(np.delete(ring.positions_D, 7, axis=0), np.delete(LedRing().positions_D, 7, axis=0))
