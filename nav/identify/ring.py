@@ -3,17 +3,19 @@
     candidates ► prior gate ► triples (three-point circles | Hough peaks) ► octagon look-up ► exact fit ► decision
                                                                                    ellipse ► numbering ◄ roll
 
-`hypotheses` proposes rings, fits them and says how likely each is an accident; it must be less likely than the settings
-allow. Two rings that both pass and are not the same are `AMBIGUOUS`, so is one whose roll prior falls between two
-numberings, and one that may be an accident; no ring of at least four LEDs is `NOT_FOUND`.
+`hypotheses` proposes rings and fits them, `chance` says how likely each is an accident and how many impostors it may
+hold; both must be less than the settings allow. Two rings that both pass and are not the same are `AMBIGUOUS`, so is
+one whose roll prior falls between two numberings, one whose code contradicts it, one that may be an accident, and one
+so crowded that a blob may pass for a hidden LED (the most doubtful member is left out if that is enough). No ring of at
+least four LEDs is `NOT_FOUND`; four LEDs without a prior are seldom more than an accident.
 
-The ring looks the same every 45 degrees. With a prior (the roll of LED 0, or where each LED is expected) the LEDs get
-their numbers; without one, LED 0 is the LED nearest to the left (-u) of the centre, and numbers are right up to that
-symmetry. Roll is the angle of LED 0 in the image seen from the centre, from left (0) toward up (pi/2), averaged over
-the LEDs less their 45 degrees each: the drogue's roll for a ring without tilt.
+The ring looks the same every 45 degrees. With a prior (the roll of LED 0, or where each LED is expected) or a coded
+ring (`code`) the LEDs get their numbers; without, LED 0 is the LED nearest to the left (-u) of the centre, and numbers
+are right up to that symmetry (`absolute` says which). Roll is the angle of LED 0 in the image seen from the centre,
+from left (0) toward up (pi/2), averaged over the LEDs less their 45 degrees each: without tilt the drogue's roll.
 
 Cost is bounded: at most `max_candidates` (nearest to the prior, else the brightest, else the first), all their triples,
-`max_fits` exact fits.
+beyond `few_candidates` in three patterns of slots only, and `max_fits` exact fits.
 """
 
 import numpy as np

@@ -177,9 +177,11 @@ def _draw(tables: dict[str, dict[tuple[int, int], dict[str, float]]], path: Path
         name, cells = row
         for what, axes in zip(shown, axes_row, strict=True):
             values = np.array([[cells[v, c][f"{what}_percent"] for c in CLUTTER] for v in VISIBLE])
-            axes.imshow(values, vmin=0.0, vmax=100.0 if what != "wrong" else 1.0, cmap="Blues", aspect="auto")
+            full = 100.0 if what != "wrong" else 1.0
+            axes.imshow(values, vmin=0.0, vmax=full, cmap="Blues", aspect="auto")
             for (i, j), value in np.ndenumerate(values):
-                axes.text(j, i, f"{value:.3g}", ha="center", va="center", fontsize=8)
+                colour = "white" if value > 0.6 * full else "black"
+                axes.text(j, i, f"{value:.3g}", ha="center", va="center", fontsize=8, color=colour)
             axes.set(title=f"{name}: {what} [%]", xlabel="clutter", ylabel="LEDs seen")
             axes.set_xticks(range(len(CLUTTER)), [str(c) for c in CLUTTER])
             axes.set_yticks(range(len(VISIBLE)), [str(v) for v in VISIBLE])

@@ -86,7 +86,7 @@ def test_points_between_the_slots_lie_on_the_image_of_the_same_circle(ring_scene
 def test_of_two_poses_alike_the_one_within_the_tilt_is_taken():
     """18 deg off the axis, tilted 30 deg the other way, the mirrored pose is tilted by 66: noise must not choose it."""
     rng = np.random.default_rng(35)
-    limit, number = np.deg2rad(40.0), np.array([0, 1, 2, 4, 7])
+    limit, number = np.deg2rad(40.0), np.array([0, 1, 2, 3, 4])
     p_CL = 28.0 * np.array([1.0, 0.33, 0.0]) + LedRing().positions_D @ matrix_from_yaw_pitch_roll(-0.52, 0.0, 0.4).T
     slots = np.full(8, -1)
     slots[number] = np.arange(5)
@@ -97,4 +97,4 @@ def test_of_two_poses_alike_the_one_within_the_tilt_is_taken():
         camera = CAMERA.focal_length_px, CAMERA.principal_point_px
         bounded.append(fit_ring(points, slots, *camera, **TOLERANCES, max_tilt_rad=limit).tilt_rad)
     assert (np.array(free) > limit).sum() >= 5  # the limit is needed
-    assert (np.array(bounded) <= limit).sum() >= 90
+    assert (np.array(bounded) <= limit).all()

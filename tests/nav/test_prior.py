@@ -28,6 +28,16 @@ def test_radius_and_roll_of_a_tilted_ring_are_those_of_its_parallel_projection()
     assert roll == pytest.approx(0.3)
 
 
+def test_leds_off_their_places_shift_neither_centre_nor_roll_when_their_angles_are_known():
+    angle = np.arange(8) * np.pi / 4 + np.array([0, 0, 0, 0, 0, 0, 0, 0.2])
+    led_px = np.array([40.0, 30.0]) - 50.0 * np.column_stack([0.8 * np.cos(angle + 0.3), np.sin(angle + 0.3)])
+    centre, radius, roll = ring_from_leds(led_px, angle)
+    np.testing.assert_allclose(centre, [40, 30], atol=1e-12)
+    assert (radius, roll) == (pytest.approx(50.0), pytest.approx(0.3))
+    assert prior(led_px=led_px, led_angle_rad=angle).roll_rad == pytest.approx(0.3)
+    assert abs(prior(led_px=led_px).roll_rad - 0.3) > 0.01
+
+
 def test_without_expectation_every_gate_is_open():
     nothing = prior()
     assert not nothing.has_centre and nothing.prediction_px is None

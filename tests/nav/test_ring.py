@@ -132,6 +132,15 @@ def test_a_second_ring_is_ambiguous_without_and_resolved_with_a_radius(method):
         np.testing.assert_array_equal(np.sort(result.members), np.arange(8))
 
 
+def test_of_two_rings_within_the_gate_the_one_nearly_as_large_as_expected_is_taken():
+    points = np.vstack([leds((600, 500), 100.0), leds((1300, 500), 121.0)])
+    assert identify(points, expected_radius_px=110.0).status is AMBIGUOUS
+    for expected, first in ((99.0, 0), (130.0, 8)):
+        result = identify(points, expected_radius_px=expected)
+        assert result.status is FOUND
+        np.testing.assert_array_equal(np.sort(result.members), np.arange(first, first + 8))
+
+
 def test_a_ring_elsewhere_than_expected_is_not_found():
     assert identify(leds(), expected_centre_px=np.array([300.0, 300.0]), expected_sigma_px=10.0).status is NOT_FOUND
     assert identify(leds(), expected_radius_px=200.0).status is not FOUND
