@@ -11,7 +11,7 @@ Sun are bright and do not move it. c_min keeps single hot pixels out when the fr
 below the LEDs' expected level however noisy the sky ("a little lower than the LEDs' grey level", [Yoon 2018, II.1]).
 
 Not modelled: a background that varies over the frame by more than c_min. Inside the Sun's halo everything is
-foreground, one wide blob that the area filter drops, and an LED in it is lost for that frame.
+foreground, one wide blob that the area filter drops, and an LED in it is lost for that frame. `spots` is for those.
 """
 
 from dataclasses import dataclass

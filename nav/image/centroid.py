@@ -44,6 +44,7 @@ _WINDOW_RADII = 1.9  # R in equivalent radii of the blob: least error from 2 m t
 _CLIPPED_WINDOW_RADII = 2.8
 _LEAST_WINDOW_PX = 1.9
 _CORRELATION = 2.0  # neighbouring pixels of structure go together: their variance counts as often
+_RINGS_SHARE = 0.01  # of the peak: rms of the lens's rings two and three pixels outside a blob
 _STEPS = 12  # Newton's; four are the rule
 _CONVERGED_PX = 1e-5
 
@@ -205,6 +206,7 @@ def _start(image, patch, top, left, threshold):  # type: ignore[no-untyped-def]
                 v += w * i
                 n += 1
                 peak = max(peak, level)
+    total = max(total, 1e-9)
     return u / total, v / total, n, peak
 
 
@@ -263,8 +265,9 @@ def _measure(image, row, start, stop, offset, threshold, model, given_background
         own = _variance(background, background, model, 0.0)
         su, sv, area, peak = _start(image, patch, top, left, threshold[c])
         clipped = peak >= saturation
-        # around a clipped blob it is the lens's rings that vary, about the same on all sides
-        texture = 0.0 if clipped else _CORRELATION * max(spread - own, 0.0)
+        # the lens's own rings vary too, but alike on all sides: they are no texture
+        rings = (_RINGS_SHARE * (peak - background)) ** 2
+        texture = 0.0 if clipped else _CORRELATION * max(spread - own - rings, 0.0)
         u, v, sigma, flux = _weighted(image, patch, top, left, model, background, texture, (own + texture) / n)
         if windowed:
             radii = _CLIPPED_WINDOW_RADII if clipped else _WINDOW_RADII

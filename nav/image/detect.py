@@ -58,11 +58,15 @@ class DetectSettings:
     response_spread: float = 0.01  # of the pixels, as their maker states it
     saturation_dn: int | None = None  # None for the data type's largest level
     sigma_floor_px: float = 0.001  # phase error of a sampled spot, from the tests' frames
-    clipped_sigma_floor_px: float = 0.19  # of a clipped one of one pixel, falls with the root of the area
+    clipped_sigma_floor_px: float = 0.14  # of a clipped one of one pixel, falls with the root of the area
 
     def __post_init__(self) -> None:
-        if self.method not in ("local", "frame"):
-            raise DockairError("detect.method", expected="a method", got=self.method, exists=["local", "frame"])
+        for name, value, exists in (
+            ("method", self.method, ["local", "frame"]),
+            ("centroid", self.centroid, ["windowed", "weighted"]),
+        ):
+            if value not in exists:
+                raise DockairError(f"detect.{name}", expected="one that exists", got=value, exists=exists)
         if not 1 <= self.min_area_px <= self.max_area_px:
             raise DockairError(
                 "detect.min_area_px", expected=f"1 to max_area_px = {self.max_area_px}", got=self.min_area_px
@@ -108,7 +112,8 @@ def detect(
     check_image(image)
     if window is not None and window.shape != image.shape:
         raise DockairError("image", expected=f"the window's shape {window.shape}", got=image.shape)
-    image = np.ascontiguousarray(image)
+    # a read-only array is another type to the compiler: it is copied rather than compiled for
+    image = np.ascontiguousarray(image) if image.flags.writeable else np.array(image, order="C")
     if gain_dn_per_electron is None:
         gain_dn_per_electron = settings.gain_dn_per_electron
     if settings.method == "local" and settings.threshold_dn is None:

@@ -24,8 +24,8 @@ def ring_steps(reach: int) -> NDArray[np.int32]:
     return steps[np.abs(np.hypot(*steps.T) - reach) <= 0.5].astype(np.int32)
 
 
-_RING_SIZES = tuple(len(ring_steps(reach)) for reach in REACHES_PX)
 _RINGS = np.concatenate([ring_steps(reach) for reach in REACHES_PX])
+_RING_STARTS = tuple(sum(len(ring_steps(reach)) for reach in REACHES_PX[:k]) for k in range(len(REACHES_PX) + 1))
 
 
 @njit(cache=True)
@@ -224,7 +224,7 @@ def _cut_out(image, peak, centre, reach, ring, contrast, model, patch, stack):  
         return -1, 0.0
     lowest = b + max(factor * np.sqrt(gain * b + noise**2), share * (P - b))
     for rise in RISES:
-        level = np.int64(lowest + rise * (P - lowest))
+        level = min(np.int64(lowest + rise * (P - lowest)), P - 1)  # rounding must not lift it to the peak
         if _flood(image, peak, centre, level, reach, patch, stack):
             return level, b
     return -1, 0.0
@@ -271,7 +271,7 @@ def find(image, zero, contrast, wide_contrast, model):  # type: ignore[no-untype
         image: contiguous.
         zero: of the image's type.
         contrast: c of Eq. (1), whole.
-        wide_contrast: c of wide spots, whole.
+        wide_contrast: the same for spots of the wide reaches.
         model: k, f, q, g, s_n.
     """
     rows, columns = image.shape
@@ -280,10 +280,8 @@ def find(image, zero, contrast, wide_contrast, model):  # type: ignore[no-untype
     largest = 2 * max(REACHES_PX) + 1
     patch, stack = np.empty((largest, largest), np.uint8), np.empty((largest**2, 2), np.int64)
     count, n = 0, 0
-    used = 0
     for scale in range(len(REACHES_PX)):
-        reach, ring = REACHES_PX[scale], _RINGS[used : used + _RING_SIZES[scale]]
-        used += _RING_SIZES[scale]
+        reach, ring = REACHES_PX[scale], _RINGS[_RING_STARTS[scale] : _RING_STARTS[scale + 1]]
         c = wide_contrast if reach >= WIDE_PX else contrast
         last = (-1, -1)
         for hit in _hits(image, zero, c, reach, ROW_STEPS[scale]):

@@ -19,7 +19,8 @@ side of the spot, but not one on either side, for that is a rib; and the spot's 
 Reaches are 4 first, for the best background; 2, for far LEDs between bright surfaces; 8 and 14 for near or clipped
 LEDs, which are bright: their c is larger. A peak inside an earlier spot is passed over. Most of a frame never comes so
 far: before, a pixel has to pass 7/8 x - n >= c, n the second brightest of the four pixels at distance r along its row
-and column, which vector instructions test 64 at a time. Spots of more than two rows are met on every second row.
+and column, which vector instructions test 64 at a time. Spots of more than two rows are met on every second row, wide
+ones on every third or fourth.
 
 Not modelled: spots whose ring leaves the frame; spots of more than 11 pixels radius; a background that falls by more
 than its noise across the spot. Compact features of cloud, water and metal are spots too: identification must tell.

@@ -17,23 +17,29 @@ def match(blobs, spots):
     return max(np.hypot(*(blobs.centroids_px - p).T).min() for p in true)
 
 
+METHODS = pytest.mark.parametrize("settings", [DetectSettings(), DetectSettings(method="frame")])
+
+
+@METHODS
 @pytest.mark.parametrize(("radius", "electrons"), [(24, 1.2e4), (60, 3e4), (200, 2e5), (330, 1e6)])
-def test_a_ring_is_eight_blobs_at_every_range(render, radius, electrons):
+def test_a_ring_is_eight_blobs_at_every_range(render, radius, electrons, settings):
     spots = ring_spots((400.3, 360.7), radius, electrons)
-    blobs = detect(render((720, 800), spots, np.random.default_rng(radius)))
+    blobs = detect(render((720, 800), spots, np.random.default_rng(radius)), settings)
     assert len(blobs) == 8
     assert match(blobs, spots) < 0.15
 
 
-def test_a_far_led_of_four_pixels_survives():
+@METHODS
+def test_a_far_led_of_four_pixels_survives(settings):
     image = np.full((60, 60), 2, np.uint8)
     image[30:32, 30:32] = 70
-    blobs = detect(image)
+    blobs = detect(image, settings)
     np.testing.assert_allclose(blobs.centroids_px, [[30.5, 30.5]])
     assert blobs.area_px.tolist() == [4]
 
 
-def test_hot_pixels_streaks_and_the_sun_are_no_leds(render):
+@METHODS
+def test_hot_pixels_streaks_and_the_sun_are_no_leds(render, settings):
     rng = np.random.default_rng(9)
     spots = ring_spots((150, 150), 60, 3e4)
     image = render((400, 400), spots, rng)
@@ -41,14 +47,17 @@ def test_hot_pixels_streaks_and_the_sun_are_no_leds(render):
     image[350, 100:300] = 120  # streak
     rows, columns = np.indices(image.shape)
     image[(rows - 320) ** 2 + (columns - 320) ** 2 < 13.5**2] = 255  # 27 px disc
-    blobs = detect(image)
+    blobs = detect(image, settings)
     assert len(blobs) == 8
     assert match(blobs, spots) < 0.05
 
 
-def test_a_frame_of_noise_has_no_blobs(render):
+@METHODS
+def test_a_frame_of_noise_has_no_blobs(render, settings):
     for seed, background in enumerate((0.0, 100.0, 2000.0)):
-        assert len(detect(render((1088, 2048), [], np.random.default_rng(seed), background_e=background))) == 0
+        assert (
+            len(detect(render((1088, 2048), [], np.random.default_rng(seed), background_e=background), settings)) == 0
+        )
 
 
 def test_a_window_gives_the_full_frame_s_centroids(render):
@@ -66,6 +75,8 @@ def test_ten_bit_frames_in_sixteen_bit_words_give_the_same_centres(render):
     image = render((200, 200), ring_spots((100, 100), 50, 3e4), np.random.default_rng(11))
     wide = image.astype(np.uint16) * 4
     settings = DetectSettings(
+        spot_contrast_dn=16.0,
+        wide_spot_contrast_dn=192.0,
         min_contrast_dn=32.0,
         max_contrast_dn=160.0,
         gain_dn_per_electron=4 * 255 / 13500,
@@ -130,3 +141,25 @@ def test_wrong_images_and_settings_are_refused():
         detect(np.zeros((4, 4), np.uint8), None, Window(0, 5, 0, 4))
     with pytest.raises(DockairError, match="min_area_px"):
         DetectSettings(min_area_px=500)
+    with pytest.raises(DockairError, match="method"):
+        DetectSettings(method="global")
+    with pytest.raises(DockairError, match="centroid"):
+        DetectSettings(centroid="best")
+
+
+def test_leds_before_a_bright_uneven_background_are_found_by_their_surroundings_alone(render):
+    """A veil from 10 to 110 DN: one threshold is above the LEDs on one side or below the veil on the other."""
+    spots = ring_spots((300, 150), 100, 8e3)
+    veil_e = np.linspace(500.0, 6000.0, 600)[None] * np.ones((300, 1))
+    image = render((300, 600), spots, np.random.default_rng(16), background_e=veil_e)
+    blobs = detect(image)
+    assert len(blobs) == 8
+    assert match(blobs, spots) < 0.15
+    assert match(detect(image, DetectSettings(method="frame")), spots) > 5.0
+
+
+def test_a_spot_s_threshold_is_reported_and_lies_between_background_and_peak(render):
+    blobs = detect(render((200, 200), ring_spots((100, 100), 60, 3e4), np.random.default_rng(17)))
+    assert (blobs.thresholds_dn > 5).all() and (blobs.thresholds_dn < blobs.peak).all()
+    assert blobs.threshold_dn == blobs.thresholds_dn.min()
+    assert detect(np.zeros((9, 9), np.uint8)).threshold_dn == -1

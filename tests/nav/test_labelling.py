@@ -38,15 +38,30 @@ def all_labellings(mask: np.ndarray, connectivity: int) -> list[np.ndarray]:
     return [tracing, two_pass, from_runs(runs, mask.shape)]
 
 
-@given(mask=MASKS, connectivity=CONNECTIVITY)
-@settings(max_examples=600, deadline=None)
-def test_every_labelling_is_the_partition_of_scipy_and_opencv(mask, connectivity):
+def check_against_scipy_and_opencv(mask: np.ndarray, connectivity: int) -> None:
     reference, _ = ndimage.label(mask, np.ones((3, 3)) if connectivity == 8 else None)
     _, opencv = cv2.connectedComponents(mask.astype(np.uint8), connectivity=connectivity)
     expected = in_raster_order(reference)
     np.testing.assert_array_equal(in_raster_order(opencv), expected)
     for labels in all_labellings(mask, connectivity):
         np.testing.assert_array_equal(labels, expected)
+
+
+@given(mask=MASKS, connectivity=CONNECTIVITY)
+@settings(max_examples=1000, deadline=None)
+def test_every_labelling_is_the_partition_of_scipy_and_opencv(mask, connectivity):
+    check_against_scipy_and_opencv(mask, connectivity)
+
+
+@pytest.mark.parametrize("connectivity", [4, 8])
+def test_larger_random_images_of_every_density_and_grain_are_labelled_alike(connectivity):
+    """Near the density at which they begin to percolate (0.59 and 0.41) components wind most."""
+    rng = np.random.default_rng(connectivity)
+    for _ in range(500):
+        grain = rng.integers(1, 4, 2)
+        shape = rng.integers(1, 70, 2)
+        coarse = rng.random(-(-shape // grain)) < rng.choice([0.1, 0.41, 0.5, 0.59, 0.9])
+        check_against_scipy_and_opencv(np.kron(coarse, np.ones(grain, bool))[: shape[0], : shape[1]] > 0, connectivity)
 
 
 def _spiral(size: int) -> np.ndarray:
