@@ -24,6 +24,8 @@ from dockair.scenarios.reproduce import (
     image_morphology,
     image_panels,
     image_three_point,
+    pose_surface,
+    pose_table3,
     sensor_band,
 )
 
@@ -45,6 +47,8 @@ _MODULES = (
 _REPRODUCTIONS: dict[str, tuple[str, Reproduction]] = {
     **{module.ID: (module.TITLE, module.reproduce) for module in _MODULES},
     **image_hough.REPRODUCTIONS,
+    **pose_surface.REPRODUCTIONS,
+    **pose_table3.REPRODUCTIONS,
 }
 
 
