@@ -92,7 +92,7 @@ def _draw_trials(found: dict[float, Array], path: Path) -> None:
     for (above, below), (range_m, each) in zip(panels.T, found.items(), strict=True):
         for k, column in enumerate(COLUMNS):
             panel, colour = (above, below)[k // 3], ("tab:blue", "tab:orange", "tab:green")[k % 3]
-            panel.plot(each[:, k], lw=0.5, color=colour, label=column.split("_")[0])
+            panel.plot(each[:, k], lw=0.5, color=colour, label=column.split("_")[0], zorder=3 - k % 3)
         above.set(title=f"{range_m:g} m", ylabel="camera in drogue axes [m]" if range_m == min(found) else "")
         below.set(xlabel="trial", ylabel="angle [deg]" if range_m == min(found) else "")
     for panel in panels[:, 0]:

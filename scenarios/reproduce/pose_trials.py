@@ -51,7 +51,7 @@ READINGS = (RADIUS, DIAMETER, RADIUS_SENSOR, DIAMETER_SENSOR)
 def errors(reading: Reading, size_m: float, range_m: float, trials: int, rng: np.random.Generator) -> tuple[Array, int]:
     """Return (trials, 6) errors in the order of COLUMNS [m, deg], and how many descents were still on the way.
 
-    These count as they stand: they creep on a floor so flat that its lowest point no longer matters.
+    These count as they stand: they started on the ridge between the two minima of a flat ring and creep along it.
 
     Args:
         reading: of size and noise.
