@@ -228,8 +228,8 @@ def branch_and_bound(
             if taken > count or taken + open_ < count:
                 continue
             nodes += 1
-            if taken == count or taken + open_ == count:
-                members = np.flatnonzero(state == 1) if taken == count else np.flatnonzero(state >= 0)
+            if taken == count:
+                members = np.flatnonzero(state == 1)
                 N, L = start.copy(), np.zeros_like(start)
                 for member in members:
                     N += pieces[member]

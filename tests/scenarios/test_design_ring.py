@@ -96,6 +96,16 @@ def test_a_node_is_the_worst_of_several_directions_of_the_tilt():
         assert np.arccos(R[0, 0]) == pytest.approx(0.3)
 
 
+def test_the_mirror_image_of_a_node_is_the_cheapest_of_its_directions(monkeypatch):
+    corridor = Corridor(ranges_m=np.array([10.0]), tilts_rad=np.array([0.3]))
+    three, turns = RingDesign(rim=3), corridor.attitudes(0.3)
+    found, each = map_ring(three, corridor).mirror_chi2[0, 0], []
+    for turn in turns:
+        monkeypatch.setattr(Corridor, "attitudes", lambda self, tilt, turn=turn: [turn])
+        each.append(map_ring(three, corridor).mirror_chi2[0, 0])
+    assert found == min(each) < 0.95 * max(each) and np.argmin(each) < 4
+
+
 def test_leds_off_the_plane_end_the_frontal_weakness(flat, deep):
     """At 10 m, 0.1 px: attitude 3.15 deg with eight flat LEDs, 0.16 deg with one 0.2 m ahead, 0.09 deg with four."""
     one = bound_at(replace(DEEP, inner=1), CORRIDOR, 10.0)
