@@ -25,9 +25,10 @@ from dockair.sim.aircraft.flight_control import FlightControlParameters
 from dockair.sim.aircraft.receiver import Receiver
 from dockair.sim.aircraft.trim import level_trim
 from dockair.sim.as_built import AsBuilt, AsBuiltParameters, draw_as_built
-from dockair.sim.camera.camera import CameraNoise, CameraSheets, NearInfraredCamera
-from dockair.sim.camera.readout import shortest_period_s
-from dockair.sim.camera.sheets import LedParameters
+from dockair.sim.basket import place_leds
+from dockair.sim.camera.camera import CameraNoise, NearInfraredCamera
+from dockair.sim.camera.readout import row_time_s, shortest_period_s
+from dockair.sim.camera.sheets import CameraSheets, LedParameters
 from dockair.sim.camera.sky import Weather
 from dockair.sim.faults import Faults
 from dockair.sim.hose.chain import DrogueParameters, HoseParameters
@@ -113,6 +114,7 @@ def build(scenario: Scenario, seed: int) -> Parts:
     world = World(parameters, receiver, _gusts(scenario, seed, clock), start, clock)
     sheets = _navigation_sheets(scenario, parameters)
     _check_ring(sheets.ring, parameters.drogue)
+    place_leds(world.model, world.data, sheets.ring)
     as_built = _as_built(scenario, seed, sheets)
     faults = Faults([table.fault for table in scenario.faults], sheets.ring.count)
     if scenario.navigation.is_truth:
@@ -247,8 +249,7 @@ def _imu(scenario: Scenario, seed: int, mounting: Mounting) -> Imu:
 
 def _as_built(scenario: Scenario, seed: int, sheets: NavigationSheets) -> AsBuilt:
     """Draw the hardware as it was built."""
-    leds = _sheet(scenario, "leds", LedParameters)
-    parameters = _sheet(scenario, "as_built", AsBuiltParameters)
+    leds, parameters = _sheet(scenario, "leds", LedParameters), _sheet(scenario, "as_built", AsBuiltParameters)
     rng = random_stream(seed, "as_built")
     return draw_as_built(sheets.camera, sheets.ring, sheets.mounting, parameters, leds, rng)
 
@@ -277,12 +278,13 @@ def _camera(scenario: Scenario, seed: int, as_built: AsBuilt, faults: Faults, wo
 
 def _check_camera_rate(camera_hz: int, camera: Camera, sheets: CameraSheets) -> None:
     """A full frame must be read before the next: the navigation may ask for one at any time."""
-    longest_s = sheets.exposure.longest_s
-    highest_hz = 1.0 / shortest_period_s(camera.height_px, sheets.sensor, longest_s)
+    sensor, longest_s = sheets.sensor, sheets.exposure.longest_s
+    highest_hz = 1.0 / shortest_period_s(camera.height_px, sensor, longest_s)
     if camera_hz > highest_hz:
-        expected = (
-            f"a rate up to {highest_hz:.0f} Hz, at which the sensor's {sheets.sensor.outputs} outputs read full frames"
-        )
+        at_which = f"at which the sensor's {sensor.outputs} outputs read full frames"
+        if longest_s > camera.height_px * row_time_s(sensor):
+            at_which = f"at which it can still expose for exposure.longest_s = {longest_s} s"
+        expected = f"a rate up to {np.floor(10.0 * highest_hz) / 10.0:.1f} Hz, {at_which}"
         raise DockairError("rates.camera_hz", expected=expected, got=camera_hz)
 
 

@@ -18,10 +18,10 @@ Without `leds` all LEDs are meant; without `stop_s` a fault lasts to the end.
 """
 
 from dataclasses import MISSING, fields
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from dockair.errors import DockairError
 from dockair.scenarios.refusal import Expected
@@ -90,6 +90,7 @@ def _tuple_from_list(value: Any) -> Any:
 
 
 _Led = Annotated[int, Field(ge=0, le=7)]
+_Step = Annotated[float, Field(ge=-5000.0, le=5000.0)]  # deg/s
 
 
 class FaultTable(BaseModel):
@@ -111,22 +112,27 @@ class FaultTable(BaseModel):
     cover: float | None = Field(default=None, ge=0.0, le=1.0)  #: part of the window under smudges
     exposure_us: float | None = Field(default=None, gt=0.0, le=20_000.0)
     rate_deg_s: Annotated[
-        tuple[float, float, float] | None, BeforeValidator(_tuple_from_list), Expected("three numbers")
+        tuple[_Step, _Step, _Step] | None,
+        BeforeValidator(_tuple_from_list),
+        Expected("three numbers, each from -5000 to 5000"),
     ] = None
     limit_deg_s: float | None = Field(default=None, gt=0.0, le=5000.0)
 
-    @model_validator(mode="after")
-    def _keys_fit_the_kind(self) -> Self:
+    def check(self, where: str) -> None:
+        """Refuse a table without a key that its kind must have, or with one that it cannot have.
+
+        Args:
+            where: the table's place, to be named.
+        """
         wanted = {key: _has_default(self.kind, name) for key, name in _own_fields(self.kind).items()}
         for key in sorted(self.model_fields_set - {*wanted, *_COMMON, "kind"}):
             exists = sorted({*wanted, *_COMMON, "kind"})
-            raise DockairError("faults", expected=f"a key of the kind {self.kind}", got=key, exists=exists)
+            raise DockairError(where, expected=f"a key of the kind {self.kind}", got=key, exists=exists)
         for key, optional in wanted.items():
             if getattr(self, key) is None and not optional:
-                raise DockairError("faults", expected=f"the key {key} of the kind {self.kind}", got=None)
+                raise DockairError(where, expected=f"the key {key} of the kind {self.kind}", got=None)
         if self.stop_s is not None and self.stop_s <= self.start_s:
-            raise DockairError("faults", expected=f"a stop_s after start_s = {self.start_s}", got=self.stop_s)
-        return self
+            raise DockairError(f"{where}.stop_s", expected=f"a time after start_s = {self.start_s}", got=self.stop_s)
 
     @property
     def fault(self) -> Fault:

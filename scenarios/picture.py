@@ -184,4 +184,5 @@ def _fresh(flight: Any) -> NDArray[np.int64]:
     stamps = _values(flight, "nav_frame_time_stamp_s")
     if not np.isfinite(stamps).any():
         return np.arange(len(stamps), dtype=np.int64)
-    return np.asarray(np.flatnonzero(np.diff(stamps, prepend=np.nan) > 0.0), dtype=np.int64)
+    before = np.nan_to_num(np.concatenate([[np.nan], stamps[:-1]]), nan=-np.inf)
+    return np.asarray(np.flatnonzero(stamps > before), dtype=np.int64)

@@ -100,7 +100,7 @@ class Turbulence(_Table):
 class Sun(_Table):
     """Where the Sun stands, seen from the receiver in level flight."""
 
-    present: bool = True
+    present: bool = True  #: false: daylight from above, but no disc, glints or stray light; `weather.night` is dark
     azimuth_deg: float = Field(default=180.0, ge=-360.0, le=360.0)  #: 0 straight ahead, positive to the left
     elevation_deg: float = Field(default=35.0, ge=-10.0, le=90.0)
 
@@ -247,6 +247,12 @@ class Scenario(_Table):
     ] = ()  #: what breaks, and when
     parameters: dict[str, dict[str, Any]] = {}  #: sheet -> key -> value instead of the sheet's
     accept: Accept = Accept()
+
+    @model_validator(mode="after")
+    def _faults_fit(self) -> Self:
+        for index, table in enumerate(self.faults):
+            table.check(f"faults[{index}]")
+        return self
 
     @model_validator(mode="after")
     def _parameters_fit(self) -> Self:

@@ -3,7 +3,7 @@
     R_BC = exp(a) R_BC,nominal,   a ~ N(0, sigma_a^2 I) about body axes; the IMU's R_BI likewise                 (1)
     f = f_nominal (1 + N(0, sigma_f^2)),   c = c_nominal + N(0, sigma_c^2)                                       (2)
     p_DL = (1 + dD/D) p_DL,nominal + N(0, sigma_L^2 I),   dD ~ N(0, sigma_D^2)                                   (3)
-    I_0 = I_nominal x U(2/(1 + q), 2 q/(1 + q))      brightness bin of ratio q, mean 1                           (4)
+    I_0 = b_k I_nominal x U(2/(1 + q), 2 q/(1 + q))      ring sheet's b_k, brightness bin of ratio q, mean 1        (4)
     (k1, k2, p1, p2) = nominal + N(0, (sigma_k1, sigma_k2, sigma_p, sigma_p)^2),   k3 as the sheet's             (5)
 
 The probe's tip and the IMU's place are where their sheets say: only the camera's place relative to the tip matters, and
@@ -17,6 +17,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from dockair.calibration import Camera, LedRing, Mounting
+from dockair.errors import DockairError
+from dockair.parameters import read_sheet
 from dockair.rotations import Array, exp, log
 from dockair.sim.camera.radiometry import led_intensity_w_sr
 from dockair.sim.camera.sheets import LedParameters
@@ -65,19 +67,27 @@ def draw_as_built(
     """Draw one piece of hardware around its nominal sheets, Eqs. (1) to (5).
 
     The same numbers are drawn whatever the standard deviations are: setting one to zero leaves the others' draws.
+
+    Raises:
+        DockairError: a ring with an LED so bright that it takes more current than LEDs bear.
     """
+    brightest, most_a = float(ring.relative_brightness.max()), read_sheet("leds")["drive_current_a"].high
+    if brightest * leds.drive_current_a > most_a:
+        expected = f"at most {most_a / leds.drive_current_a:.4g} times sheet leds' LED, which bears {most_a} A"
+        raise DockairError("ring.brightness", expected=expected, got=brightest)
     camera_angle, imu_angle, camera_shift = rng.standard_normal((3, 3))
     lens = rng.standard_normal(3)
     diameter = parameters.ring_diameter_sigma_m * rng.standard_normal()
     led_shift = parameters.led_position_sigma_m * rng.standard_normal((ring.count, 3))
-    brightness = rng.uniform(size=ring.count)
+    place_in_bin = rng.uniform(size=ring.count)
     distortion = rng.standard_normal(4)  # last: what was there before it keeps its draws
 
     low, high = 2.0 / (1.0 + leds.bin_ratio), 2.0 * leds.bin_ratio / (1.0 + leds.bin_ratio)
+    nominal_w_sr = led_intensity_w_sr(leds) * ring.relative_brightness
     built = AsBuilt(
         camera=_camera(camera, parameters, lens, distortion),
         ring_positions_D=_frozen(ring.positions_D * (1.0 + diameter / ring.diameter_m) + led_shift),
-        led_intensity_w_sr=_frozen(led_intensity_w_sr(leds) * (low + (high - low) * brightness)),
+        led_intensity_w_sr=_frozen(nominal_w_sr * (low + (high - low) * place_in_bin)),
         mounting=replace(
             mounting,
             R_BC=_frozen(exp(parameters.mounting_angle_sigma_rad * camera_angle) @ mounting.R_BC),
@@ -85,7 +95,7 @@ def draw_as_built(
             R_BI=_frozen(exp(parameters.mounting_angle_sigma_rad * imu_angle) @ mounting.R_BI),
         ),
     )
-    return replace(built, differences=_differences(built, camera, ring, mounting, led_intensity_w_sr(leds)))
+    return replace(built, differences=_differences(built, camera, ring, mounting, nominal_w_sr))
 
 
 def _camera(nominal: Camera, parameters: AsBuiltParameters, lens: Array, distortion: Array) -> Camera:
@@ -106,7 +116,7 @@ def _camera(nominal: Camera, parameters: AsBuiltParameters, lens: Array, distort
     )
 
 
-def _differences(built: AsBuilt, camera: Camera, ring: LedRing, mounting: Mounting, intensity_w_sr: float) -> Record:
+def _differences(built: AsBuilt, camera: Camera, ring: LedRing, mounting: Mounting, intensity_w_sr: Array) -> Record:
     differences = {
         "camera_turn_B_rad": log(built.mounting.R_BC @ mounting.R_BC.T),
         "camera_shift_B_m": built.mounting.p_BC - mounting.p_BC,

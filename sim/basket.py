@@ -11,10 +11,12 @@ import mujoco
 import numpy as np
 
 from dockair.calibration import LedRing
+from dockair.errors import DockairError
 from dockair.rotations import Array, quaternion_from_matrix
 from dockair.sim.hose.chain import DrogueParameters
 from dockair.sim.hose.coupling import CouplingParameters
 
+_LEDS = 8
 _SOCKET_STAVES = 12  # capsules around the coupling's mouth
 _CANOPY_PANELS = 24
 
@@ -51,7 +53,7 @@ def add_drogue(body: Any, drogue: DrogueParameters, coupling: CouplingParameters
     _add_basket(body, drogue, coupling, solid)
     _add_socket(body, drogue, coupling, solid)
     _add_canopy(body, drogue)
-    ring = LedRing(diameter_m=drogue.ring_diameter_m)
+    ring = LedRing(diameter_m=drogue.ring_diameter_m, count=_LEDS)
     drawn = {"contype": 0, "conaffinity": 0}
     for k, (_, y, z) in enumerate(ring.positions_D):
         body.add_site(name=f"led_{k}", pos=[0.0, y, z], size=[0.004] * 3)
@@ -64,6 +66,27 @@ def add_drogue(body: Any, drogue: DrogueParameters, coupling: CouplingParameters
             **drawn,
         )
     body.add_site(name="coupling", pos=[coupling.depth_m, 0.0, 0.0], size=[0.01] * 3)
+
+
+def place_leds(model: mujoco.MjModel, data: mujoco.MjData, ring: LedRing) -> None:
+    """Move the LEDs' sites and housings, which `add_drogue` spaced evenly, to where a ring's sheet has its LEDs.
+
+    They are drawn only: mass, contacts and motion do not change.
+
+    Args:
+        model: of the world; changed.
+        data: its state; places of sites and geoms are brought up to date.
+        ring: its sheet.
+
+    Raises:
+        DockairError: a ring of more or fewer LEDs than the drogue carries.
+    """
+    if ring.count != _LEDS:
+        raise DockairError("ring.count", expected=f"{_LEDS} LEDs, as many as the drogue carries", got=ring.count)
+    for k, (_, y, z) in enumerate(ring.positions_D):
+        model.site(f"led_{k}").pos[1:] = y, z
+        model.geom(f"led_housing_{k}").pos[1:] = y, z
+    mujoco.mj_kinematics(model, data)
 
 
 def _circle(count: int, radius: float) -> Array:

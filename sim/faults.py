@@ -158,9 +158,15 @@ class Faults:
         return bool(self._faults)
 
     @property
-    def exposures_s(self) -> tuple[float, ...]:
-        """Exposures at which the camera will be stuck."""
-        return tuple(fault.exposure_s for fault in self._faults if isinstance(fault, ExposureStuck))
+    def exposures_s(self) -> dict[int, float]:
+        """Exposures at which the camera will be stuck, by the fault's place in the list."""
+        return {k: fault.exposure_s for k, fault in enumerate(self._faults) if isinstance(fault, ExposureStuck)}
+
+    @property
+    def most_hot_pixels(self) -> int:
+        """The largest number of hot pixels at any time."""
+        counts = [self.camera(fault.start_s).hot_pixels for fault in self._faults if isinstance(fault, HotPixels)]
+        return max(counts, default=0)
 
     def led_factors(self, time_s: float, exposure_s: float = 0.0) -> Array:
         """(n,) what is left of each LED's light in an exposure.

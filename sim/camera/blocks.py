@@ -30,9 +30,10 @@ _KNOTS = 16  # blocks between the rays from which a spline makes the others
 
 #: For each pixel along a row or column: the node before it, and the part of the way to the next.
 Line = tuple[NDArray[np.int64], NDArray[np.float32]]
-Layer = tuple[NDArray[np.float32], Line, Line]  # nodes, rows, columns
+Layer = tuple[NDArray[np.float32], Line, Line, tuple[int, int], int]  # nodes, rows, columns, first node, spacing [px]
 _NO_LINE: Line = (np.empty(0, dtype=np.int64), np.empty(0, dtype=np.float32))
-_NOTHING: Layer = (np.empty((0, 0), dtype=np.float32), _NO_LINE, _NO_LINE)
+_NOTHING: Layer = (np.empty((0, 0), dtype=np.float32), _NO_LINE, _NO_LINE, (0, 0), 0)
+_ALIKE = np.empty((0, 0), dtype=np.float32)  # in the place of the fall-off: none
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +61,7 @@ class Blocks:
 
     def __init__(self, camera: Camera, k: int) -> None:
         self._camera, self._k = camera, k
+        self._lines = tuple(_line(0, size, 2 * k, 1 - k) for size in (camera.height_px, camera.width_px))
         self.whole = self.around(camera.full_window)
         f, k_f = camera.focal_length_px, k / camera.focal_length_px
         self._first = (0.5 * k - 0.5 - np.array(camera.principal_point_px)) / f, k_f
@@ -130,20 +132,19 @@ class Blocks:
         """Return (rows, columns) expected electrons of the window, Eq. (1).
 
         Args:
-            picture: radiances of the sensor's blocks; changed.
+            picture: radiances of the sensor's blocks.
             extent: which those are.
             window: what is wanted.
             white_e: electrons of radiance 1 on the axis.
             stray: electrons added; None for none.
             dirt: factor; None for 1.
         """
-        k = self._k
-        picture *= self._part(self._fall_off, extent)
-        picture *= np.float32(white_e)
-        rows = _line(window.row_start, window.row_stop, 2 * k, 1 - k, extent.row_start)
-        columns = _line(window.column_start, window.column_stop, 2 * k, 1 - k, extent.column_start)
+        rows = _cut(self._lines[0], window.row_start, window.row_stop)
+        columns = _cut(self._lines[1], window.column_start, window.column_stop)
+        scene = picture, rows, columns, (extent.row_start, extent.column_start), self._k
+        fall_off = self._part(self._fall_off, extent)
         out = np.empty(window.shape, dtype=np.float32)
-        _to_pixels(out, (picture, rows, columns), _layer(stray, window), _layer(dirt, window))
+        _to_pixels(out, scene, fall_off, np.float32(white_e), _layer(stray, window), _layer(dirt, window))
         return out
 
     def _tangents(self, extent: Extent) -> tuple[Array, Array]:
@@ -168,10 +169,14 @@ class Blocks:
         return RectBivariateSpline(*few, x)(rows, columns), RectBivariateSpline(*few, y)(rows, columns)
 
 
-def _line(start: int, stop: int, unit: int, shift: int, first: int) -> Line:
-    """For pixels n in [start, stop): floor and remainder of (2 n + shift) / unit, the floor less `first`."""
+def _line(start: int, stop: int, unit: int, shift: int) -> Line:
+    """For pixels n in [start, stop): floor and remainder of (2 n + shift) / unit."""
     twice = 2 * np.arange(start, stop) + shift
-    return twice // unit - first, ((twice % unit) / unit).astype(np.float32)
+    return twice // unit, ((twice % unit) / unit).astype(np.float32)
+
+
+def _cut(line: Line, start: int, stop: int) -> Line:
+    return line[0][start:stop], line[1][start:stop]
 
 
 def _layer(grid: CoarseGrid | None, window: Window) -> Layer:
@@ -179,12 +184,12 @@ def _layer(grid: CoarseGrid | None, window: Window) -> Layer:
     if grid is None:
         return _NOTHING
     unit = 2 * grid.spacing_px
-    rows = _line(window.row_start, window.row_stop, unit, 0, grid.first[0])
-    columns = _line(window.column_start, window.column_stop, unit, 0, grid.first[1])
-    for line, nodes in zip((rows, columns), grid.values.shape, strict=True):
-        if line[0][0] < 0 or line[0][-1] + 2 > nodes:
+    rows = _line(window.row_start, window.row_stop, unit, 0)
+    columns = _line(window.column_start, window.column_stop, unit, 0)
+    for line, first, nodes in zip((rows, columns), grid.first, grid.values.shape, strict=True):
+        if line[0][0] < first or line[0][-1] + 2 > first + nodes:
             raise ValueError(f"a grid of {grid.values.shape} nodes from {grid.first} does not hold {window}")
-    return grid.values, rows, columns
+    return grid.values, rows, columns, grid.first, grid.spacing_px
 
 
 @njit(cache=True)
@@ -208,37 +213,70 @@ def _take(
 
 
 @njit(cache=True)
-def _to_pixels(out: NDArray[np.float32], scene: Layer, stray: Layer, dirt: Layer) -> None:
+def _to_pixels(
+    out: NDArray[np.float32],
+    scene: Layer,
+    fall_off: NDArray[np.float32],
+    white_e: np.float32,
+    stray: Layer,
+    dirt: Layer,
+) -> None:
     """Fill the window, Eq. (1); a layer without nodes is left out."""
-    two_lines = np.empty((3, 2, out.shape[1]), dtype=np.float32)
+    lines = np.empty((3, 3, max(out.shape[1], scene[0].shape[1])), dtype=np.float32)
     held = np.full(3, -2)
     for r in range(out.shape[0]):
         row = out[r]
-        a, b, down = _lines_around(scene, r, two_lines[0], held[0:1])
+        a, b, down = _lines_around(scene, fall_off, white_e, r, row.shape[0], lines[0], held[0:1])
         for c in range(row.shape[0]):
             row[c] = a[c] + down * (b[c] - a[c])
         if stray[0].size > 0:
-            a, b, down = _lines_around(stray, r, two_lines[1], held[1:2])
+            a, b, down = _lines_around(stray, _ALIKE, white_e, r, row.shape[0], lines[1], held[1:2])
             for c in range(row.shape[0]):
                 row[c] += a[c] + down * (b[c] - a[c])
         if dirt[0].size > 0:
-            a, b, down = _lines_around(dirt, r, two_lines[2], held[2:3])
+            a, b, down = _lines_around(dirt, _ALIKE, white_e, r, row.shape[0], lines[2], held[2:3])
             for c in range(row.shape[0]):
                 row[c] *= a[c] + down * (b[c] - a[c])
 
 
 @njit(cache=True)
 def _lines_around(
-    layer: Layer, r: int, two_lines: NDArray[np.float32], held: NDArray[np.int64]
+    layer: Layer,
+    fall_off: NDArray[np.float32],
+    white_e: np.float32,
+    r: int,
+    width: int,
+    lines: NDArray[np.float32],
+    held: NDArray[np.int64],
 ) -> tuple[NDArray[np.float32], NDArray[np.float32], np.float32]:
     """Rows of nodes before and after row r of the window, spread to pixels, and the part of the way between them."""
-    nodes, (rows, down), (left, right) = layer
-    i = rows[r]
+    nodes, (rows, down), columns, first, spacing = layer
+    i = rows[r] - first[0]
     for node in range(max(i, held[0] + 2), i + 2):
-        line, spread = nodes[node], two_lines[node % 2]
-        for c in range(spread.shape[0]):
-            k = np.uint32(left[c])  # unsigned: spares the test for indices that count from the end
-            a = line[k]
-            spread[c] = a + right[c] * (line[k + np.uint32(1)] - a)
+        line = nodes[node]
+        if fall_off.size > 0:
+            line = lines[2]
+            for k in range(nodes.shape[1]):
+                line[k] = nodes[node, k] * fall_off[node, k] * white_e
+        _spread(line, columns, first[1], spacing, lines[node % 2, :width])
     held[0] = i
-    return two_lines[i % 2], two_lines[(i + 1) % 2], down[r]
+    return lines[i % 2, :width], lines[(i + 1) % 2, :width], down[r]
+
+
+@njit(cache=True)
+def _spread(line: NDArray[np.float32], columns: Line, first: int, spacing: int, out: NDArray[np.float32]) -> None:
+    """Interpolate a row of nodes at the pixels; two that lie between the same nodes at once where each node has two."""
+    before, part = columns
+    n, begin, end = out.shape[0], 0, 0  # of the pairs
+    if spacing == 2 and n > 2:
+        begin = 0 if before[0] == before[1] else 1
+        pairs, node = (n - begin) // 2, before[begin] - first
+        end = begin + 2 * pairs
+        nodes, pixels, near, far = line[node : node + pairs + 1], out[begin:end], part[begin], part[begin + 1]
+        for k in range(pairs):
+            a, step = nodes[k], nodes[k + 1] - nodes[k]
+            pixels[2 * k], pixels[2 * k + 1] = a + near * step, a + far * step
+    for start, stop in ((0, begin), (end, n)):
+        for c in range(start, stop):
+            k = np.uint32(before[c] - first)  # unsigned: spares the test for indices that count from the end
+            out[c] = line[k] + part[c] * (line[k + np.uint32(1)] - line[k])

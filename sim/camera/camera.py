@@ -10,9 +10,8 @@ Time: `expose` is called with the world at the middle of the exposure; the frame
 Not modelled: motion of background and Sun during an exposure; glints move as if they stuck to their surfaces.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
-from typing import Any
+from dataclasses import dataclass, replace
+from functools import partial
 
 import mujoco
 import numpy as np
@@ -20,62 +19,28 @@ from numpy.typing import NDArray
 
 from dockair.errors import DockairError
 from dockair.messages import CameraFrame, Window
-from dockair.parameters import load_parameters
 from dockair.rotations import Array
 from dockair.sim.as_built import AsBuilt
-from dockair.sim.camera import sheets as sheet
 from dockair.sim.camera.background import Background
+from dockair.sim.camera.blobs import Blobs
 from dockair.sim.camera.coarse_grid import CoarseGrid
+from dockair.sim.camera.defects import Defects
 from dockair.sim.camera.dirt import Dirt
 from dockair.sim.camera.electronics import digitise, output_gain
 from dockair.sim.camera.exposure import ExposureControl
 from dockair.sim.camera.fixed_pattern import FixedPattern
 from dockair.sim.camera.glare import Glare
 from dockair.sim.camera.optics import PointSpread
-from dockair.sim.camera.patches import add_patches
-from dockair.sim.camera.point_sources import WIDE_PX, PointSources, Sources
+from dockair.sim.camera.point_sources import PointSources
 from dockair.sim.camera.radiometry import extinction_1_m, led_wavelength_m, responses
 from dockair.sim.camera.readout import latency_s, transfer_jitter_s
+from dockair.sim.camera.sheets import CameraSheets
 from dockair.sim.camera.sky import Sky, Weather
 from dockair.sim.camera.sun_view import SunView
-from dockair.sim.faults import CameraFault, Faults, hot_pixel_places
+from dockair.sim.faults import CameraFault, Faults
 from dockair.streams import counter_key, random_stream
 
-_FAINTEST_E = 0.5  # a whole blob with fewer electrons is left out
-_SQUARE_SIGMAS = float(np.sqrt(12.0))  # side of a square over its standard deviation
 _EDGE_SIGMAS = 6.0  # how far the blurred edge of the Sun's disc is drawn
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class CameraSheets:
-    """All parameter sheets of a camera and of the light it works in; field names are the sheets'."""
-
-    lens: sheet.LensParameters
-    filter: sheet.FilterParameters
-    sensor: sheet.SensorParameters
-    exposure: sheet.ExposureParameters
-    leds: sheet.LedParameters
-    light: sheet.LightParameters
-    glare: sheet.GlareParameters
-    surfaces: sheet.SurfaceParameters
-    sky: sheet.SkyParameters
-    background: sheet.BackgroundParameters
-
-    @classmethod
-    def load(
-        cls, filter_name: str = "long_pass", overrides: Mapping[str, Mapping[str, Any]] | None = None
-    ) -> "CameraSheets":
-        """Read all sheets.
-
-        Args:
-            filter_name: "long_pass" or "band_pass".
-            overrides: sheet -> key -> value instead of the sheet's.
-        """
-        loaded: dict[str, Any] = {}
-        for entry in fields(cls):
-            name = f"filter_{filter_name}" if entry.name == "filter" else entry.name
-            loaded[entry.name] = load_parameters(name, entry.type, (overrides or {}).get(name))  # type: ignore[arg-type]
-        return cls(**loaded)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -110,7 +75,8 @@ class NearInfraredCamera:
         as_built: the hardware.
         noise: of `CameraNoise.of`.
         model: the world's, with bodies "receiver" and "drogue".
-        sun_direction_W: (3,) unit vector toward the Sun; None for no Sun.
+        sun_direction_W: (3,) unit vector toward the Sun. None is daylight without the Sun's own image: sky and solids
+            are lit from above, but there is no disc, glint or stray light. For no light there is the weather's night.
         weather: clouds, haze, night.
         altitude_m: of the flight.
         faults: what breaks, and when.
@@ -150,6 +116,7 @@ class NearInfraredCamera:
         )
         wavelength = led_wavelength_m(sheets.leds)
         self._spread = PointSpread(sheets.lens, sheets.sensor, camera, wavelength)
+        self._blobs = Blobs(camera, self._spread)
         self._sky = Sky(sheets.sky, weather, sun_direction_W, altitude_m, noise.clouds)
         self._extinction_1_m = extinction_1_m(weather.visibility_m)
         self._sun: SunView | None = None
@@ -160,10 +127,9 @@ class NearInfraredCamera:
             self._sun = SunView(model, camera, self._sky, sun_W, sheets.light.sun_angular_radius_rad, margin)
         self._background = Background(model, camera, sheets.background, self._sky, background)
         self._sources = PointSources(model, sheets, as_built, self._response, self._sun, self._extinction_1_m)
-        _check_stuck_exposures(self._faults, sheets.exposure)
+        self._defects = Defects(camera, sheets.glare, sheets.exposure, self._faults, noise.dirt, noise.hot_pixels)
         self._pattern = FixedPattern(sheets.sensor, noise.fixed_pattern, camera.height_px, camera.width_px)
         self._control = ExposureControl(sheets.exposure, sheets.sensor, automatic=automatic_exposure)
-        self._dirt: tuple[float, Dirt | None] = 0.0, None
         self._last: CameraFrame | None = None
 
     def expose(
@@ -194,7 +160,7 @@ class NearInfraredCamera:
         pixels = digitise(
             expected, self._sheets.sensor, self._pattern, self._noise.image, frame_number, start, exposure_s
         )
-        self._whiten(pixels, window, fault.hot_pixels)
+        self._defects.whiten(pixels, window, fault.hot_pixels)
         self._control.step(pixels, exposure_s)
         pixels.setflags(write=False)
         self._last = CameraFrame(
@@ -242,7 +208,7 @@ class NearInfraredCamera:
             exposure_s: None for that of the next frame.
         """
         exposure_s = self.exposure_s() if exposure_s is None else exposure_s
-        pose, dirt = self.pose(data), self._dirt_at(time_s)
+        pose, dirt = self.pose(data), self._defects.dirt(self._faults.camera(time_s).dirt_cover)
         veil = 1.0 if dirt is None else dirt.veil_factor
         sun_C, visible = self._sun_in_view(data, pose)
         stray = self._glare.stray(sun_C, visible, exposure_s, window, veil) if visible > 0.0 else None
@@ -255,7 +221,8 @@ class NearInfraredCamera:
                 seen, first = patch if dirt is None else (patch[0] * dirt.over(patch[0].shape, patch[1]), patch[1])
                 self._glare.add_disc(image, start, sun_C, seen, first, exposure_s, self._spread.edge_sigma_px())
         factors = self._faults.led_factors(time_s, exposure_s)
-        self._add(image, start, self._sources.of(data, pose, exposure_s, factors), dirt)
+        found = self._sources.candidates(data, pose, exposure_s, factors)
+        self._blobs.add(image, start, found, dirt, partial(self._sources.are_seen, data, pose[1], found))
         return image
 
     def background_electrons(
@@ -300,42 +267,6 @@ class NearInfraredCamera:
         """(n,) which LEDs nothing hides from the lens: truth, for logs and tests. Outside the picture counts too."""
         return self._sources.visible_leds(data, self.pose(data)[1])
 
-    def _add(self, image: NDArray[np.float32], start: tuple[int, int], sources: Sources, dirt: Dirt | None) -> None:
-        """Splat the sources that are bright enough and in front of the lens."""
-        kept = np.flatnonzero((sources.p_C[:, 0] > 0.0) & (sources.electrons > _FAINTEST_E))
-        if len(kept) == 0:
-            return
-        camera, p_C, way = self._as_built.camera, sources.p_C[kept], 0.5 * sources.way_C_m[kept]
-        ends = camera.pixels_from_points(np.concatenate([p_C, p_C + way, p_C - way])).reshape(3, -1, 2)
-        pixels, smear, electrons, size = ends[0], ends[1] - ends[2], sources.electrons[kept], sources.size_m[kept]
-        if dirt is not None:
-            electrons = electrons * dirt.at(pixels)
-        width_px = size * camera.focal_length_px / p_C[:, 0]
-        wide = width_px >= WIDE_PX
-        if wide.any():
-            add_patches(image, start, pixels[wide], electrons[wide], width_px[wide] / _SQUARE_SIGMAS)
-        for size_m in sorted(set(size[~wide].tolist())):
-            of = np.flatnonzero((size == size_m) & ~wide)
-            self._spread.splat(image, start, pixels[of], electrons[of], p_C[of, 0], size_m, smear[of])
-
-    def _dirt_at(self, time_s: float) -> Dirt | None:
-        cover = self._faults.camera(time_s).dirt_cover
-        if cover != self._dirt[0]:
-            rng = np.random.Generator(type(self._noise.dirt.bit_generator)())
-            rng.bit_generator.state = self._noise.dirt.bit_generator.state  # the same smudges whatever their cover
-            dirt = Dirt(self._sheets.glare, self._as_built.camera, rng, cover) if cover > 0.0 else None
-            self._dirt = cover, dirt
-        return self._dirt[1]
-
-    def _whiten(self, pixels: NDArray[np.unsignedinteger], window: Window, count: int) -> None:
-        if count == 0:
-            return
-        camera = self._as_built.camera
-        places = hot_pixel_places(self._noise.hot_pixels, count, camera.height_px, camera.width_px)
-        places = places - (window.row_start, window.column_start)
-        places = places[((places >= 0) & (places < pixels.shape)).all(axis=1)]
-        pixels[places[:, 0], places[:, 1]] = np.iinfo(pixels.dtype).max
-
     def _checked(self, window: Window | None) -> Window:
         full = self._as_built.camera.full_window
         if window is None:
@@ -347,10 +278,3 @@ class NearInfraredCamera:
         if not inside:
             raise DockairError("camera.window", expected=f"a window inside {full}", got=window)
         return window
-
-
-def _check_stuck_exposures(faults: Faults, exposure: sheet.ExposureParameters) -> None:
-    for stuck_at in faults.exposures_s:
-        if not exposure.shortest_s <= stuck_at <= exposure.longest_s:
-            expected = f"{1e6 * exposure.shortest_s:g} to {1e6 * exposure.longest_s:g} us, the hardware's limits"
-            raise DockairError("faults.exposure_us", expected=expected, got=round(1e6 * stuck_at, 6))

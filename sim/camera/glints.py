@@ -24,7 +24,7 @@ from dockair.rotations import Array
 from dockair.sim.camera.curved_mirrors import ellipsoid_spots, rim_spots
 from dockair.sim.camera.lobes import ROW, SPOT, facet_rows, spot_rows
 from dockair.sim.camera.mirrors import METAL, Mirrors, Vector, finishes, vector
-from dockair.sim.camera.occlusion import first_hits, is_clear
+from dockair.sim.camera.occlusion import Obstacles, first_hits, is_clear
 from dockair.sim.camera.round_mirrors import round_spots
 from dockair.sim.camera.sheets import LightParameters, SurfaceParameters
 
@@ -64,13 +64,14 @@ def find_glints(
         ahead_W: (3,) the camera's axis, to leave out what lies behind the lens; None for all around.
     """
     rows = glint_rows(data, mirrors, p_WC, s_W, surfaces, light, ahead_W)
-    seen, starts = starts_of_seen(model, data, p_WC, rows)
-    kept = [i for i in np.flatnonzero(seen) if is_clear(model, data, starts[i], s_W, np.inf)]
+    obstacles = Obstacles.of(model)
+    seen, starts = starts_of_seen(obstacles, data, p_WC, rows)
+    kept = [i for i in np.flatnonzero(seen) if is_clear(obstacles, data, starts[i], s_W, np.inf)]
     return Glints(p_W=rows[kept, :3], area_m2_sr=rows[kept, 6], size_m=rows[kept, 7])
 
 
 def starts_of_seen(
-    model: mujoco.MjModel, data: mujoco.MjData, p_WC: Array, rows: Array
+    obstacles: Obstacles, data: mujoco.MjData, p_WC: Array, rows: Array
 ) -> tuple[NDArray[np.bool_], Array]:
     """(n,) which of the patches the lens sees, (n, 3) a little above them, where rays to the light start.
 
@@ -79,7 +80,7 @@ def starts_of_seen(
     """
     eye, directions, distances = vector(p_WC), np.empty((len(rows), 3)), np.empty(len(rows))
     _aim(eye, rows, directions, distances)
-    hits = first_hits(model, data, p_WC, directions, float(distances.max(initial=0.0) + 1.0))
+    hits = first_hits(obstacles, data, p_WC, directions, float(distances.max(initial=0.0) + 1.0))
     seen, starts = np.empty(len(rows), dtype=np.bool_), directions
     _judge(eye, rows, distances, hits, seen, starts)
     return seen, starts

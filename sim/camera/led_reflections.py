@@ -27,7 +27,7 @@ from dockair.sim.camera.curved_mirrors import ellipsoid_spots, rim_spots
 from dockair.sim.camera.glints import starts_of_seen
 from dockair.sim.camera.lobes import ROW, SPOT, Poses, spot_rows
 from dockair.sim.camera.mirrors import METAL, Balls, Mirrors, Tubes, Vector, finishes, vector
-from dockair.sim.camera.occlusion import is_clear
+from dockair.sim.camera.occlusion import Obstacles, is_clear
 from dockair.sim.camera.round_mirrors import round_spots
 from dockair.sim.camera.sheets import SurfaceParameters
 
@@ -71,8 +71,9 @@ def find_led_reflections(
         data, mirrors, p_WC, leds_W, axis_W, intensity_w_sr, pattern_exponent, surfaces
     )
     led = rows[:, 9].astype(np.intp)
-    seen, starts = starts_of_seen(model, data, p_WC, rows)
-    kept = [i for i in np.flatnonzero(seen) if is_lit(model, data, starts[i], leds_W[led[i]], surfaces.led_seat_m)]
+    obstacles = Obstacles.of(model)
+    seen, starts = starts_of_seen(obstacles, data, p_WC, rows)
+    kept = [i for i in np.flatnonzero(seen) if is_lit(obstacles, data, starts[i], leds_W[led[i]], surfaces.led_seat_m)]
     return LedReflections(p_W=rows[kept, :3], intensity_w_sr=intensity[kept], led=led[kept])
 
 
@@ -181,11 +182,11 @@ def _dot(a: Vector, b: Vector) -> float:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-def is_lit(model: mujoco.MjModel, data: mujoco.MjData, start: Array, led_W: Array, seat_m: float) -> bool:
+def is_lit(obstacles: Obstacles, data: mujoco.MjData, start: Array, led_W: Array, seat_m: float) -> bool:
     """Say whether nothing stands between a place (3,) and an LED, but for its seat."""
     ray = led_W - start
     distance = math.sqrt(ray @ ray)
-    return is_clear(model, data, start, ray / distance, distance - seat_m)
+    return is_clear(obstacles, data, start, ray / distance, distance - seat_m)
 
 
 def _rows(

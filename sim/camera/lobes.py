@@ -27,7 +27,9 @@ techniques in electromagnetics, Proc. IEEE 60, 1972 (curvature of reflected wave
 
 import math
 
+import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from dockair.rotations import Array
 from dockair.sim.camera.mirrors import Facets
@@ -39,6 +41,9 @@ _STEEPEST = 0.5  # h.n below which no facet of a rough surface stands that way
 _MOST_PIECES = 8  # of a streak
 _EVERYWHERE = 1e9  # [m], bounds of surfaces without edges
 _FAINTEST_SHARE = 1e-9  # of a lobe
+_MOST_GAIN = 4.0  # by which reflectance and tilt may differ over a facet, where it is asked whether it may shine
+_LEAST_COS = 1e-3  # of the angle under which it is then seen
+_ALL_SIGMAS = 9.0  # what lies beyond is lost in rounding
 _DARK = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 Vector = tuple[float, float, float]
@@ -113,32 +118,50 @@ def facet_rows(
 ) -> int:
     """Append what facets send of the Sun to the lens; arguments as of `spot_rows`."""
     xpos, xmat = poses
-    for i in range(len(facets.geom)):
-        g, frame = facets.geom[i], facets.frame[i]
-        n, at = _turned(xmat[g], frame[1]), _turned(xmat[g], frame[0])
-        p = (xpos[g, 0] + at[0], xpos[g, 1] + at[1], xpos[g, 2] + at[2])
-        sight = _add(eye, -1.0, p)
-        if _dot(light[0], n) <= 0.0 or _dot(sight, n) <= 0.0:
-            continue  # turned away
-        v, d = _unit(sight)
-        h, twice = _unit(_add(v, 1.0, light[0]))
-        hn, half, finish = _dot(n, h), facets.half[i], finishes[facets.material[i]]
-        bend = facets.bend[i] + 2.0 * (half[0] + half[1]) / max(d * twice, 1e-9)
-        if (
-            hn < _STEEPEST
-            or 1.0 / hn**2 - 1.0 > (6.0 * finish[3] + bend + 6.0 * math.sqrt(light[2]) / max(twice, 1e-9)) ** 2
-        ):
-            continue  # out of the lobe's reach
-        spot = (p, n, _turned(xmat[g], frame[2]), _turned(xmat[g], frame[3]), _vector(facets.curvature[i], 0))
-        box = (-half[0], half[0], -half[1], half[1])
-        lobe = _lobe(spot, box, light, eye, finish, limits[0])
-        if lobe[0] == 0.0:
-            continue
-        spot, box = _nearer(spot, box, light, eye)  # where it is bright, Eq. (2)'s linear map is better
-        lobe = _lobe(spot, box, light, eye, finish, limits[0])
-        if lobe[0] > 0.0 and lobe[0] >= limits[1] and lobe[1] >= limits[2] and count < len(rows):
-            _write(rows[count], spot, lobe, _SKIN_M, 0.0)
-            count += 1
+    facing = np.empty(len(facets.geom) + 1, dtype=np.int64)
+    for g, start, stop in facets.runs:
+        # toward the light and to the lens, in the geom's axes
+        s, e = _turned_back(xmat[g], light[0]), _turned_back(xmat[g], _add(eye, -1.0, _vector(xpos[g], 0)))
+        for i in facing[: _face(facets.planes, start, stop, s, e, facing)]:
+            frame, half, finish = facets.frame[i], facets.half[i], finishes[facets.material[i]]
+            v, d = _unit(_add(e, -1.0, _vector(frame[0], 0)))
+            h, twice = _unit(_add(v, 1.0, s))
+            sun, local = math.sqrt(light[2]) / max(twice, 1e-9), _vector(frame[1], 0)
+            hn, vn, rough = _dot(local, h), _dot(local, v), finish[3]
+            if hn < _STEEPEST:
+                continue
+            bend = facets.bend[i] + 2.0 * (half[0] + half[1]) / max(d * twice, 1e-9)
+            tilt = max(math.sqrt(max(1.0 / hn**2 - 1.0, 0.0)) - bend, 0.0)  # what the facet at its best lacks
+            if tilt > 6.0 * (rough + sun):
+                continue
+            most = (
+                _MOST_GAIN * _reflectance(0.5 * twice, finish) / (8.0 * hn**4 * max(vn - bend, _LEAST_COS) * rough**2)
+            )
+            if most * math.exp(-0.5 * tilt**2 / (rough**2 + sun**2)) < limits[2]:
+                continue  # surely too dim
+            p, n = _add(_vector(xpos[g], 0), 1.0, _turned(xmat[g], frame[0])), _turned(xmat[g], frame[1])
+            spot = (p, n, _turned(xmat[g], frame[2]), _turned(xmat[g], frame[3]), _vector(facets.curvature[i], 0))
+            box = (-half[0], half[0], -half[1], half[1])
+            lobe = _lobe(spot, box, light, eye, finish, limits[0])
+            if lobe[0] == 0.0:
+                continue
+            spot, box = _nearer(spot, box, light, eye)  # where it is bright, Eq. (2)'s linear map is better
+            lobe = _lobe(spot, box, light, eye, finish, limits[0])
+            if lobe[0] > 0.0 and lobe[0] >= limits[1] and lobe[1] >= limits[2] and count < len(rows):
+                _write(rows[count], spot, lobe, _SKIN_M, 0.0)
+                count += 1
+    return count
+
+
+@njit(cache=True)
+def _face(planes: Array, start: int, stop: int, s: Vector, e: Vector, facing: NDArray[np.int64]) -> int:
+    """List which facets of a run face both a direction s and a point e; return how many."""
+    count = 0
+    for i in range(start, stop):
+        x, y, z = planes[0, i], planes[1, i], planes[2, i]
+        facing[count] = i
+        toward, ahead = x * s[0] + y * s[1] + z * s[2], x * e[0] + y * e[1] + z * e[2]
+        count += (toward > 0.0) & (ahead > planes[3, i])
     return count
 
 
@@ -217,6 +240,16 @@ def _turned(M: Array, a: Array) -> Vector:
 
 
 @njit(cache=True)
+def _turned_back(M: Array, a: Vector) -> Vector:
+    """M' a, with M (9,) by rows."""
+    return (
+        M[0] * a[0] + M[3] * a[1] + M[6] * a[2],
+        M[1] * a[0] + M[4] * a[1] + M[7] * a[2],
+        M[2] * a[0] + M[5] * a[1] + M[8] * a[2],
+    )
+
+
+@njit(cache=True)
 def _reflectance(cos_i: float, finish: Array) -> float:
     """R of Eq. (4): Fresnel's for unpolarised light on a dielectric, Schlick's form on metal."""
     index, metal, share = finish[0], finish[1], finish[2]
@@ -232,6 +265,8 @@ def _reflectance(cos_i: float, finish: Array) -> float:
 def _strip(low: float, high: float, mean: float, sd: float) -> tuple[float, float, float]:
     """Part of a normal distribution between two bounds, and the mean and variance of that part."""
     a, b = (low - mean) / sd, (high - mean) / sd
+    if a < -_ALL_SIGMAS and b > _ALL_SIGMAS:
+        return 1.0, mean, sd * sd
     root = math.sqrt(2.0)
     if b - a < 1e-3:  # the differences below would cancel
         middle = 0.5 * (a + b)

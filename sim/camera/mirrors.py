@@ -22,8 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dockair.rotations import Array
-from dockair.sim.camera.occlusion import VISIBLE_GROUPS
 from dockair.sim.camera.sheets import SurfaceParameters
+from dockair.sim.camera.solids import VISIBLE_GROUPS
 
 PAINT, METAL, RUBBER, GLASS = range(4)
 RIM_GEOMS = "basket_rim"  #: how the names of the rim's pieces begin
@@ -74,6 +74,8 @@ class Facets(NamedTuple):
     half: Array  #: (n, 2) half sides [m]
     curvature: Array  #: (n, 3) 11, 12, 22 of the second fundamental form, positive for convex [1/m]
     bend: Array  #: (n,) how much the slope may differ from the middle's
+    planes: Array  #: (4, n) normal n, and n . centre [m]: a point p of the geom's axes is before it where n . p is more
+    runs: NDArray[np.int64]  #: (m, 3) geom, its first facet, one past its last
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -268,7 +270,11 @@ def _facet_table(rows: list[tuple[int, int, Array, tuple[float, float], Vector]]
     sides = np.reshape(half, (-1, 2)).astype(float)
     C = np.reshape(curvature, (-1, 3)).astype(float)
     bend = np.abs(C[:, [0, 1, 1, 2]]).sum(axis=1) * sides.sum(axis=1)
-    return Facets(_index(geom), _index(material), np.reshape(frame, (-1, 4, 3)).astype(float), sides, C, bend)
+    frames, geoms = np.reshape(frame, (-1, 4, 3)).astype(float), _index(geom)
+    planes = np.vstack([frames[:, 1].T, np.sum(frames[:, 0] * frames[:, 1], axis=1)])
+    first = np.flatnonzero(np.diff(geoms, prepend=-1))
+    runs = np.column_stack([geoms[first], first, np.append(first[1:], len(geoms))]) if len(geoms) else np.empty((0, 3))
+    return Facets(geoms, _index(material), frames, sides, C, bend, planes, runs.astype(np.int64))
 
 
 def _index(values: object) -> NDArray[np.int64]:

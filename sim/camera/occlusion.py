@@ -1,33 +1,69 @@
 """What hides what: rays from a point through the scene's real geometry. No OpenGL, so both backgrounds agree.
 
-Only geoms that are drawn hide: those in a visible group and not fully transparent. Surfaces are met from inside, too.
+Every solid is convex: a ray is in it from one distance to another, and meets it at the first of the two that is not
+behind its start; surfaces are met from inside, too. In a solid's own axes, o being the start and d the ray,
+
+    ball       |A^-1 (o + t d)|^2 <= 1                      A = diag of half axes                                (1)
+    tube       (o + t d)_x^2 + (o + t d)_y^2 <= r^2                                                              (2)
+    slab       |o + t d|_k <= h_k                                                                                (3)
+
+A box is what three slabs share, a cylinder a tube and a slab; a capsule is a cylinder and the balls at its ends.
+
+Only geoms that are drawn hide: those in a visible group and not fully transparent.
 Not modelled: partly hidden sources (a source is a point), transparent things.
-Sources: MuJoCo's ray casting, mj_ray and mj_multiRay.
+Source: Glassner (ed.), An Introduction to Ray Tracing, ch. 2.
 """
+
+import math
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from dockair.rotations import Array
+from dockair.sim.camera.solids import BALL, BOX, CAPSULE, Solids
 
-VISIBLE_GROUPS: NDArray[np.uint8] = np.array([1, 1, 1, 0, 0, 0], dtype=np.uint8)  #: MuJoCo's own default
-_EVERYWHERE = 1e10  # how far rays reach [m]; MuJoCo's own limit
+_ALONG = 1e-300  # least squared component across a tube, of a ray that does not run along it
+_NOWHERE = (math.inf, -math.inf)
+
+Vector = tuple[float, float, float]
+Part = tuple[float, float]  # of a ray: from one distance to another; nothing where the second is less
 
 
-def is_clear(model: mujoco.MjModel, data: mujoco.MjData, p_W: Array, direction_W: Array, distance_m: float) -> bool:
+class Obstacles(NamedTuple):
+    """The solids of a model as rays meet them."""
+
+    geoms: NDArray[np.int64]  #: (n,) their numbers in the model
+    kinds: NDArray[np.int64]  #: (n,) as of `solids`
+    half_sizes_m: Array  #: (n, 3) as of `solids`
+    radii_m: Array  #: (n,) of a ball around each
+
+    @classmethod
+    def of(cls, model: mujoco.MjModel) -> "Obstacles":
+        """Take what is drawn.
+
+        Raises:
+            DockairError: the model has a visible geom that is no solid.
+        """
+        s = Solids.of(model)
+        return cls(s.geoms.astype(np.int64), s.kinds, s.half_sizes_m, np.array(model.geom_rbound[s.geoms]))
+
+
+def is_clear(obstacles: Obstacles, data: mujoco.MjData, p_W: Array, direction_W: Array, distance_m: float) -> bool:
     """Say whether nothing visible lies within `distance_m` of p_W along a unit vector."""
-    hit = mujoco.mj_ray(model, data, p_W, direction_W, VISIBLE_GROUPS, 1, -1, None)
-    return hit < 0.0 or hit >= distance_m
+    hit = first_hits(obstacles, data, p_W, np.array(direction_W, dtype=float, ndmin=2), math.inf)[0]
+    return bool(hit < 0.0 or hit >= distance_m)
 
 
 def hidden(
-    model: mujoco.MjModel, data: mujoco.MjData, p_WC: Array, targets_W: Array, clearance_m: float
+    obstacles: Obstacles, data: mujoco.MjData, p_WC: Array, targets_W: Array, clearance_m: float
 ) -> NDArray[np.bool_]:
     """(n,) whether something stands between a point and each of the targets.
 
     Args:
-        model: geoms.
+        obstacles: geoms.
         data: their poses, up to date; not changed.
         p_WC: (3,) the lens [m].
         targets_W: (n, 3) [m].
@@ -36,20 +72,103 @@ def hidden(
     rays = np.asarray(targets_W, dtype=float) - p_WC
     distances = np.linalg.norm(rays, axis=1)
     reach = float(distances.max(initial=0.0))
-    hits = first_hits(model, data, p_WC, rays / np.maximum(distances, np.finfo(float).tiny)[:, None], reach)
+    hits = first_hits(obstacles, data, p_WC, rays / np.maximum(distances, np.finfo(float).tiny)[:, None], reach)
     return np.asarray((hits >= 0.0) & (hits < distances - clearance_m))
 
 
-def clear_directions(model: mujoco.MjModel, data: mujoco.MjData, p_W: Array, directions: Array) -> NDArray[np.bool_]:
+def clear_directions(obstacles: Obstacles, data: mujoco.MjData, p_W: Array, directions: Array) -> NDArray[np.bool_]:
     """(n,) whether nothing visible lies along each of the unit vectors (n, 3) from a point, however far."""
-    return np.asarray(first_hits(model, data, p_W, np.asarray(directions, dtype=float), _EVERYWHERE) < 0.0)
+    return np.asarray(first_hits(obstacles, data, p_W, np.asarray(directions, dtype=float), math.inf) < 0.0)
 
 
-def first_hits(model: mujoco.MjModel, data: mujoco.MjData, p_W: Array, directions: Array, reach: float) -> Array:
+def first_hits(obstacles: Obstacles, data: mujoco.MjData, p_W: Array, directions: Array, reach: float) -> Array:
     """(n,) distances along unit vectors (n, 3) to the nearest surface [m]; -1 for none within `reach`."""
-    n = len(directions)
-    distances, geoms = np.full(n, -1.0), np.empty(n, dtype=np.int32)
-    if n:
-        rays = np.ascontiguousarray(directions).ravel()
-        mujoco.mj_multiRay(model, data, p_W, rays, VISIBLE_GROUPS, 1, -1, geoms, distances, None, n, reach)
-    return distances
+    out = np.full(len(directions), reach)
+    _cast(obstacles, data.geom_xpos, data.geom_xmat, p_W, directions, out)
+    out[out == reach] = -1.0
+    return out
+
+
+@njit(cache=True)
+def _cast(obstacles: Obstacles, xpos: Array, xmat: Array, p: Array, directions: Array, nearest: Array) -> None:
+    """Lower (n,) distances to those of the nearest surface."""
+    for k in range(len(obstacles.geoms)):
+        g, radius, h = obstacles.geoms[k], obstacles.radii_m[k], obstacles.half_sizes_m[k]
+        x, y, z, M = xpos[g, 0] - p[0], xpos[g, 1] - p[1], xpos[g, 2] - p[2], xmat[g]
+        square = x * x + y * y + z * z
+        for i in range(len(nearest)):
+            d = (directions[i, 0], directions[i, 1], directions[i, 2])
+            along = x * d[0] + y * d[1] + z * d[2]
+            if square - along * along > radius * radius or along + radius < 0.0 or along - radius > nearest[i]:
+                continue
+            start, stop = _inside(obstacles.kinds[k], (h[0], h[1], h[2]), _into(M, (-x, -y, -z)), _into(M, d))
+            at = start if start >= 0.0 else stop
+            if start <= stop and 0.0 <= at < nearest[i]:
+                nearest[i] = at
+
+
+@njit(cache=True)
+def _into(M: Array, a: Vector) -> Vector:
+    """M' a, with M (9,) by rows."""
+    return (
+        M[0] * a[0] + M[3] * a[1] + M[6] * a[2],
+        M[1] * a[0] + M[4] * a[1] + M[7] * a[2],
+        M[2] * a[0] + M[5] * a[1] + M[8] * a[2],
+    )
+
+
+@njit(cache=True)
+def _inside(kind: int, h: Vector, o: Vector, d: Vector) -> Part:
+    """Which part of a ray is in a solid."""
+    if kind == BALL:
+        return _in_ball(h, o, d)
+    across = _in_slab(h[2], o[2], d[2])
+    if kind == BOX:
+        return _shared(_shared(_in_slab(h[0], o[0], d[0]), _in_slab(h[1], o[1], d[1])), across)
+    start, stop = _shared(_in_tube(h[0], o, d), across)
+    if kind == CAPSULE:
+        for end in (-h[2], h[2]):
+            first, last = _in_ball((h[0], h[0], h[0]), (o[0], o[1], o[2] - end), d)
+            if first <= last:
+                start, stop = (min(start, first), max(stop, last)) if start <= stop else (first, last)
+    return start, stop
+
+
+@njit(cache=True)
+def _shared(one: Part, other: Part) -> Part:
+    return max(one[0], other[0]), min(one[1], other[1])
+
+
+@njit(cache=True)
+def _in_ball(h: Vector, o: Vector, d: Vector) -> Part:
+    """Eq. (1)."""
+    ox, oy, oz, dx, dy, dz = o[0] / h[0], o[1] / h[1], o[2] / h[2], d[0] / h[0], d[1] / h[1], d[2] / h[2]
+    a, b, c = dx * dx + dy * dy + dz * dz, ox * dx + oy * dy + oz * dz, ox * ox + oy * oy + oz * oz - 1.0
+    return _roots(a, b, c)
+
+
+@njit(cache=True)
+def _in_tube(r: float, o: Vector, d: Vector) -> Part:
+    """Eq. (2)."""
+    a, b, c = d[0] * d[0] + d[1] * d[1], o[0] * d[0] + o[1] * d[1], o[0] * o[0] + o[1] * o[1] - r * r
+    if a < _ALONG:
+        return (-math.inf, math.inf) if c <= 0.0 else _NOWHERE
+    return _roots(a, b, c)
+
+
+@njit(cache=True)
+def _in_slab(h: float, o: float, d: float) -> Part:
+    """Eq. (3)."""
+    if d == 0.0:
+        return (-math.inf, math.inf) if abs(o) <= h else _NOWHERE
+    return min((-h - o) / d, (h - o) / d), max((-h - o) / d, (h - o) / d)
+
+
+@njit(cache=True)
+def _roots(a: float, b: float, c: float) -> Part:
+    """Where a t^2 + 2 b t + c <= 0."""
+    square = b * b - a * c
+    if square < 0.0:
+        return _NOWHERE
+    root = math.sqrt(square)
+    return (-b - root) / a, (root - b) / a

@@ -68,9 +68,8 @@ class PointSpread:
             smear_px: (n, 2) way (du, dv) during the exposure.
         """
         pixels, electrons, depth_m = (np.asarray(a, dtype=float) for a in (pixels, electrons, depth_m))
-        if size_m > _LARGEST_M:
-            side = 2 ** math.ceil(math.log2(size_m / _LARGEST_M))
-            size_m /= side
+        side, size_m = _divided(size_m)
+        if side > 1:
             step_px = self._camera.focal_length_px * size_m / np.maximum(depth_m, NEAREST_M)
             pixels = (pixels[:, None] + step_px[:, None, None] * _grid(side)).reshape(-1, 2)
             electrons, depth_m = (electrons / side**2).repeat(side**2), depth_m.repeat(side**2)
@@ -79,6 +78,15 @@ class PointSpread:
         levels = cores.levels(depth_m)
         pixels, electrons, smear_px = (np.ascontiguousarray(a, dtype=float) for a in (pixels, electrons, smear_px))
         splat(image, start, pixels, electrons, smear_px, levels, cores.tables, self._sharp.wing)
+
+    @property
+    def wing(self) -> tuple[float, float]:
+        """A and w of the wings, [splat, eq 1]."""
+        return self._sharp.wing
+
+    def half_width_px(self, size_m: float) -> int:
+        """Half of the widest core of sources of one size."""
+        return self._cores_of(_divided(size_m)[1]).widest_px
 
     def edge_sigma_px(self) -> float:
         """Gaussian equivalent [px] of the blur of the Sun's edge: the same slope in the middle of a straight edge."""
@@ -98,6 +106,12 @@ class PointSpread:
         f = (np.arange(_EDGE_NODES) + 0.5) / (_EDGE_NODES * q)
         line = transfer(f, q, blur) * np.exp(-2.0 * (np.pi * d * f) ** 2) * np.sinc(f)
         return 1.0 / (math.sqrt(2.0 * math.pi) * 2.0 * float(line.sum()) / (_EDGE_NODES * q))
+
+
+def _divided(size_m: float) -> tuple[int, float]:
+    """Into how many squares a side a source is cut, and their size."""
+    side = 2 ** math.ceil(math.log2(size_m / _LARGEST_M)) if size_m > _LARGEST_M else 1
+    return side, size_m / side
 
 
 def _grid(side: int) -> Array:
@@ -124,6 +138,7 @@ class _Cores:
         self._half_widths = np.array([spread.half_width for spread in spreads])
         self._phases = np.array([spread.phases for spread in spreads])
         self._pool = np.zeros(0, dtype=np.float32)
+        self.widest_px = int(self._half_widths.max())
 
     @property
     def tables(self) -> Tables:

@@ -19,18 +19,18 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from dockair.rotations import Array, skew
+from dockair.rotations import Array
 from dockair.sim.as_built import AsBuilt
 from dockair.sim.camera.glints import glint_rows, starts_of_seen
 from dockair.sim.camera.led_reflections import is_lit, led_reflection_rows
 from dockair.sim.camera.lobes import ROW
-from dockair.sim.camera.mirrors import Mirrors
-from dockair.sim.camera.occlusion import hidden, is_clear
+from dockair.sim.camera.mirrors import Mirrors, Vector
+from dockair.sim.camera.occlusion import Obstacles, hidden, is_clear
 from dockair.sim.camera.radiometry import Responses, led_electrons
 from dockair.sim.camera.sun_view import SunView
 
 if TYPE_CHECKING:  # the camera imports this module
-    from dockair.sim.camera.camera import CameraSheets
+    from dockair.sim.camera.sheets import CameraSheets
 
 _SMALLEST_PX = 0.5  # of a patch that is not a point
 WIDE_PX = 8.0  #: side of a patch that is so much wider than the lens's blur that it is drawn without it
@@ -44,9 +44,10 @@ class Sources:
     """Points as the lens sees them."""
 
     p_C: Array  #: (n, 3) camera axes [m]
-    electrons: Array  #: (n,) of each whole blob, 0 for what is hidden
+    electrons: Array  #: (n,) of each whole blob
     size_m: Array  #: (n,) side of the source
     way_C_m: Array  #: (n, 3) motion during the exposure
+    patches_W: Array  #: (n, ROW) as of `lobes`; the last column which LED a mirror shows, or _SUN
 
 
 class PointSources:
@@ -72,11 +73,12 @@ class PointSources:
     ) -> None:
         self._model, self._sheets, self._as_built, self._response = model, sheets, as_built, response
         self._sun, self._extinction_1_m = sun, extinction_1_m
-        self._receiver, self._drogue = model.body("receiver").id, model.body("drogue").id
-        self._mirrors = Mirrors.of(model)
+        self._bodies = model.body("receiver").id, model.body("drogue").id
+        self._drogue, self._count = self._bodies[1], len(as_built.led_intensity_w_sr)
+        self._mirrors, self._obstacles = Mirrors.of(model), Obstacles.of(model)
 
     def of(self, data: mujoco.MjData, pose: tuple[Array, Array], exposure_s: float, led_factors: Array) -> Sources:
-        """Return all points: the LEDs first, in their order, then their reflections, then the Sun's glints.
+        """Return all points: the LEDs first, in their order, dark where hidden, then what mirrors LEDs, then the Sun.
 
         Args:
             data: positions and velocities up to date.
@@ -84,26 +86,47 @@ class PointSources:
             exposure_s: exposure.
             led_factors: (n,) what faults leave of each LED's light.
         """
+        found = self.candidates(data, pose, exposure_s, led_factors)
+        seen = self.are_seen(data, pose[1], found, np.arange(len(found.electrons)))
+        kept = np.flatnonzero(seen | (np.arange(len(seen)) < self._count))
+        return Sources(
+            p_C=found.p_C[kept],
+            electrons=(found.electrons * seen)[kept],
+            size_m=found.size_m[kept],
+            way_C_m=found.way_C_m[kept],
+            patches_W=found.patches_W[kept],
+        )
+
+    def candidates(
+        self, data: mujoco.MjData, pose: tuple[Array, Array], exposure_s: float, led_factors: Array
+    ) -> Sources:
+        """Return what could be seen if nothing hid it, in the order of `of`; arguments as there."""
         R_WC, p_WC = pose
         leds_W, intensity = self.leds_W(data), self._as_built.led_intensity_w_sr * led_factors
-        axis_W, count = data.xmat[self._drogue].reshape(3, 3) @ _LED_AXIS_D, len(leds_W)
+        axis_W, count = data.xmat[self._drogue].reshape(3, 3) @ _LED_AXIS_D, self._count
         mirrored, electrons_m2_s, size_m = self._mirrored(data, pose, leds_W, axis_W, intensity)
-        seen, starts = starts_of_seen(self._model, data, p_WC, np.concatenate([self._led_rows(leds_W), mirrored]))
-        kept = [
-            i for i in np.flatnonzero(seen[count:]) if self._is_lit(data, starts[count + i], mirrored[i, 9], leds_W)
-        ]
-        p_C = (np.concatenate([leds_W, mirrored[kept, :3]]) - p_WC) @ R_WC
-        p_CL, p_CM = p_C[:count], p_C[count:]
-        leds, response = self._sheets.leds, self._response
-        led_rates = led_electrons(response, leds, intensity, p_CL, axis_W @ R_WC, 1.0, self._extinction_1_m)
-        mirrored_rates, sizes = electrons_m2_s[kept], size_m[kept]
-        _as_received(p_CM, self._extinction_1_m, self._as_built.camera.focal_length_px, mirrored_rates, sizes)
-        return Sources(
-            p_C=p_C,
-            electrons=exposure_s * np.concatenate([led_rates * seen[:count], mirrored_rates]),
-            size_m=np.concatenate([np.full(count, leds.die_size_m), sizes]),
-            way_C_m=exposure_s * self._velocities_C(data, pose, p_C, leds_W),
+        leds, f_px = self._sheets.leds, self._as_built.camera.focal_length_px
+        patches = np.concatenate([self._led_rows(leds_W), mirrored])
+        p_C = (patches[:, :3] - p_WC) @ R_WC
+        electrons, sizes = np.empty(len(patches)), np.full(len(patches), leds.die_size_m)
+        electrons[:count] = led_electrons(
+            self._response, leds, intensity, p_C[:count], axis_W @ R_WC, 1.0, self._extinction_1_m
         )
+        electrons[count:], sizes[count:] = electrons_m2_s, size_m
+        _as_received(p_C[count:], self._extinction_1_m, f_px, electrons[count:], sizes[count:])
+        electrons *= exposure_s
+        ways = self._ways_C(data, pose, p_C, count, exposure_s)
+        return Sources(p_C=p_C, electrons=electrons, size_m=sizes, way_C_m=ways, patches_W=patches)
+
+    def are_seen(
+        self, data: mujoco.MjData, p_WC: Array, candidates: Sources, which: NDArray[np.intp]
+    ) -> NDArray[np.bool_]:
+        """(k,) whether the lens sees these of the candidates, and their light reaches them."""
+        patches, leds_W = candidates.patches_W[which], candidates.patches_W[: self._count, :3]
+        seen, starts = starts_of_seen(self._obstacles, data, p_WC, patches)
+        for k in np.flatnonzero(seen & (which >= self._count)):
+            seen[k] = self._is_lit(data, starts[k], patches[k, 9], leds_W)
+        return seen
 
     def leds_W(self, data: mujoco.MjData) -> Array:
         """(n, 3) the LEDs as built [m]."""
@@ -113,7 +136,7 @@ class PointSources:
     def visible_leds(self, data: mujoco.MjData, p_WC: Array) -> NDArray[np.bool_]:
         """(n,) which LEDs nothing hides from the lens."""
         clearance = self._sheets.leds.occlusion_clearance_m
-        return np.logical_not(hidden(self._model, data, p_WC, self.leds_W(data), clearance))
+        return np.logical_not(hidden(self._obstacles, data, p_WC, self.leds_W(data), clearance))
 
     def _led_rows(self, leds_W: Array) -> Array:
         """(n, ROW) the LEDs as patches for `starts_of_seen`."""
@@ -152,21 +175,49 @@ class PointSources:
         """Whether the way from a place (3,) to the Sun, or to an LED, is clear."""
         if light == _SUN:
             assert self._sun is not None
-            return is_clear(self._model, data, start, self._sun.direction_W, np.inf)
-        return is_lit(self._model, data, start, leds_W[int(light)], self._sheets.surfaces.led_seat_m)
+            return is_clear(self._obstacles, data, start, self._sun.direction_W, np.inf)
+        return is_lit(self._obstacles, data, start, leds_W[int(light)], self._sheets.surfaces.led_seat_m)
 
-    def _velocities_C(self, data: mujoco.MjData, pose: tuple[Array, Array], p_C: Array, leds_W: Array) -> Array:
+    def _ways_C(
+        self, data: mujoco.MjData, pose: tuple[Array, Array], p_C: Array, count: int, exposure_s: float
+    ) -> Array:
         """(n, 3) Eq. (1): the LEDs, which come first, move with the drogue; what mirrors is taken to stand still."""
-        R_WC, p_WC = pose
-        w_C = R_WC.T @ data.cvel[self._receiver, :3]
-        velocity_C = p_C @ skew(w_C) - self._point_velocities(data, self._receiver, p_WC) @ R_WC  # p x w = -w x p
-        velocity_C[: len(leds_W)] += self._point_velocities(data, self._drogue, leds_W) @ R_WC
-        return np.asarray(velocity_C)
+        out, root, twist, receiver, drogue = np.empty_like(p_C), self._model.body_rootid, data.cvel, *self._bodies
+        com = data.subtree_com
+        flight, tow = (twist[receiver], com[root[receiver]]), (twist[drogue], com[root[drogue]])
+        _ways(p_C, pose, flight, tow, count, exposure_s, out)
+        return out
 
-    def _point_velocities(self, data: mujoco.MjData, body: int, points_W: Array) -> Array:
-        """(..., 3) velocity in W of points of a body [m/s]; MuJoCo keeps that of the tree's centre of mass."""
-        root = data.subtree_com[self._model.body_rootid[body]]
-        return np.asarray(data.cvel[body, 3:] - (points_W - root) @ skew(data.cvel[body, :3]))
+
+#: Angular and linear velocity (6,) in W, and the point (3,) whose the linear one is: MuJoCo's is the tree's centre.
+Twist = tuple[Array, Array]
+
+
+@njit(cache=True)
+def _velocity(twist: Twist, p: Vector) -> Vector:
+    """Of a body's point, in W [m/s]."""
+    v, at = twist
+    x, y, z = p[0] - at[0], p[1] - at[1], p[2] - at[2]
+    return v[3] + v[1] * z - v[2] * y, v[4] + v[2] * x - v[0] * z, v[5] + v[0] * y - v[1] * x
+
+
+@njit(cache=True)
+def _ways(
+    p_C: Array, pose: tuple[Array, Array], camera: Twist, leds: Twist, count: int, exposure_s: float, out: Array
+) -> None:
+    """Fill (n, 3) Eq. (1) times the exposure; the first `count` points move with the LEDs' body, the others rest."""
+    R, lens = pose
+    for i in range(len(p_C)):
+        p = (
+            lens[0] + R[0, 0] * p_C[i, 0] + R[0, 1] * p_C[i, 1] + R[0, 2] * p_C[i, 2],
+            lens[1] + R[1, 0] * p_C[i, 0] + R[1, 1] * p_C[i, 1] + R[1, 2] * p_C[i, 2],
+            lens[2] + R[2, 0] * p_C[i, 0] + R[2, 1] * p_C[i, 1] + R[2, 2] * p_C[i, 2],
+        )
+        past = _velocity(camera, p)  # of the camera's body, drawn on to the point: v_lens + w x p
+        own = _velocity(leds, p) if i < count else (0.0, 0.0, 0.0)
+        for k in range(3):
+            v = R[0, k] * (own[0] - past[0]) + R[1, k] * (own[1] - past[1]) + R[2, k] * (own[2] - past[2])
+            out[i, k] = exposure_s * v
 
 
 @njit(cache=True)

@@ -32,11 +32,13 @@ Sources: EMVA 1288 release 3.1 section 2; W. J. Smith, Modern Optical Engineerin
 OSRAM SFH 4715AS for (5); ASTM G173-03 and Hansen & Travis 1974 eq. 2.30 (tau_R) for (9); Kasten & Young 1989.
 """
 
+import math
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 
 import numpy as np
+from numba import njit
 from scipy import constants
 
 from dockair.calibration import Camera
@@ -239,9 +241,25 @@ def led_electrons(
         exposure_s: exposure.
         extinction_1_m: of the air between, from the function of that name.
     """
-    r = np.linalg.norm(p_CL, axis=1)
-    cos_psi = np.clip(-(p_CL @ axis_C) / r, 0.0, 1.0)
-    cos_t = np.clip(p_CL[:, 0] / r, 0.0, 1.0)
-    seen = np.interp(cos_t, np.linspace(0.0, 1.0, len(response.led_transmission)), response.led_transmission)
-    watts = intensity_w_sr * cos_psi**leds.pattern_exponent * cos_t * np.exp(-extinction_1_m * r) / r**2
-    return np.asarray(response.led_e_m2_sr_w_s * exposure_s * seen * watts)
+    out = np.empty(len(p_CL))
+    lens = response.led_e_m2_sr_w_s * exposure_s, response.led_transmission, extinction_1_m
+    _receive(p_CL, np.asarray(intensity_w_sr, dtype=float), np.asarray(axis_C), leds.pattern_exponent, lens, out)
+    return out
+
+
+@njit(cache=True, error_model="numpy")
+def _receive(
+    p_CL: Array, intensity_w_sr: Array, axis_C: Array, exponent: float, lens: tuple[float, Array, float], out: Array
+) -> None:
+    """Fill (n,) electrons; `lens` is electrons per m^2 W/sr on the axis, its transmission by cosine, the extinction."""
+    on_axis, transmission, extinction = lens
+    last = len(transmission) - 1
+    for i in range(len(p_CL)):
+        x, y, z = p_CL[i]
+        r = math.sqrt(x * x + y * y + z * z)
+        cos_psi = min(max(-(x * axis_C[0] + y * axis_C[1] + z * axis_C[2]) / r, 0.0), 1.0)
+        cos_t = min(max(x / r, 0.0), 1.0)
+        k = min(int(cos_t * last), last - 1)
+        seen = transmission[k] + (cos_t * last - k) * (transmission[k + 1] - transmission[k])
+        watts = intensity_w_sr[i] * cos_psi**exponent * cos_t * math.exp(-extinction * r) / r**2
+        out[i] = on_axis * seen * watts

@@ -22,9 +22,12 @@ from numpy.typing import NDArray
 from dockair.rotations import Array
 from dockair.sim.camera.mirrors import Balls, Tubes
 
-_NEWTON_STEPS, _CLOSE = 30, 1e-13
+_NEWTON_STEPS = 30
+_SMALL = 0.01  # angles [rad] whose series end within 1e-15
+_CLOSE = 1e-8  # after a step so short the rest is its square
 _EVERYWHERE = 1e9  # [m], for surfaces without edges
 _SKIN_M = 1e-3  # a ray that starts on a surface starts this far off it
+_STEEP = 0.87  # cosine between h and a tube's axis from which h.n < 1/2 around it, the limit of `lobes`
 
 Vector = tuple[float, float, float]
 
@@ -77,8 +80,11 @@ def _ball_spot(
         return False
     z = (xmat[g, 2], xmat[g, 5], xmat[g, 8])
     centre = _add((xpos[g, 0], xpos[g, 1], xpos[g, 2]), balls.at_z[i], z)
-    found, n = _on_sphere(centre, axes[0], toward, point, eye)
-    if not found or balls.side[i] * _dot(n, z) < 0.0:
+    to_light, to_eye, side = _add(toward, -point, centre), _add(eye, -1.0, centre), balls.side[i]
+    if side * _dot(to_light, z) < 0.0 and side * _dot(to_eye, z) < 0.0:
+        return False  # and so is the normal, which stands between them
+    found, n = _on_sphere(to_light, point, to_eye, axes[0])
+    if not found or side * _dot(n, z) < 0.0:
         return False
     t1, t2 = _frame(n)
     c = 1.0 / axes[0]
@@ -92,11 +98,25 @@ def _tube_spot(
 ) -> bool:
     g, radius, half = tubes.geom[i], tubes.radius[i], tubes.half_length[i]
     axis, centre = (xmat[g, 2], xmat[g, 5], xmat[g, 8]), (xpos[g, 0], xpos[g, 1], xpos[g, 2])
+    if _is_steep(_add(toward, -point, centre), point, _add(eye, -1.0, centre), axis, half + radius):
+        return False
     found, n, x = _on_tube(centre, axis, radius, half, toward, point, eye)
     if found:
         p, bounds = _add(_add(centre, x, axis), radius, n), (-half - x, half - x)
         _write(row, p, n, axis, _cross(axis, n), (0.0, 1.0 / radius), bounds, tubes.material[i])
     return found
+
+
+@njit(cache=True)
+def _is_steep(to_light: Vector, point: float, to_eye: Vector, axis: Vector, reach: float) -> bool:
+    """Whether a facet of a tube would have to stand steeper than `lobes` allows, wherever on it."""
+    s, ds = _unit(to_light)
+    v, dc = _unit(to_eye)
+    h, twice = _unit(_add(s, 1.0, v))
+    if dc <= reach or point * ds < point * reach or twice == 0.0:
+        return False
+    turn = reach / (dc - reach) + (point * reach / (ds - reach) if point > 0.0 else 0.0)  # of s + v along the tube
+    return abs(_dot(h, axis)) - 2.0 * turn / twice > _STEEP
 
 
 @njit(cache=True)
@@ -148,24 +168,37 @@ def _frame(n: Vector) -> tuple[Vector, Vector]:
 
 
 @njit(cache=True)
-def _incidence(x: float, q: float) -> float:
-    return math.atan2(math.sin(x), math.cos(x) - q)
+def _angle(y: float, x: float) -> float:
+    """atan2(y, x); of a small angle by its series, which is faster."""
+    if abs(y) > _SMALL * x:
+        return math.atan2(y, x)
+    t = y / x
+    return t * (1.0 - t * t * (1.0 / 3.0 - t * t * (0.2 - t * t / 7.0)))
 
 
 @njit(cache=True)
-def _mirror_angle(q_s: float, q_c: float, gamma: float) -> float:
-    """The root of Eq. (1), by Newton's method kept in [0, gamma]; q are radii over distances."""
+def _mirror_angle(q_s: float, q_c: float, cos_gamma: float, sin_gamma: float) -> tuple[float, float]:
+    """Cosine and sine of the root of Eq. (1), by Newton's method kept in [0, gamma]; q are radii over distances."""
+    gamma = math.atan2(sin_gamma, cos_gamma)
     x = gamma * (1.0 - q_s) / (2.0 - q_s - q_c)
+    cos_x, sin_x = math.cos(x), math.sin(x)
     for _ in range(_NEWTON_STEPS):
-        y = gamma - x
-        cos_x, cos_y = math.cos(x), math.cos(y)
-        slope = (1.0 - q_s * cos_x) / (1.0 + q_s * q_s - 2.0 * q_s * cos_x)
-        slope += (1.0 - q_c * cos_y) / (1.0 + q_c * q_c - 2.0 * q_c * cos_y)
-        step = (_incidence(x, q_s) - _incidence(y, q_c)) / slope
-        x = min(max(x - step, 0.0), gamma)
+        cos_y, sin_y = cos_gamma * cos_x + sin_gamma * sin_x, sin_gamma * cos_x - cos_gamma * sin_x
+        a, b = cos_x - q_s, cos_y - q_c
+        slope = (1.0 - q_s * cos_x) / (a * a + sin_x * sin_x) + (1.0 - q_c * cos_y) / (b * b + sin_y * sin_y)
+        step = min(max(x - _angle(sin_x * b - sin_y * a, a * b + sin_x * sin_y) / slope, 0.0), gamma) - x
+        x += step
+        if abs(step) > _SMALL:
+            cos_x, sin_x = math.cos(x), math.sin(x)
+            continue
+        c, s = (
+            1.0 - step * step * (0.5 - step * step / 24.0),
+            step * (1.0 - step * step * (1.0 - 0.05 * step * step) / 6.0),
+        )
+        cos_x, sin_x = cos_x * c - sin_x * s, sin_x * c + cos_x * s
         if abs(step) < _CLOSE:
             break
-    return x
+    return cos_x, sin_x
 
 
 @njit(cache=True)
@@ -184,16 +217,14 @@ def _circle_normal(
     g, sin_gamma = _unit(_add(f, -cos_gamma, e))
     if sin_gamma < 1e-12:
         g = spare
-    x = _mirror_angle(point * radius / ds, radius / dc, math.atan2(sin_gamma, cos_gamma))
-    cos_x = math.cos(x)
-    return True, _add((cos_x * e[0], cos_x * e[1], cos_x * e[2]), math.sin(x), g), ds
+    cos_x, sin_x = _mirror_angle(point * radius / ds, radius / dc, cos_gamma, sin_gamma)
+    return True, _add((cos_x * e[0], cos_x * e[1], cos_x * e[2]), sin_x, g), ds
 
 
 @njit(cache=True)
-def _on_sphere(centre: Vector, radius: float, toward: Vector, point: float, eye: Vector) -> tuple[bool, Vector]:
-    to_light = _add(toward, -point, centre)
+def _on_sphere(to_light: Vector, point: float, to_eye: Vector, radius: float) -> tuple[bool, Vector]:
     spare, _ = _frame(_unit(to_light)[0])
-    found, n, _ = _circle_normal(to_light, point, _add(eye, -1.0, centre), radius, spare)
+    found, n, _ = _circle_normal(to_light, point, to_eye, radius, spare)
     return found, n
 
 

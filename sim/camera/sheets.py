@@ -1,11 +1,17 @@
 """Parameter sheets of the camera: one frozen dataclass a file of `assets/parameters`, same keys, units there."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
 
 from dockair.errors import DockairError
+from dockair.parameters import load_parameters
 from dockair.rotations import Array
 
 OUTPUTS_OF_BITS = {10: (2, 4, 8, 16), 12: (2, 4)}  #: CMV2000: the LVDS outputs that can read so many bits a pixel
+OUTPUT_BIT_RATE_HZ = 480e6  #: CMV2000: the most that an output sends, 10 bits at 48 MHz or 12 at 40 MHz
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,6 +34,12 @@ class FilterParameters:
     cut_off_ramp_m: float
     transmittance: float
     effective_index: float
+
+    def __post_init__(self) -> None:
+        """Refuse a band that ends before it begins."""
+        if not self.cut_on_m < self.cut_off_m:
+            expected = f"less than filter.cut_off_m = {self.cut_off_m} m"
+            raise DockairError("filter.cut_on_m", expected=expected, got=self.cut_on_m)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -66,6 +78,14 @@ class SensorParameters:
         if self.outputs not in allowed:
             expected = f"a number of outputs that reads {self.converter_bits} bits"
             raise DockairError("sensor.outputs", expected=expected, got=self.outputs, exists=[str(n) for n in allowed])
+        fastest_hz = OUTPUT_BIT_RATE_HZ / self.converter_bits
+        if self.clock_hz > fastest_hz:
+            expected = f"up to {fastest_hz:g} Hz, as fast as an output sends {self.converter_bits} bits"
+            raise DockairError("sensor.clock_hz", expected=expected, got=self.clock_hz)
+        nodes = np.asarray(self.wavelength_m)
+        if nodes.shape != np.shape(self.quantum_efficiency) or not np.all(np.diff(nodes) > 0.0):
+            expected = "rising wavelengths, one for each sensor.quantum_efficiency"
+            raise DockairError("sensor.wavelength_m", expected=expected, got=nodes.tolist())
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -145,6 +165,12 @@ class GlareParameters:
     dirt_slope: float
     dirt_scatter: float
 
+    def __post_init__(self) -> None:
+        """Refuse smudges whose limits exclude each other."""
+        if not self.dirt_smallest_rad <= self.dirt_largest_rad:
+            expected = f"at most glare.dirt_largest_rad = {self.dirt_largest_rad} rad"
+            raise DockairError("glare.dirt_smallest_rad", expected=expected, got=self.dirt_smallest_rad)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SurfaceParameters:
@@ -174,7 +200,7 @@ class SkyParameters:
     """Sheet `sky`."""
 
     zenith: float
-    horizon: float
+    airlight: float
     aureole: float
     aureole_decay_1_rad: float
     molecular: float
@@ -199,9 +225,46 @@ class SkyParameters:
     clear_visibility_m: float
     earth_radius_m: float
 
+    def __post_init__(self) -> None:
+        """Refuse a sky overhead that endless air could not make."""
+        if not self.zenith < self.airlight:
+            raise DockairError("sky.zenith", expected=f"less than sky.airlight = {self.airlight}", got=self.zenith)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BackgroundParameters:
     """Sheet `background`."""
 
     reduction: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class CameraSheets:
+    """All parameter sheets of a camera and of the light it works in; field names are the sheets'."""
+
+    lens: LensParameters
+    filter: FilterParameters
+    sensor: SensorParameters
+    exposure: ExposureParameters
+    leds: LedParameters
+    light: LightParameters
+    glare: GlareParameters
+    surfaces: SurfaceParameters
+    sky: SkyParameters
+    background: BackgroundParameters
+
+    @classmethod
+    def load(
+        cls, filter_name: str = "long_pass", overrides: Mapping[str, Mapping[str, Any]] | None = None
+    ) -> "CameraSheets":
+        """Read all sheets.
+
+        Args:
+            filter_name: "long_pass" or "band_pass".
+            overrides: sheet -> key -> value instead of the sheet's.
+        """
+        loaded: dict[str, Any] = {}
+        for entry in fields(cls):
+            name = f"filter_{filter_name}" if entry.name == "filter" else entry.name
+            loaded[entry.name] = load_parameters(name, entry.type, (overrides or {}).get(name))  # type: ignore[arg-type]
+        return cls(**loaded)

@@ -3,23 +3,24 @@
 Relative radiance, 1 = a white Lambertian surface in normal sunlight, as a function of the direction in W alone: c is
 the cosine of the angle X from the Sun, s the sine of the elevation.
 
-    J(c) = horizon f,   f = 1 + a (exp(-d X) - exp(-d pi/2)) + e c^2                                            (1)
-    clear sky   J (1 - exp(-b m)),   b = -ln(1 - zenith/horizon),   m = 1/(|s| + 0.025 exp(-11 |s|))               (2)
+    J(c) = airlight f,   f = 1 + a (exp(-d X) - exp(-d pi/2)) + e c^2                                           (1)
+    clear sky   J (1 - exp(-b m)),   b = -ln(1 - zenith/airlight),   m = 1/(|s| + 0.025 exp(-11 |s|))              (2)
+                below level, down to the lowest point and up:  80 exp(D/H) - m,   D = r (1 - sqrt(1 - s^2))
     cloud above at (x, y) = height (d_x, d_y)/(s + w), crossed at mu = (s + w)/(1 + w)                             (3)
     surface below, depth h down:  d = -r s - sqrt(q),  q = (r - h)^2 - r^2 (1 - s^2),  mu = sqrt(q)/(r - h)          (4)
     deck        R min(mu_0 (1 + w n), 1) + (1 - R) (what is below),   R = 1 - T(tau/mu)                           (5)
     air before  L <- L exp(-b' m) + J' (1 - exp(-b' m)),   b' = aerosol (exp(-z_1/H) - exp(-z_2/H))                (6)
     haze        L <- L exp(-b_h m) + J_h (1 - exp(-b_h m)),   b_h = (3.912/V - 3.912/V_clear) depth, not below 0   (7)
 
-Eq. (1) is the CIE clear sky's indicatrix, which is 1 at 90 degrees; (2) its gradation, scaled so that zenith and
-horizon at 90 degrees from the Sun are the sheet's. w is the thickness of cloud elements over their width: it keeps
+Eq. (1) is the CIE clear sky's indicatrix, which is 1 at 90 degrees; (2) its gradation, scaled so that the zenith and
+endless air at 90 degrees from the Sun are the sheet's. w is the thickness of cloud elements over their width: it keeps
 slant paths finite where a layer is seen edge-on. J' has less Sun in it where cloud shades the air (mean of the
 layer); J_h less where the haze itself does. The light that cloud sends down is `clouds`.
 
 Nothing here moves: W goes with the tanker, and in the minutes of a docking the clouds stay where they are.
 Not modelled: twilight, moon, vapour trails, shadows on the deck, polarisation; cloud at flight level but as haze. Cloud
 above is one layer that starts over the aircraft; within it, or under the deck's top, this is not valid.
-Sources: ISO 15469 (CIE S 011), sky type 12; Rozenberg 1966 (air mass at the horizon); Koschmieder 1924 (3.912/V).
+Sources: ISO 15469 (CIE S 011), sky type 12; Rozenberg 1966 (air mass at the horizon); 3.912/V as in radiometry (7).
 """
 
 import math
@@ -31,12 +32,12 @@ from numpy.typing import NDArray
 from dockair.errors import DockairError
 from dockair.rotations import Array
 from dockair.sim.camera.clouds import Droplets, Texture, optical_depth
+from dockair.sim.camera.radiometry import extinction_1_m
 from dockair.sim.camera.sheets import SkyParameters
 from dockair.sim.camera.sky_table import DirectionTable
 
 _TILES = 48  # of the table, a side
 _NODE_RAD = 2.0 / (64 * _TILES)
-_KOSCHMIEDER = 3.912  # -ln 0.02, the contrast that an eye still sees
 _OVERHEAD = (0.0, 0.0, 1.0)
 _LAYERS = 0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0xD6E8FEB86659FD93  # keys apart: cloud above, deck, ground
 _AMBIENT_DIRECTIONS = 1024
@@ -89,9 +90,9 @@ class Sky:
             Texture(key=key ^ layer, cell_m=cell, spectral_exponent=p.cloud_spectral_exponent)
             for layer, cell in zip(_LAYERS, cells, strict=True)
         )
-        self._clear_depth = -math.log(1.0 - p.zenith / p.horizon)
+        self._clear_depth = -math.log(1.0 - p.zenith / p.airlight)
         self._clear_share = 1.0 - math.exp(-p.cloud_height_m / p.aerosol_scale_m)  # of the air, under the cloud
-        excess = _KOSCHMIEDER / weather.visibility_m - _KOSCHMIEDER / p.clear_visibility_m
+        excess = extinction_1_m(weather.visibility_m) - extinction_1_m(p.clear_visibility_m)
         self._haze_depth = max(excess, 0.0) * p.haze_depth_m
         self._shade()
         self._table = DirectionTable(self.radiance, _TILES)
@@ -147,7 +148,7 @@ class Sky:
 
     def _sky(self, d: Array, cosine: Array, with_aureole: bool) -> Array:
         """Clear sky, Eq. (2), and the cloud in it, Eq. (3)."""
-        mass = _air_mass(d[:, 2])
+        mass = self._clear_mass(d[:, 2])
         before = np.exp(-self._clear_share * self._clear_depth * mass)
         beyond = self._source(cosine, 1.0, 1.0) * (before - np.exp(-self._clear_depth * mass))
         front = self._source(cosine, self._light_below, self._direct_below) * (1.0 - before)
@@ -200,7 +201,7 @@ class Sky:
         angle = np.arccos(cosine)
         decayed = np.exp(-p.aureole_decay_1_rad * angle) - math.exp(-0.5 * math.pi * p.aureole_decay_1_rad)
         shape = p.aureole * decayed + p.molecular * cosine * cosine
-        return np.asarray(p.horizon * light * (1.0 + direct * shape))
+        return np.asarray(p.airlight * light * (1.0 + direct * shape))
 
     def _haze(self, cosine: Array) -> Array:
         """J_h of Eq. (7): the beam that gets through the haze makes J, the rest of the light is the same all round."""
@@ -216,6 +217,14 @@ class Sky:
         self._light_below = 1.0 - cover + cover * float(self._droplets.transmittance(np.asarray(depth)))
         self._direct_below = (1.0 - cover + cover * math.exp(-0.5 * depth / self._mu_sun)) / self._light_below
         self._has_deck = self._p.deck_cover > 0.0 and self._altitude_m > self._p.deck_top_m
+
+    def _clear_mass(self, sine: Array) -> Array:
+        """(n,) air mass of clear air, Eq. (2); a ray that would go through the ground counts as one that skims it."""
+        mass, level = _air_mass(sine), float(_air_mass(np.zeros(1))[0])
+        r = self._p.earth_radius_m + self._altitude_m
+        drop_m = r * sine * sine / (1.0 + np.sqrt(np.maximum(1.0 - sine * sine, 0.0)))
+        thicker = np.exp(np.minimum(drop_m, self._altitude_m) / self._p.aerosol_scale_m)
+        return np.where(sine < 0.0, 2.0 * level * thicker - mass, mass)
 
     def _depth_above(self, d: Array) -> Array:
         """(n,) optical depth straight through the layer where rays (n, 3) cross it, Eq. (3)."""

@@ -38,16 +38,15 @@ class DirectionTable:
         self._is_known = np.zeros((tiles, tiles), dtype=np.bool_)
 
     def fill(self, out: NDArray[np.float32], R_WC: Array, x: Array, y: Array) -> None:
-        """Write the value toward (1, -x_j, -y_i), C axes, into out (rows, columns)."""
-        step = max(_largest_step(x), _largest_step(y), 1e-9)
+        """Write the value toward (1, -x_j, -y_i), C axes, into out (rows, columns); x and y are evenly spaced."""
+        step = max(_step(x), _step(y), 1e-9)
         cells = self._values.shape[0] - 2  # even, so that the middle is a node; the last row and column serve nothing
         stride = max(1, int((_TILE - 1) / (0.5 * cells * _STEEPEST * step)))
-        wanted = np.zeros_like(self._is_known)
         R, columns = np.ascontiguousarray(R_WC, dtype=float), np.asarray(x, dtype=np.float32)
-        rows = np.asarray(y, dtype=float)
-        _mark(R, columns, rows, stride, cells, wanted)
-        for row, column in np.argwhere(wanted & ~self._is_known):
-            self._compute(int(row), int(column))
+        rows, missing = np.asarray(y, dtype=float), np.zeros_like(self._is_known)
+        if _mark(R, columns, rows, stride, cells, self._is_known, missing):
+            for row, column in np.argwhere(missing):
+                self._compute(int(row), int(column))
         _sample(self._values.ravel(), cells + 2, R, columns, rows, out)
 
     def _compute(self, row: int, column: int) -> None:
@@ -70,8 +69,8 @@ def directions_from_nodes(i: NDArray[np.int64], j: NDArray[np.int64], n: int) ->
     return np.stack([x / length, y / length, z / length], axis=1)
 
 
-def _largest_step(x: Array) -> float:
-    return float(np.abs(np.diff(x)).max()) if len(x) > 1 else 0.0
+def _step(x: Array) -> float:
+    return abs(float(x[-1] - x[0])) / (len(x) - 1) if len(x) > 1 else 0.0
 
 
 @njit(cache=True, error_model="numpy")
@@ -116,9 +115,20 @@ def _sample(
 
 
 @njit(cache=True)
-def _mark(R: Array, x: NDArray[np.float32], y: Array, stride: int, cells: int, wanted: NDArray[np.bool_]) -> None:
-    """Mark the tiles of every stride-th block and their neighbours; no block in between lies farther than a tile."""
-    tiles = wanted.shape[0]
+def _mark(
+    R: Array,
+    x: NDArray[np.float32],
+    y: Array,
+    stride: int,
+    cells: int,
+    known: NDArray[np.bool_],
+    missing: NDArray[np.bool_],
+) -> bool:
+    """Mark what is not known of the tiles of every stride-th block and their neighbours; say whether that is any.
+
+    No block in between lies farther than a tile.
+    """
+    tiles, any_missing = known.shape[0], False
     half = np.float32(0.5 * cells)
     for i in range(0, len(y) + stride - 1, stride):
         y_i = y[min(i, len(y) - 1)]
@@ -138,4 +148,6 @@ def _mark(R: Array, x: NDArray[np.float32], y: Array, stride: int, cells: int, w
                         r, c = min(max(a, 0), tiles - 1), tiles - 1 - c
                     if b < 0 or b >= tiles:
                         r, c = tiles - 1 - r, min(max(c, 0), tiles - 1)
-                    wanted[r, c] = True
+                    if not known[r, c]:
+                        missing[r, c] = any_missing = True
+    return any_missing

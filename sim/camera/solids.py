@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 from dockair.errors import DockairError
 from dockair.rotations import Array
-from dockair.sim.camera.occlusion import VISIBLE_GROUPS
 
+VISIBLE_GROUPS: NDArray[np.uint8] = np.array([1, 1, 1, 0, 0, 0], dtype=np.uint8)  #: MuJoCo's own default
 #: Kinds of solids, as numbers for compiled code.
 BALL, CAPSULE, CYLINDER, BOX = 0, 1, 2, 3
 _KIND_OF = {

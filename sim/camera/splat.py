@@ -26,6 +26,8 @@ from dockair.rotations import Array
 FAINTEST_E = 0.1  #: electrons per pixel at which the wings end
 SHORTEST_SMEAR_PX = 0.02  #: less counts as none: it adds 3e-5 px^2
 _REACH_CORES = 1.5  # the wings reach at least this many half-widths of the core, over which W exceeds (1)'s tail
+_REACH_WIDTHS = 1.5  # of a square's side: parts of it, or a patch of its variance, reach less far from its middle
+_SPARE_PX = 1.0  # for rounding
 _SMEAR_STEPS = 4.0  # blobs per pixel of smear; the wings, smooth over w, need 1/w
 
 #: All cores one after the other; of each level: where its core begins, its half-width, its positions per pixel.
@@ -40,6 +42,37 @@ def missing_levels(levels: Array, made: NDArray[np.bool_]) -> NDArray[np.int64]:
         middle = _middle(level, made.shape[0])
         wanted[middle - 1 : middle + 2] = True
     return np.flatnonzero(wanted & ~made)
+
+
+@njit(cache=True, error_model="numpy")
+def reach_window(
+    shape: tuple[int, int],
+    start: tuple[int, int],
+    pixels: Array,
+    smear: Array,
+    electrons: Array,
+    width_px: Array,
+    half_px: Array,
+    wing: tuple[float, float],
+) -> NDArray[np.int64]:
+    """Return which blobs may add to a pixel of a window; those left out surely do not.
+
+    Args:
+        shape: rows and columns of the window.
+        start: (row, column) of its first pixel.
+        pixels: (n, 2) as of `splat`, like the rest.
+        smear: (n, 2).
+        electrons: (n,).
+        width_px: (n,) sides of the sources.
+        half_px: (n,) largest half-widths of their cores.
+        wing: A and w.
+    """
+    near = np.zeros(pixels.shape[0], np.bool_)
+    for i in range(pixels.shape[0]):
+        length = math.hypot(smear[i, 0], smear[i, 1])
+        reach = _reach(electrons[i], half_px[i], wing) + length + _REACH_WIDTHS * width_px[i] + _SPARE_PX
+        near[i] = not _is_outside(shape, start, pixels[i, 0], pixels[i, 1], reach)
+    return np.flatnonzero(near)
 
 
 @njit(cache=True, error_model="numpy")
@@ -72,10 +105,10 @@ def splat(
             continue
         middle = _middle(levels[i], half_widths.shape[0])
         half = max(half_widths[middle - 1], half_widths[middle], half_widths[middle + 1])
-        reach = max((wing[0] * E / FAINTEST_E) ** (1.0 / 3.0), _REACH_CORES * half)
+        reach = _reach(E, half, wing)
         du, dv = smear[i]
         length = math.hypot(du, dv)
-        if _is_outside(image, start, u, v, reach + length):
+        if _is_outside(image.shape, start, u, v, reach + length):
             continue
         count = 2 + int(length / wing[1]) if length > SHORTEST_SMEAR_PX else 1
         for k in range(count):
@@ -99,14 +132,20 @@ def _along(k: int, count: int) -> float:
     return (k - 0.5 * (count - 1)) / math.sqrt(count * count - 1.0) if count > 1 else 0.0
 
 
+@njit(cache=True, error_model="numpy")
+def _reach(electrons: float, half: float, wing: tuple[float, float]) -> float:
+    """R of Eq. (1), no less than the core asks for."""
+    return max((wing[0] * electrons / FAINTEST_E) ** (1.0 / 3.0), _REACH_CORES * half)
+
+
 @njit(cache=True)
-def _is_outside(image: NDArray[np.float32], start: tuple[int, int], u: float, v: float, reach: float) -> bool:
+def _is_outside(shape: tuple[int, int], start: tuple[int, int], u: float, v: float, reach: float) -> bool:
     """Whether a square about (u, v) misses the window."""
     return (
         u + reach < start[1]
-        or u - reach > start[1] + image.shape[1] - 1
+        or u - reach > start[1] + shape[1] - 1
         or v + reach < start[0]
-        or v - reach > start[0] + image.shape[0] - 1
+        or v - reach > start[0] + shape[0] - 1
     )
 
 
@@ -165,7 +204,7 @@ def _add_core(
 ) -> None:
     """Add the interpolated core about (u, v)."""
     column, row = math.floor(u + 0.5), math.floor(v + 0.5)
-    if _is_outside(image, start, column, row, half):
+    if _is_outside(image.shape, start, column, row, half):
         return
     core = np.zeros((2 * half + 1, 2 * half + 1), np.float32)
     d = level - middle

@@ -16,7 +16,7 @@ import numpy as np
 
 from dockair.calibration import Camera
 from dockair.rotations import Array
-from dockair.sim.camera.occlusion import clear_directions
+from dockair.sim.camera.occlusion import Obstacles, clear_directions
 
 _RINGS = 4  # of equal area, with 6, 12, 18, 24 rays: 60 rays resolve 2 % of the disc
 _BLOCK_PX = 2
@@ -49,7 +49,7 @@ class SunView:
     def __init__(
         self, model: mujoco.MjModel, camera: Camera, sky: Beam, sun_W: Array, radius_rad: float, margin_px: float
     ) -> None:
-        self._model, self._camera, self._sky = model, camera, sky
+        self._obstacles, self._camera, self._sky = Obstacles.of(model), camera, sky
         self.direction_W = sun_W
         self._radius_px = camera.focal_length_px * float(np.tan(radius_rad)) + margin_px
         self._disc_W = _disc_directions(sun_W, radius_rad)
@@ -58,7 +58,7 @@ class SunView:
 
     def visible(self, data: mujoco.MjData, p_WC: Array) -> float:
         """Part of the disc that the lens sees, Eq. (1)."""
-        return float((self._dimmed * clear_directions(self._model, data, p_WC, self._disc_W)).mean())
+        return float((self._dimmed * clear_directions(self._obstacles, data, p_WC, self._disc_W)).mean())
 
     def patch(self, data: mujoco.MjData, pose: tuple[Array, Array]) -> tuple[Array, tuple[int, int]] | None:
         """What the pixels around the disc's image see of it.
@@ -83,7 +83,7 @@ class SunView:
         count = int(2.0 * reach // _BLOCK_PX) + 2
         centres = _BLOCK_PX * (np.arange(count) + 0.5) - 0.5
         rays = self._rays_W(R_WC, _BLOCK_PX * first[0] + centres, _BLOCK_PX * first[1] + centres)
-        clear = clear_directions(self._model, data, p_WC, rays).reshape(count, count)
+        clear = clear_directions(self._obstacles, data, p_WC, rays).reshape(count, count)
         start = _BLOCK_PX * first[0], _BLOCK_PX * first[1]
         fine = np.arange(float(_BLOCK_PX * count))
         dimmed = self._sky.beam(self._rays_W(R_WC, start[0] + fine, start[1] + fine)).reshape(len(fine), len(fine))

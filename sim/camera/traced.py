@@ -1,15 +1,18 @@
 """Draws solids by intersecting rays with them in closed form: the background without OpenGL.
 
-In camera axes C a block's ray is d = (1, -x, -y), so that the parameter t of a hit is its depth. In a solid's own axes,
-o being the lens and d the ray, the nearer root t of
+In camera axes C a block's ray is d = (1, -x, -y), so that the parameter t of a hit is its depth. In a solid's own axes
+and in units of its size, o being the lens and w = o x d, a ray enters
 
-    ball      |A^-1 (o + t d)|^2 = 1                      A = diag of half axes                                  (1)
-    tube      (o + t d)_x^2 + (o + t d)_y^2 = r^2                                                                (2)
-    box       |o + t d|_k <= h_k, k = x, y, z             entered where the last of three slabs is               (3)
+    ball      |o + t d|^2 = 1                  t = -(o.d + s)/d.d,   s^2 = d.d - w.w,   n = (d x w - s d)/d.d        (1)
+    tube      the same across its axis                                                                           (2)
+    box       |o + t d|_k <= 1, k = x, y, z    where the last of three slabs is entered                          (3)
 
-A capsule is a tube up to its two balls, a cylinder a tube cut by one slab. The nearest solid wins, block by block.
-Only entries count: a solid that the lens stands in is not seen, as with OpenGL's culled back faces. Each solid visits
-the blocks between the edges of its box's picture, row by row; what a block shows depends on its own ray alone.
+s and the place n of the entry are no small differences of large numbers, so that single precision is enough: w is linear
+in x, and its coefficients are worked out in double precision. A capsule is a tube up to its two balls, a cylinder a
+tube cut by one slab. The nearest solid wins, block by block. Only entries count: a solid that the lens stands in is not
+seen, as with OpenGL's culled back faces. What a block shows depends on its own ray alone; which are looked at for a
+solid, `spans` says.
+
 Not modelled: more than one ray a block (edges are steps of a block).
 Source: Glassner (ed.), An Introduction to Ray Tracing, ch. 2.
 """
@@ -23,12 +26,22 @@ from numpy.typing import NDArray
 
 from dockair.rotations import Array
 from dockair.sim.camera.solids import BALL, BOX, CAPSULE, CYLINDER, Haze, Lighting, Solids, depth_limits_m
+from dockair.sim.camera.spans import Placed, place
 
-_MOST_EDGES = 190  # pairs of 20 points: a box's corners and its edges' cuts
-_ALONG = 1e-300  # least squared component across a tube, of a ray that runs along it
-_ON_SIDE = 1.0 - 1e-9  # part of a tube's length that is surely its side
+_F = np.float32
+_ZERO, _ONE, _MISS = _F(0.0), _F(1.0), _F(np.nan)
+_ALONG = _F(1e-30)  # least squared component across a tube, of a ray that runs along it
+_FAINTEST = _F(80.0)  # exponent beyond which nothing is seen through the haze
+_LANES = 16  # rays that are taken at once
+_LOG2_E = _F(1.44269504)
+#: 2^-f on [0, 1] to 2e-9, but for rounding; highest power first, 1 at f = 0 to the bit.
+_POWER = tuple(_F(a) for a in (1.0902322e-4, -1.2747482e-3, 9.5791798e-3, -5.5490758e-2, 0.24022436, -0.69314706, 1.0))
 
+Row = NDArray[np.float32]
 Triple = tuple[float, float, float]
+Single = tuple[np.float32, np.float32, np.float32]
+#: Of one row, in a solid's axes and units: o; d = a + x b; w = p + x q.
+Rays = tuple[Single, Single, Single, Single, Single]
 
 
 class TracedSolids:
@@ -44,6 +57,7 @@ class TracedSolids:
         self._solids, self._lighting = Solids.of(model), lighting
         self._limits_m = depth_limits_m(model)
         self._memory = np.empty(0, dtype=np.float32)
+        self._placed = Placed.room_for(len(self._solids.geoms), 0)
 
     def draw(
         self,
@@ -60,21 +74,24 @@ class TracedSolids:
             out: (rows, columns) relative radiance, one value a block.
             data: positions and attitudes up to date.
             pose: R_WC and p_WC of the camera.
-            x: (columns,) tangents to the right of the axis, of the blocks' centres.
-            y: (rows,) tangents below it.
+            x: (columns,) evenly spaced tangents to the right of the axis, of the blocks' centres.
+            y: (rows,) evenly spaced tangents below it.
             haze: the air in between.
         """
         R_WC, p_WC = pose
-        s, light = self._solids, self._lighting
-        centres = (data.geom_xpos[s.geoms] - p_WC) @ R_WC
-        axes = R_WC.T @ data.geom_xmat[s.geoms].reshape(-1, 3, 3)
+        s, light, (near, far) = self._solids, self._lighting, self._limits_m
+        most = len(s.geoms) * len(y)
+        if len(self._placed.runs) < most:
+            self._placed = Placed.room_for(len(s.geoms), len(y))
         if self._memory.size < out.size:
             self._memory = np.empty(out.size, dtype=np.float32)
+        poses = s.geoms, data.geom_xpos, data.geom_xmat
+        count = place(s.kinds, s.half_sizes_m, poses, (R_WC, p_WC), x, y, near, self._placed)
         nearest = self._memory[: out.size].reshape(out.shape)
-        nearest[:] = self._limits_m[1]
+        nearest.fill(far)
         shade = light.ambient, light.direct, haze.extinction_1_m, haze.airlight
         solids = s.kinds, s.half_sizes_m, s.reflectances
-        _trace(out, nearest, solids, centres, axes, x, y, R_WC.T @ light.toward_W, shade, self._limits_m[0])
+        _trace(out, nearest, solids, self._placed, count, x, y, R_WC.T @ light.toward_W, shade, near)
 
     def close(self) -> None:
         """Nothing to free."""
@@ -85,60 +102,47 @@ def _trace(
     out: NDArray[np.float32],
     nearest: NDArray[np.float32],
     solids: tuple[NDArray[np.int64], Array, Array],
-    centres: Array,
-    axes: Array,
+    placed: Placed,
+    count: int,
     x: Array,
     y: Array,
     sun_C: Array,
     shade: tuple[float, float, float, float],
     near: float,
 ) -> None:
-    """Draw every solid; `centres` (n, 3) and `axes` (n, 3, 3) in C, `nearest` (rows, columns) depths so far."""
+    """Draw the first `count` placed solids; `nearest` (rows, columns) holds depths so far."""
     kinds, half_sizes, reflectances = solids
-    ambient, direct, extinction, air = shade
-    edges, depth_row = np.empty((_MOST_EDGES, 4)), np.empty(x.shape[0])
-    for g in range(kinds.shape[0]):
-        kind, h, M, c = kinds[g], half_sizes[g], axes[g], centres[g]
-        count = _edges_of_box(edges, c, M, h, kind == CAPSULE, near)
-        if count == 0:
-            continue
-        row, row_stop = _between(edges[:count, 1::2].min(), edges[:count, 1::2].max(), y)
-        if row == row_stop:
-            continue
+    ambient, direct, extinction, air = _F(shade[0]), _F(shade[1]), _F(shade[2]), _F(shade[3])
+    tangents = x.astype(np.float32)
+    for k in range(count):
+        g = placed.solid[k]
+        kind, h, M, c = kinds[g], half_sizes[g], placed.axes_C[k], placed.centre_C[k]
         # To the solid's own axes, in units of its size: a unit ball, a tube of radius 1, a cube of half side 1
         unit = (h[0], h[0], h[0]) if kind in (CAPSULE, CYLINDER) else (h[0], h[1], h[2])
-        half = h[2] / h[0]
         o = _to_unit(-c[0], -c[1], -c[2], M, unit)
-        sun = _to_unit(sun_C[0], sun_C[1], sun_C[2], M, (1.0, 1.0, 1.0))
-        across = _to_unit(0.0, -1.0, 0.0, M, unit)
-        for i in range(row, row_stop):
-            left, right = _crossed(edges, count, y[i])
-            column, column_stop = _between(left, right, x)
-            ahead = _to_unit(1.0, 0.0, -y[i], M, unit)
-            depths, tangents = depth_row[column:column_stop], x[column:column_stop]
+        ahead, across = _to_unit(1.0, 0.0, 0.0, M, unit), _to_unit(0.0, -1.0, 0.0, M, unit)
+        down, q = _to_unit(0.0, 0.0, -1.0, M, unit), _cross(o, across)
+        sun = _single(_to_unit(sun_C[0], sun_C[1], sun_C[2], M, (1.0, 1.0, 1.0)))
+        half, inverse = _F(h[2] / h[0]), _single((1.0 / h[0], 1.0 / h[1], 1.0 / h[2]))
+        row, stop, run = placed.rows[k]
+        for i in range(row, stop):
+            left, right = placed.runs[run + i - row]
+            if left == right:
+                continue
+            right = min(left + (right - left + _LANES - 1) // _LANES * _LANES, len(x))
+            a = (ahead[0] + y[i] * down[0], ahead[1] + y[i] * down[1], ahead[2] + y[i] * down[2])
+            rays = _single(o), _single(a), _single(across), _single(_cross(o, a)), _single(q)
+            part, picture, depths = tangents[left:right], out[i, left:right], nearest[i, left:right]
+            light = _F(reflectances[g]), ambient, direct
+            haze = extinction, air, _F(1.0 + y[i] * y[i])
             if kind == BALL:
-                _hit_ball(o, ahead, across, tangents, depths)
+                _draw_ball(rays, inverse, sun, part, light, haze, _F(near), picture, depths)
             elif kind == BOX:
-                _hit_box(o, ahead, across, tangents, depths)
+                _draw_box(rays, sun, part, light, haze, _F(near), picture, depths)
             elif kind == CAPSULE:
-                _hit_capsule(o, ahead, across, half, tangents, depths)
+                _draw_capsule(rays, half, sun, part, light, haze, _F(near), picture, depths)
             else:
-                _hit_cylinder(o, ahead, across, half, tangents, depths)
-            for j in range(column, column_stop):
-                t = depth_row[j]
-                if not near <= t < nearest[i, j]:  # NaN is a miss
-                    continue
-                nearest[i, j] = t
-                p = (
-                    o[0] + t * (ahead[0] + x[j] * across[0]),
-                    o[1] + t * (ahead[1] + x[j] * across[1]),
-                    o[2] + t * (ahead[2] + x[j] * across[2]),
-                )
-                radiance = reflectances[g] * (ambient + direct * max(0.0, _cosine(kind, p, unit, half, sun)))
-                if extinction > 0.0:
-                    clear = math.exp(-extinction * t * math.sqrt(1.0 + x[j] * x[j] + y[i] * y[i]))
-                    radiance = radiance * clear + air * (1.0 - clear)
-                out[i, j] = radiance
+                _draw_cylinder(rays, half, sun, part, light, haze, _F(near), picture, depths)
 
 
 @njit(cache=True)
@@ -152,148 +156,178 @@ def _to_unit(a: float, b: float, c: float, M: Array, unit: Triple) -> Triple:
 
 
 @njit(cache=True)
-def _edges_of_box(edges: Array, c: Array, M: Array, h: Array, capped: bool, near: float) -> int:
-    """Fill edges (m, 4), tangents (x, y) of two ends each, of the picture of a solid's box; return how many.
-
-    Of a box that reaches behind the near plane they join all corners of the part before it, pair by pair.
-    """
-    corners, picture = np.empty((8, 3)), np.empty((20, 2))
-    behind = _corners_of_box(corners, c, M, h, h[2] + h[0] if capped else h[2], near)
-    points, count = 0, 0
-    for k in range(8):
-        if corners[k, 0] >= near:
-            picture[points] = -corners[k, 1:] / corners[k, 0]
-            points += 1
-    for a in range(8):
-        for b in (a | 1, a | 2, a | 4):
-            if behind == 0 and b != a:
-                edges[count, :2], edges[count, 2:] = picture[a], picture[b]
-                count += 1
-            elif (corners[a, 0] < near) != (corners[b, 0] < near):
-                part = (near - corners[a, 0]) / (corners[b, 0] - corners[a, 0])
-                picture[points] = -(corners[a, 1:] + part * (corners[b, 1:] - corners[a, 1:])) / near
-                points += 1
-    if behind > 0:
-        for a in range(points):
-            for b in range(a):
-                edges[count, :2], edges[count, 2:] = picture[a], picture[b]
-                count += 1
-    return count
+def _cross(a: Triple, b: Triple) -> Triple:
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 @njit(cache=True)
-def _corners_of_box(corners: Array, c: Array, M: Array, h: Array, length: float, near: float) -> int:
-    """Fill (8, 3) corners in C, number k having bit 0, 1, 2 set on its far sides; return how many lie behind `near`."""
-    behind = 0
-    for k in range(8):
-        a, b, e = h[0] * (2 * (k & 1) - 1), h[1] * ((k & 2) - 1), length * ((k & 4) / 2 - 1)
-        for axis in range(3):
-            corners[k, axis] = c[axis] + M[axis, 0] * a + M[axis, 1] * b + M[axis, 2] * e
-        behind += corners[k, 0] < near
-    return behind
+def _single(a: Triple) -> Single:
+    return _F(a[0]), _F(a[1]), _F(a[2])
 
 
-@njit(cache=True)
-def _crossed(edges: Array, count: int, y: float) -> tuple[float, float]:
-    """Leftmost and rightmost tangent at which edges cross a row."""
-    left, right = math.inf, -math.inf
-    for k in range(count):
-        x0, y0, x1, y1 = edges[k, 0], edges[k, 1], edges[k, 2], edges[k, 3]
-        if (y0 - y) * (y1 - y) > 0.0:
-            continue
-        if y0 == y1:
-            left, right = min(left, x0, x1), max(right, x0, x1)
-        else:
-            at = x0 + (y - y0) / (y1 - y0) * (x1 - x0)
-            left, right = min(left, at), max(right, at)
-    return left, right
-
-
-@njit(cache=True)
-def _between(low: float, high: float, tangents: Array) -> tuple[int, int]:
-    """Range of the evenly spaced tangents in [low, high], one more on each side."""
-    n = tangents.shape[0]
-    if not (low <= high) or n == 0:
-        return 0, 0
-    step = (tangents[-1] - tangents[0]) / (n - 1) if n > 1 else 1.0
-    first = (low - tangents[0]) / step
-    last = (high - tangents[0]) / step
-    if last < -2.0 or first > n + 2.0:
-        return 0, 0
-    return max(0, math.floor(max(first, 0.0)) - 1), min(n, math.ceil(min(last, n + 0.0)) + 2)
-
-
-# The next four fill the depths at which one row of rays, d = ahead + x across, enters a solid of unit size; NaN or no
-# depth before the lens is a miss. They have no branches, so that the compiler can take several rays at once.
+# The next four draw a row of a kind of solid. What they call has no branches, so that the compiler takes several rays at
+# once; it returns the depth at which a ray enters a solid, NaN or before the lens for a miss, and the cosine of the
+# Sun's incidence there.
 
 
 @njit(cache=True, error_model="numpy")
-def _hit_ball(o: Triple, ahead: Triple, across: Triple, x: Array, depths: Array) -> None:
-    """Eq. (1)."""
-    c = o[0] * o[0] + o[1] * o[1] + o[2] * o[2] - 1.0
+def _draw_ball(
+    rays: Rays,
+    inverse: Single,
+    sun: Single,
+    x: Row,
+    light: Single,
+    haze: Single,
+    near: np.float32,
+    out: Row,
+    nearest: Row,
+) -> None:
     for j in range(x.shape[0]):
-        dx, dy, dz = ahead[0] + x[j] * across[0], ahead[1] + x[j] * across[1], ahead[2] + x[j] * across[2]
-        a = dx * dx + dy * dy + dz * dz
-        b = o[0] * dx + o[1] * dy + o[2] * dz
-        depths[j] = (-b - math.sqrt(b * b - a * c)) / a
+        t, cos = _enter_ball(rays, inverse, sun, x[j])
+        out[j], nearest[j] = _lay_over(t, cos, x[j], light, haze, near, out[j], nearest[j])
 
 
 @njit(cache=True, error_model="numpy")
-def _hit_capsule(o: Triple, ahead: Triple, across: Triple, half: float, x: Array, depths: Array) -> None:
+def _draw_capsule(
+    rays: Rays,
+    half: np.float32,
+    sun: Single,
+    x: Row,
+    light: Single,
+    haze: Single,
+    near: np.float32,
+    out: Row,
+    nearest: Row,
+) -> None:
+    for j in range(x.shape[0]):
+        t, cos = _enter_capsule(rays, half, sun, x[j])
+        out[j], nearest[j] = _lay_over(t, cos, x[j], light, haze, near, out[j], nearest[j])
+
+
+@njit(cache=True, error_model="numpy")
+def _draw_cylinder(
+    rays: Rays,
+    half: np.float32,
+    sun: Single,
+    x: Row,
+    light: Single,
+    haze: Single,
+    near: np.float32,
+    out: Row,
+    nearest: Row,
+) -> None:
+    for j in range(x.shape[0]):
+        t, cos = _enter_cylinder(rays, half, sun, x[j])
+        out[j], nearest[j] = _lay_over(t, cos, x[j], light, haze, near, out[j], nearest[j])
+
+
+@njit(cache=True, error_model="numpy")
+def _draw_box(
+    rays: Rays, sun: Single, x: Row, light: Single, haze: Single, near: np.float32, out: Row, nearest: Row
+) -> None:
+    for j in range(x.shape[0]):
+        t, cos = _enter_box(rays, sun, x[j])
+        out[j], nearest[j] = _lay_over(t, cos, x[j], light, haze, near, out[j], nearest[j])
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _enter_ball(rays: Rays, inverse: Single, sun: Single, x: np.float32) -> tuple[np.float32, np.float32]:
+    """Eq. (1); `inverse` are the inverses of the half axes."""
+    o, a, b, p, q = rays
+    dx, dy, dz = a[0] + x * b[0], a[1] + x * b[1], a[2] + x * b[2]
+    wx, wy, wz = p[0] + x * q[0], p[1] + x * q[1], p[2] + x * q[2]
+    dd = dx * dx + dy * dy + dz * dz
+    s = np.sqrt(dd - (wx * wx + wy * wy + wz * wz))
+    nx, ny, nz = dy * wz - dz * wy - s * dx, dz * wx - dx * wz - s * dy, dx * wy - dy * wx - s * dz
+    nx, ny, nz = nx * inverse[0], ny * inverse[1], nz * inverse[2]
+    cos = (nx * sun[0] + ny * sun[1] + nz * sun[2]) / np.sqrt(nx * nx + ny * ny + nz * nz)
+    return -(o[0] * dx + o[1] * dy + o[2] * dz + s) / dd, cos
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _enter_capsule(rays: Rays, half: np.float32, sun: Single, x: np.float32) -> tuple[np.float32, np.float32]:
     """Eq. (2); a ray that enters the endless tube beyond one of its ends may hit that end's ball."""
-    c = o[0] * o[0] + o[1] * o[1] - 1.0
-    for j in range(x.shape[0]):
-        dx, dy, dz = ahead[0] + x[j] * across[0], ahead[1] + x[j] * across[1], ahead[2] + x[j] * across[2]
-        a = max(dx * dx + dy * dy, _ALONG)
-        b = o[0] * dx + o[1] * dy
-        side = (-b - math.sqrt(b * b - a * c)) / a
-        z = o[2] + side * dz
-        from_end = o[2] - math.copysign(half, z)
-        a += dz * dz
-        b += from_end * dz
-        end = (-b - math.sqrt(b * b - a * (c + from_end * from_end))) / a
-        depths[j] = side if abs(z) <= half else end
+    o, a, b, p, q = rays
+    dx, dy, dz = a[0] + x * b[0], a[1] + x * b[1], a[2] + x * b[2]
+    wx, wy, wz = p[0] + x * q[0], p[1] + x * q[1], p[2] + x * q[2]
+    dd, od = max(dx * dx + dy * dy, _ALONG), o[0] * dx + o[1] * dy
+    s, k = np.sqrt(dd - wz * wz), _ONE / dd
+    side = -(od + s) * k
+    z = o[2] + side * dz
+    cos_side = ((dy * wz - s * dx) * sun[0] - (dx * wz + s * dy) * sun[1]) * k
+    to_end = -half if z > _ZERO else half  # o is moved by it along the axis
+    wx, wy = wx - to_end * dy, wy + to_end * dx
+    dd, od = dd + dz * dz, od + (o[2] + to_end) * dz
+    s, k = np.sqrt(dd - (wx * wx + wy * wy + wz * wz)), _ONE / dd
+    nx, ny, nz = dy * wz - dz * wy - s * dx, dz * wx - dx * wz - s * dy, dx * wy - dy * wx - s * dz
+    cos_end = (nx * sun[0] + ny * sun[1] + nz * sun[2]) * k
+    on_side = abs(z) <= half
+    return side if on_side else -(od + s) * k, cos_side if on_side else cos_end
 
 
-@njit(cache=True, error_model="numpy")
-def _hit_cylinder(o: Triple, ahead: Triple, across: Triple, half: float, x: Array, depths: Array) -> None:
+@njit(cache=True, error_model="numpy", inline="always")
+def _enter_cylinder(rays: Rays, half: np.float32, sun: Single, x: np.float32) -> tuple[np.float32, np.float32]:
     """Eq. (2); a ray that enters the endless tube beyond one of its ends may come in through that end."""
-    c = o[0] * o[0] + o[1] * o[1] - 1.0
-    for j in range(x.shape[0]):
-        dx, dy, dz = ahead[0] + x[j] * across[0], ahead[1] + x[j] * across[1], ahead[2] + x[j] * across[2]
-        a = max(dx * dx + dy * dy, _ALONG)
-        b = o[0] * dx + o[1] * dy
-        side = (-b - math.sqrt(b * b - a * c)) / a
-        z = o[2] + side * dz
-        end = (math.copysign(half, z) - o[2]) / dz
-        px, py = o[0] + end * dx, o[1] + end * dy
-        depths[j] = side if abs(z) <= half else (end if dz * z < 0.0 and px * px + py * py <= 1.0 else math.nan)
+    o, a, b, p, q = rays
+    dx, dy, dz = a[0] + x * b[0], a[1] + x * b[1], a[2] + x * b[2]
+    wz = p[2] + x * q[2]
+    dd, od = max(dx * dx + dy * dy, _ALONG), o[0] * dx + o[1] * dy
+    s, k = np.sqrt(dd - wz * wz), _ONE / dd
+    side, leaves = -(od + s) * k, (s - od) * k
+    z = o[2] + side * dz
+    at_end = ((half if z > _ZERO else -half) - o[2]) / dz
+    enters = (dz * z < _ZERO) & (at_end <= leaves)
+    cos_side = ((dy * wz - s * dx) * sun[0] - (dx * wz + s * dy) * sun[1]) * k
+    cos_end = sun[2] if z > _ZERO else -sun[2]
+    on_side = abs(z) <= half
+    return side if on_side else (at_end if enters else _MISS), cos_side if on_side else cos_end
 
 
-@njit(cache=True, error_model="numpy")
-def _hit_box(o: Triple, ahead: Triple, across: Triple, x: Array, depths: Array) -> None:
+@njit(cache=True, error_model="numpy", inline="always")
+def _enter_box(rays: Rays, sun: Single, x: np.float32) -> tuple[np.float32, np.float32]:
     """Eq. (3)."""
-    for j in range(x.shape[0]):
-        dx, dy, dz = ahead[0] + x[j] * across[0], ahead[1] + x[j] * across[1], ahead[2] + x[j] * across[2]
-        ax, ay, az = (-1.0 - o[0]) / dx, (-1.0 - o[1]) / dy, (-1.0 - o[2]) / dz
-        bx, by, bz = (1.0 - o[0]) / dx, (1.0 - o[1]) / dy, (1.0 - o[2]) / dz
-        enters = max(min(ax, bx), min(ay, by), min(az, bz))
-        leaves = min(max(ax, bx), max(ay, by), max(az, bz))
-        depths[j] = enters if enters <= leaves else math.nan
+    o, a, b, _, _ = rays
+    dx, dy, dz = a[0] + x * b[0], a[1] + x * b[1], a[2] + x * b[2]
+    kx, ky, kz = _ONE / dx, _ONE / dy, _ONE / dz
+    ax, ay, az = (-_ONE - o[0]) * kx, (-_ONE - o[1]) * ky, (-_ONE - o[2]) * kz
+    bx, by, bz = (_ONE - o[0]) * kx, (_ONE - o[1]) * ky, (_ONE - o[2]) * kz
+    in_x, in_y, in_z = min(ax, bx), min(ay, by), min(az, bz)
+    enters, leaves = max(in_x, in_y, in_z), min(max(ax, bx), max(ay, by), max(az, bz))
+    cos_x, cos_y = -sun[0] if dx > _ZERO else sun[0], -sun[1] if dy > _ZERO else sun[1]
+    cos_z = -sun[2] if dz > _ZERO else sun[2]
+    cos = cos_x if in_x == enters else (cos_y if in_y == enters else cos_z)
+    return enters if enters <= leaves else _MISS, cos
+
+
+@njit(cache=True, inline="always")
+def _lay_over(
+    t: np.float32,
+    cos: np.float32,
+    x: np.float32,
+    light: Single,
+    haze: Single,
+    near: np.float32,
+    behind: np.float32,
+    nearest: np.float32,
+) -> tuple[np.float32, np.float32]:
+    """Radiance, [solids, eq 1], and depth of a solid where it is nearest so far, else of what is behind it.
+
+    `light` is reflectance, ambient and direct light; `haze` extinction, airlight and 1 + y^2.
+    """
+    seen = (t >= near) & (t < nearest)  # NaN is a miss
+    radiance = light[0] * (light[1] + light[2] * (cos if cos > _ZERO else _ZERO))
+    clear = _fading(haze[0] * t * np.sqrt(haze[2] + x * x))
+    radiance = radiance * clear + haze[1] * (_ONE - clear)
+    return radiance if seen else behind, t if seen else nearest
 
 
 @njit(cache=True)
-def _cosine(kind: int, p: Triple, unit: Triple, half: float, sun: Triple) -> float:
-    """Cosine of the Sun's incidence where a solid is entered at p, in units of its size."""
-    if kind == BALL:
-        n = (p[0] / unit[0], p[1] / unit[1], p[2] / unit[2])
-    elif kind == BOX:
-        k = 0 if abs(p[0]) >= max(abs(p[1]), abs(p[2])) else (1 if abs(p[1]) >= abs(p[2]) else 2)
-        return math.copysign(1.0, p[k]) * sun[k]
-    elif abs(p[2]) < half * _ON_SIDE:
-        return p[0] * sun[0] + p[1] * sun[1]
-    elif kind == CAPSULE:
-        n = (p[0], p[1], p[2] - math.copysign(half, p[2]))
-    else:
-        return math.copysign(1.0, p[2]) * sun[2]
-    return (n[0] * sun[0] + n[1] * sun[1] + n[2] * sun[2]) / math.sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2])
+def _fading(depth: np.float32) -> np.float32:
+    """exp(-depth) of 0 to 80, of more that of 80, to 1e-7."""
+    y = (depth if depth < _FAINTEST else _FAINTEST) * _LOG2_E
+    whole = np.int32(y)
+    f = y - _F(whole)
+    power = _POWER[0]
+    for a in _POWER[1:]:
+        power = power * f + a
+    return np.int32(_F(power).view(np.int32) - (whole << np.int32(23))).view(np.float32)

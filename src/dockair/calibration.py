@@ -152,13 +152,14 @@ def _distort(ab: Array, coefficients: tuple[float, ...]) -> Array:
 class LedRing:
     """LEDs on the drogue's rim: in the drogue's y-z plane, LED k at 45 deg k from +y toward +z, shining aft (-x).
 
-    Two optional keys tell its numbering from its image: LEDs off their even places, or of unlike brightness.
+    Two optional keys are a code that tells the numbering from the image: LEDs off their even places, or LEDs driven
+    brighter or dimmer than the others.
     """
 
     diameter_m: float = 0.5
     count: int = 8
     angles_deg: tuple[float, ...] | None = None  #: (count,) each within 0.4 spacings of its even place, from +y
-    brightness: tuple[float, ...] | None = None  #: (count,) relative, any unit
+    brightness: tuple[float, ...] | None = None  #: (count,) intensity over that of the LEDs' own sheet
 
     LIMITS: ClassVar[Mapping[str, tuple[float, float, str]]] = {
         "diameter_m": (0.05, 5.0, "m"),
@@ -190,6 +191,11 @@ class LedRing:
         if self.angles_deg is not None:
             return np.asarray(np.deg2rad(np.array(self.angles_deg, dtype=float)))
         return np.asarray(2.0 * np.pi * np.arange(self.count) / self.count)
+
+    @property
+    def relative_brightness(self) -> Array:
+        """(count,) intensity of each LED over that of the LEDs' own sheet."""
+        return np.ones(self.count) if self.brightness is None else np.array(self.brightness, dtype=float)
 
     @property
     def positions_D(self) -> Array:

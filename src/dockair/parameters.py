@@ -18,6 +18,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from functools import cache
 from importlib.resources import files
+from numbers import Real
 from typing import Any, TypeVar
 
 import numpy as np
@@ -72,10 +73,9 @@ def _parameter(where: str, entry: dict[str, Any]) -> Parameter:
 
 def _check_range(where: str, parameter: Parameter, value: Any) -> None:
     expected = f"{np.asarray(parameter.value).size} number(s) in [{parameter.low}, {parameter.high}] {parameter.unit}"
-    try:
-        array = np.asarray(value, dtype=float)
-    except (TypeError, ValueError):
-        raise DockairError(where, expected=expected, got=value) from None
+    if not all(isinstance(v, Real) and not isinstance(v, bool) for v in np.asarray(value, dtype=object).ravel()):
+        raise DockairError(where, expected=expected, got=value)
+    array = np.asarray(value, dtype=float)
     right_shape = array.shape == np.shape(parameter.value)
     if not right_shape or not np.all(array >= parameter.low) or not np.all(array <= parameter.high):
         raise DockairError(where, expected=expected, got=value)

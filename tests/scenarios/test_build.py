@@ -9,6 +9,7 @@ import pytest
 
 from dockair.calibration import Camera, LedRing
 from dockair.errors import DockairError
+from dockair.messages import Window
 from dockair.nav.guidance.approach import GuidanceSettings
 from dockair.parameters import load_parameters
 from dockair.scenarios.build import MountingParameters, build, guidance_settings
@@ -104,15 +105,72 @@ def test_a_ring_that_does_not_fit_the_drogue_is_refused():
         build(load_scenario("truth_navigation", {"parameters.drogue.ring_diameter_m": 0.6}), 0)
 
 
+CODED = """diameter_m = 0.5
+count = 8
+angles_deg = [0, 45, 90, 135, 180, 225, 270, 327]
+brightness = [4, 1, 1, 1, 1, 1, 1, 1]
+"""
+
+
+def with_ring(path, sheet):
+    path.write_text(sheet, encoding="utf-8")
+    return load_scenario("truth_navigation", {"hardware.ring": str(path)})
+
+
+def test_a_scenarios_coded_ring_is_built_and_told_to_the_navigation(tmp_path):
+    parts, plain = build(with_ring(tmp_path / "ring.toml", CODED), 1), truth_parts(1)
+    ring = parts.sheets.ring
+    np.testing.assert_allclose(ring.angles_deg, [0, 45, 90, 135, 180, 225, 270, 327])
+    assert np.abs(parts.as_built.ring_positions_D - ring.positions_D).max() < 3e-3  # 5 sigma of diameter and place
+    np.testing.assert_allclose(
+        parts.as_built.led_intensity_w_sr / plain.as_built.led_intensity_w_sr, ring.brightness, rtol=1e-12
+    )
+    sites_D = [parts.world.model.site(f"led_{k}").pos for k in range(8)]
+    np.testing.assert_allclose(sites_D, ring.positions_D, atol=1e-12)
+    np.testing.assert_array_equal(parts.world.truth.p_WD, plain.world.truth.p_WD)
+
+
+@pytest.mark.parametrize(
+    ("sheet", "words"),
+    [
+        (CODED.replace("327", "340"), "angles_deg: expected LED k within 18 deg of 45 k deg"),
+        (CODED.replace("[4,", "[0,"), "brightness: expected numbers above 0"),
+        (CODED.replace("[4,", "[200,"), "ring.brightness: expected at most 89.82 times"),
+        ("diameter_m = 0.5\ncount = 6\n", "ring.count: expected 8 LEDs"),
+    ],
+)
+def test_a_ring_that_cannot_be_built_is_refused(tmp_path, sheet, words):
+    with pytest.raises(DockairError, match=words):
+        build(with_ring(tmp_path / "ring.toml", sheet), 0)
+
+
 def test_the_navigation_is_not_told_of_a_changed_drogue():
     changed = load_scenario("truth_navigation", {"parameters.drogue.mass_kg": 29.0, "parameters.hose.length_m": 20.0})
     assert np.array_equal(numbers(build(changed, 1).sheets), numbers(truth_parts(1).sheets))
 
 
+def test_the_camera_flies_at_the_scenarios_altitude_and_exposes_as_it_says():
+    """Fog, the same all round: more sunlight at 9 km than at the ground. Four frames of auto exposure move it."""
+    seen, exposures_s = {}, {}
+    for altitude_m, mode in ((0.0, "fixed"), (9000.0, "auto")):
+        camera = {"camera.exposure": mode, "camera.background": "analytic"}
+        weather = {"flight.altitude_m": altitude_m, "weather.visibility_m": 50.0}
+        parts = build(load_scenario("still_air", camera | weather), 0)
+        seen[mode] = np.median(parts.camera.background_electrons(parts.world.data, Window(0, 20, 0, 300), 1.0))
+        frames = [parts.camera.expose(parts.world.data, 0.02 * k, k, None) for k in range(4)]
+        exposures_s[mode] = [frame.exposure_s for frame in frames]
+    assert 0.6 * seen["auto"] < seen["fixed"] < 0.9 * seen["auto"]
+    assert exposures_s["fixed"] == [20e-6] * 4
+    assert exposures_s["auto"][-1] != 20e-6
+
+
 def test_a_camera_faster_than_its_sensor_can_be_read_is_refused_with_both_rates():
     slow = {"parameters.sensor.outputs": 2, "rates.camera_hz": 50}
-    with pytest.raises(DockairError, match=r"rates.camera_hz: expected a rate up to 43 Hz, .* 2 outputs .*, got 50"):
+    with pytest.raises(DockairError, match=r"rates.camera_hz: expected a rate up to 42.6 Hz, .* 2 outputs .*, got 50"):
         build(load_scenario("still_air", slow), 0)
+    long = {"parameters.exposure.longest_s": 0.02, "rates.camera_hz": 50}
+    with pytest.raises(DockairError, match=r"up to 49.9 Hz, at which it can still expose for .* 0.02 s, got 50"):
+        build(load_scenario("still_air", long), 0)
     fast = {"rates.physics_hz": 1800, "rates.gyro_hz": 450, "rates.control_hz": 180, "rates.camera_hz": 180}
     parts = build(load_scenario("still_air", fast), 0)
     assert parts.camera is not None

@@ -62,13 +62,17 @@ def test_there_is_a_right_table_of_every_kind_above():
         ("kind = 'led_off', leds = [8]", "faults[0].leds[0]: expected numbers of LEDs, from 0 to 7, got 8"),
         (
             "kind = 'led_off', cover = 0.1",
-            "faults: expected a key of the kind led_off, got 'cover'; exists: kind, leds, ",
+            "faults[0]: expected a key of the kind led_off, got 'cover'; exists: kind, leds, ",
         ),
-        ("kind = 'led_dim'", "faults: expected the key factor of the kind led_dim"),
+        ("kind = 'led_dim'", "faults[0]: expected the key factor of the kind led_dim"),
         ("kind = 'led_dim', factor = 1.5", "faults[0].factor: expected a number from 0.0 to 1.0, got 1.5"),
-        ("kind = 'led_off', start_s = 3.0, stop_s = 3.0", "faults: expected a stop_s after start_s = 3.0, got 3.0"),
+        (
+            "kind = 'led_off', start_s = 3.0, stop_s = 3.0",
+            "faults[0].stop_s: expected a time after start_s = 3.0, got 3.0",
+        ),
         ("kind = 'hot_pixels', count = 0", "faults[0].count: expected an integer from 1 to 100000, got 0"),
         ("kind = 'gyro_bias_step', rate_deg_s = [1.0]", "faults[0].rate_deg_s[1]: expected three numbers"),
+        ("kind = 'gyro_bias_step', rate_deg_s = [0.0, -1e300, 0.0]", "faults[0].rate_deg_s[1]: expected three numbers"),
         ("kind = 'exposure_stuck', exposure_us = 0.0", "faults[0].exposure_us: expected a number above 0.0"),
     ],
 )
@@ -77,6 +81,12 @@ def test_a_wrong_table_is_refused_in_one_line(table, words):
         of(table)
     assert words in str(caught.value)
     assert "\n" not in str(caught.value) and "dockair.scenarios" not in str(caught.value)
+
+
+def test_of_several_tables_the_wrong_one_is_named():
+    tables = "[{kind = 'stuck_frame'}, {kind = 'led_dim', factor = 0.5}, {kind = 'led_dim'}]"
+    with pytest.raises(DockairError, match=r"--set faults\[2\]: expected the key factor of the kind led_dim"):
+        load_scenario("default", {"faults": tables})
 
 
 @pytest.mark.parametrize("text", ["3", "[3]", '{kind = "led_off"}'])

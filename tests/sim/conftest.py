@@ -10,7 +10,8 @@ import pytest
 from dockair.calibration import Camera, LedRing, Mounting
 from dockair.rotations import exp, quaternion_from_matrix
 from dockair.sim.as_built import AsBuilt
-from dockair.sim.camera.camera import CameraNoise, CameraSheets, NearInfraredCamera
+from dockair.sim.camera.camera import CameraNoise, NearInfraredCamera
+from dockair.sim.camera.sheets import CameraSheets
 from dockair.sim.faults import Fault, Faults
 
 AS_BUILT = AsBuilt(

@@ -12,6 +12,7 @@ import pytest
 
 import dockair.assets
 from dockair.calibration import Camera, LedRing, Mounting
+from dockair.errors import DockairError
 from dockair.parameters import load_parameters
 from dockair.rotations import exp, log
 from dockair.sim.as_built import AsBuilt, AsBuiltParameters, draw_as_built
@@ -109,6 +110,33 @@ def test_brightness_lies_evenly_in_one_bin_of_two_to_one_around_the_sheets_value
     assert brightness.min() >= 2.0 / 3.0 and brightness.max() <= 4.0 / 3.0
     assert brightness.max() / brightness.min() == pytest.approx(2.0, rel=2e-3)
     assert brightness.mean() == pytest.approx(1.0, abs=4.5 * (2.0 / 3.0) / np.sqrt(12.0 * 8 * N))
+
+
+def test_a_coded_rings_leds_scatter_around_its_own_angles_and_brightnesses() -> None:
+    """Same draws as for the plain ring: the tolerances come on top."""
+    coded = LedRing(angles_deg=(0.0, 45.0, 90.0, 135.0, 180.0, 225.0, 270.0, 327.0), brightness=(4.0, *6 * (1.0,), 0.5))
+    built, plain = (
+        draw_as_built(Camera(), ring, MOUNTING, SHEET, LEDS, np.random.default_rng(6)) for ring in (coded, LedRing())
+    )
+    tolerances = plain.ring_positions_D - LedRing().positions_D
+    diameter_share = (plain.ring_positions_D - built.ring_positions_D)[:7]
+    assert np.abs(diameter_share).max() < 1e-12
+    angle = np.degrees(np.arctan2(built.ring_positions_D[7, 2], built.ring_positions_D[7, 1]))
+    assert angle == pytest.approx(327.0 - 360.0, abs=np.degrees(5.0 * SHEET.led_position_sigma_m / 0.25))
+    assert np.linalg.norm(built.ring_positions_D[7] - coded.positions_D[7]) == pytest.approx(
+        np.linalg.norm(tolerances[7]), abs=5.0 * SHEET.ring_diameter_sigma_m
+    )
+    assert np.allclose(built.led_intensity_w_sr / plain.led_intensity_w_sr, coded.brightness, rtol=1e-12)
+    record = np.array(built.record()["led_intensity_w_sr"])
+    assert np.allclose(record, built.led_intensity_w_sr - led_intensity_w_sr(LEDS) * np.array(coded.brightness))
+
+
+def test_an_led_brighter_than_its_current_allows_is_refused() -> None:
+    """1.5 A is the most that the sheet knows of; the LEDs run at 16.7 mA."""
+    allowed, refused = (LedRing(brightness=(ratio, *7 * (1.0,))) for ratio in (89.0, 91.0))
+    draw_as_built(Camera(), allowed, MOUNTING, SHEET, LEDS, np.random.default_rng(0))
+    with pytest.raises(DockairError, match=r"ring.brightness: expected at most 89.82 times .* 1.5 A, got 91"):
+        draw_as_built(Camera(), refused, MOUNTING, SHEET, LEDS, np.random.default_rng(0))
 
 
 def test_without_errors_the_hardware_is_the_sheets() -> None:

@@ -12,8 +12,9 @@ from dockair.errors import DockairError
 from dockair.messages import Window
 from dockair.rotations import exp
 from dockair.sim.as_built import AsBuilt
-from dockair.sim.camera.camera import CameraSheets, NearInfraredCamera
+from dockair.sim.camera.camera import NearInfraredCamera
 from dockair.sim.camera.radiometry import led_electrons, responses
+from dockair.sim.camera.sheets import CameraSheets
 
 SHEETS = CameraSheets.load()
 BEHIND = np.array([-0.8, 0.0, 0.6])
@@ -76,9 +77,9 @@ def _predicted(built: AsBuilt, p_CD: np.ndarray, R_CD: np.ndarray, exposure_s: f
     return float(led_electrons(response, s.leds, built.led_intensity_w_sr, p_CL, -R_CD[:, 0], exposure_s).sum())
 
 
-def _settled_peaks(world: Any, camera: NearInfraredCamera, range_m: float) -> tuple[np.ndarray, float]:
+def _settled_peaks(world: Any, camera: NearInfraredCamera, p_CD: np.ndarray) -> tuple[np.ndarray, float]:
     """Peaks of the eight LEDs as parts of full scale, and the exposure, once the exposure control has settled."""
-    world.put_drogue(camera, np.array([range_m, 0.02, -0.01]))
+    world.put_drogue(camera, p_CD)
     for k in range(8):
         frame = camera.expose(world.data, 0.0, k, FULL)
         assert frame is not None
@@ -94,11 +95,20 @@ def _settled_peaks(world: Any, camera: NearInfraredCamera, range_m: float) -> tu
 def test_with_exposure_control_the_leds_peaks_stay_between_30_and_85_percent(
     make_camera: Callable[..., Made], range_m: float
 ) -> None:
-    """LEDs of a brightness bin +-30 % wide, the Sun behind."""
+    """LEDs of a brightness bin +-30 % wide, the Sun behind; six places within a pixel.
+
+    The bin spreads peaks 1.86:1 and the place 1.75:1, together 3.3:1, which is more than 85:30. So 45 of 48.
+    """
     world, camera = make_camera(BEHIND, automatic_exposure=True, hub=False)
-    peaks, exposure_s = _settled_peaks(world, camera, range_m)
-    assert peaks.max() <= 0.85 and peaks.min() >= 0.30
-    assert SHEETS.exposure.shortest_s <= exposure_s <= SHEETS.exposure.longest_s
+    peaks = []
+    for k in range(6):
+        p_CD = np.array([range_m, 0.02 + range_m * 1.3e-4 * k, -0.01 + range_m * 0.7e-4 * k])
+        of_place, exposure_s = _settled_peaks(world, camera, p_CD)
+        peaks.extend(of_place)
+        assert SHEETS.exposure.shortest_s <= exposure_s <= SHEETS.exposure.longest_s
+    within = sum(0.30 <= peak <= 0.85 for peak in peaks)
+    assert within >= 45, sorted(peaks)
+    assert min(peaks) >= 0.25 and max(peaks) <= 0.92
 
 
 def test_nearer_than_5_metres_the_leds_clip_no_more_than_threefold(make_camera: Callable[..., Made]) -> None:
@@ -219,7 +229,7 @@ def test_the_message_says_when_how_long_and_how_much(make_camera: Callable[..., 
 
 
 def test_the_gain_turns_grey_levels_back_into_electrons(make_camera: Callable[..., Made]) -> None:
-    """The sky, 0.2 of white: mean level above the black level over the gain.
+    """The sky near the horizon, 0.08 of white: mean level above the black level over the gain.
 
     The exposure is long, so that the noise spreads over several grey levels and their rounding averages out.
     """
@@ -229,7 +239,7 @@ def test_the_gain_turns_grey_levels_back_into_electrons(make_camera: Callable[..
     frame = camera.expose(world.data, 0.0, 3, window)
     expected = camera.expected_electrons(world.data, window).mean()
     black = (SHEETS.sensor.black_level_dn - 1.5) / 4.0  # the converter's lower two bits are cut off
-    assert expected > 1500.0
+    assert expected > 600.0  # 29 of noise are half a grey level
     assert (frame.pixels.mean() - black) / frame.gain == pytest.approx(expected, rel=1e-3)
 
 

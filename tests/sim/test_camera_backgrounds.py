@@ -8,7 +8,8 @@ import pytest
 
 from dockair.messages import Window
 from dockair.rotations import exp
-from dockair.sim.camera.camera import CameraNoise, CameraSheets, NearInfraredCamera
+from dockair.sim.camera.camera import CameraNoise, NearInfraredCamera
+from dockair.sim.camera.sheets import CameraSheets
 
 pytestmark = pytest.mark.gl
 

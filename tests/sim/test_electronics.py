@@ -28,7 +28,7 @@ EVEN = replace(
     dark_current_e_s=0.0, parasitic_light_sensitivity=0.0,
 )  # fmt: skip
 #: One level an electron, 12 bits.
-FINE = replace(EVEN, converter_bits=12, outputs=4, conversion_gain_dn_e=0.25, black_level_dn=50.0)
+FINE = replace(EVEN, converter_bits=12, outputs=4, clock_hz=40e6, conversion_gain_dn_e=0.25, black_level_dn=50.0)
 FULL = (1088, 2048)
 EXPOSURE_S = 20e-6
 PATTERN = FixedPattern(SENSOR, 99, *FULL)
@@ -127,7 +127,9 @@ def test_the_noise_repeats_with_key_and_frame_and_changes_with_either() -> None:
 
 def test_prnu_scales_light_and_dark_offsets_do_not_depend_on_it() -> None:
     """Averages of 32 frames against the truth maps: slopes 1, and 0 across, to 4.5 standard errors."""
-    sensor = replace(SENSOR, parasitic_light_sensitivity=0.0, conversion_gain_dn_e=0.25, converter_bits=12, outputs=4)
+    sensor = replace(
+        SENSOR, parasitic_light_sensitivity=0.0, conversion_gain_dn_e=0.25, converter_bits=12, outputs=4, clock_hz=40e6
+    )
     part, count, light = (slice(200, 300), slice(300, 700)), 32, 2000.0
 
     def average_e(electrons: float) -> np.ndarray:
@@ -195,7 +197,9 @@ def test_the_dark_is_not_cut_off() -> None:
     assert raw.mean() == pytest.approx(truth, abs=4.5 * 1.02 / np.sqrt(raw.size))
 
 
-@pytest.mark.parametrize("sensor", [SENSOR, replace(SENSOR, converter_bits=12, outputs=4)], ids=["10 bit", "12 bit"])
+@pytest.mark.parametrize(
+    "sensor", [SENSOR, replace(SENSOR, converter_bits=12, outputs=4, clock_hz=40e6)], ids=["10 bit", "12 bit"]
+)
 def test_the_output_is_the_converters_upper_eight_bits(sensor: SensorParameters) -> None:
     image = np.linspace(0.0, 14500.0, 10000, dtype=np.float32).reshape(100, 100)
     raw = _read(image, sensor, 37, bits=sensor.converter_bits)
@@ -206,7 +210,7 @@ def test_the_output_is_the_converters_upper_eight_bits(sensor: SensorParameters)
 
 
 def test_twelve_bits_have_four_times_the_levels_of_ten_and_the_output_the_same() -> None:
-    twelve = replace(SENSOR, converter_bits=12, outputs=4)
+    twelve = replace(SENSOR, converter_bits=12, outputs=4, clock_hz=40e6)
     assert output_gain(twelve, 12) == 4.0 * output_gain(SENSOR, 10) == 4.0 * SENSOR.conversion_gain_dn_e
     assert output_gain(twelve) == output_gain(SENSOR) == SENSOR.conversion_gain_dn_e / 4.0
     assert output_black(twelve, 12) == 4.0 * SENSOR.black_level_dn
@@ -222,7 +226,10 @@ def test_outputs_that_cannot_read_so_many_bits_are_refused_with_those_that_can(b
 def test_a_scenario_that_asks_for_twelve_bits_alone_is_refused() -> None:
     with pytest.raises(DockairError, match="sensor.outputs.*got 16; exists: 2, 4"):
         load_parameters("sensor", SensorParameters, {"converter_bits": 12})
-    assert load_parameters("sensor", SensorParameters, {"converter_bits": 12, "outputs": 4}).outputs == 4
+    with pytest.raises(DockairError, match=r"sensor.clock_hz: expected up to 4e\+07 Hz, .* 12 bits, got 48000000.0"):
+        load_parameters("sensor", SensorParameters, {"converter_bits": 12, "outputs": 4})
+    twelve = {"converter_bits": 12, "outputs": 4, "clock_hz": 40e6}
+    assert load_parameters("sensor", SensorParameters, twelve).outputs == 4
 
 
 def test_a_converter_of_eleven_bits_is_refused() -> None:

@@ -24,7 +24,7 @@ from dockair.sim.camera.fixed_pattern import FixedPattern
 from dockair.sim.camera.sheets import SensorParameters
 
 TEN = load_parameters("sensor", SensorParameters)
-TWELVE = replace(TEN, converter_bits=12, outputs=4)
+TWELVE = replace(TEN, converter_bits=12, outputs=4, clock_hz=40e6)
 SHAPE = (300, 2048)
 EXPOSURE_S = 100e-6
 PHOTONS_PER_ELECTRON = 3.0

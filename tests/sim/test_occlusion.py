@@ -1,17 +1,19 @@
-"""Rays through the scene: many at once say what one at a time says."""
+"""Rays through the scene, against MuJoCo's own, one at a time."""
 
 import mujoco
 import numpy as np
 import pytest
 
-from dockair.sim.camera.occlusion import clear_directions, hidden, is_clear
+from dockair.errors import DockairError
+from dockair.sim.camera.occlusion import Obstacles, clear_directions, first_hits, hidden, is_clear
+from dockair.sim.camera.solids import VISIBLE_GROUPS
 
 EYE = np.zeros(3)
 AHEAD = np.array([1.0, 0.0, 0.0])
 _G = mujoco.mjtGeom
 
 
-def _world(*geoms: dict) -> tuple[mujoco.MjModel, mujoco.MjData]:
+def _model(*geoms: dict) -> tuple[mujoco.MjModel, mujoco.MjData]:
     spec = mujoco.MjSpec()
     for geom in geoms:
         spec.worldbody.add_geom(**geom)
@@ -19,6 +21,16 @@ def _world(*geoms: dict) -> tuple[mujoco.MjModel, mujoco.MjData]:
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     return model, data
+
+
+def _world(*geoms: dict) -> tuple[Obstacles, mujoco.MjData]:
+    model, data = _model(*geoms)
+    return Obstacles.of(model), data
+
+
+def _mujocos_hits(model: mujoco.MjModel, data: mujoco.MjData, eye: np.ndarray, directions: np.ndarray) -> np.ndarray:
+    """(n,) distances, -1 for none, a ray at a time."""
+    return np.array([mujoco.mj_ray(model, data, eye, v, VISIBLE_GROUPS, 1, -1, None) for v in directions])
 
 
 def _ball(x: float, radius: float = 1.0, **more: object) -> dict:
@@ -30,7 +42,7 @@ def crowd() -> tuple[mujoco.MjModel, mujoco.MjData]:
     """Seventy geoms of all kinds around the eye, some in hidden groups, some transparent."""
     rng = np.random.default_rng(5)
     kinds = [_G.mjGEOM_SPHERE, _G.mjGEOM_BOX, _G.mjGEOM_CAPSULE, _G.mjGEOM_ELLIPSOID, _G.mjGEOM_CYLINDER]
-    return _world(
+    return _model(
         *(
             {
                 "type": kinds[i % 5],
@@ -50,20 +62,66 @@ def _directions(n: int) -> np.ndarray:
     return v / np.linalg.norm(v, axis=1, keepdims=True)
 
 
-def test_many_directions_at_once_are_clear_where_one_by_one_they_are(crowd) -> None:
-    directions = _directions(2000)
-    together = clear_directions(*crowd, EYE, directions)
-    assert 0.2 < together.mean() < 0.98
-    assert np.array_equal(together, [is_clear(*crowd, EYE, v, np.inf) for v in directions])
+@pytest.mark.parametrize("seed", range(8))
+def test_distances_to_all_kinds_of_solids_are_mujocos(crowd, seed: int) -> None:
+    """From anywhere, so from inside of solids, too; to 1e-9 m."""
+    model, data = crowd
+    eye = np.random.default_rng(seed).uniform(-9.0, 9.0, 3)
+    hits = first_hits(Obstacles.of(model), data, eye, _directions(500), np.inf)
+    expected = _mujocos_hits(model, data, eye, _directions(500))
+    assert 20 < (expected >= 0.0).sum() < 500 or (expected >= 0.0).all()
+    assert np.array_equal(hits < 0.0, expected < 0.0)
+    np.testing.assert_allclose(hits, expected, rtol=0.0, atol=1e-9)
 
 
-def test_targets_together_are_hidden_where_one_by_one_they_are(crowd) -> None:
-    targets = _directions(2000) * np.random.default_rng(7).uniform(1.0, 25.0, (2000, 1))
-    together = hidden(*crowd, EYE, targets, 0.05)
-    distances = np.linalg.norm(targets, axis=1)
-    one_by_one = [not is_clear(*crowd, EYE, p / r, r - 0.05) for p, r in zip(targets, distances, strict=True)]
+@pytest.mark.parametrize(
+    "kind", ["mjGEOM_CAPSULE", "mjGEOM_CYLINDER", "mjGEOM_BOX", "mjGEOM_SPHERE", "mjGEOM_ELLIPSOID"]
+)
+@pytest.mark.parametrize("start", [-5.0, -0.6, 0.0, 0.6, 5.0])
+def test_a_ray_along_a_solids_axis_meets_its_near_end_or_from_inside_its_far_one(kind: str, start: float) -> None:
+    """Radius 0.5, half length 1 (capsule 1.5 with its ends); no component across at all, in the axis and beside it."""
+    obstacles, data = _world(
+        {
+            "type": getattr(_G, kind),
+            "pos": [0.0, 0.0, 0.0],
+            "size": [0.5, 1.0 if "BOX" not in kind and "ELL" not in kind else 0.5, 1.0],
+        }
+    )
+    half = {"mjGEOM_CAPSULE": 1.5, "mjGEOM_SPHERE": 0.5}.get(kind, 1.0)
+    up = np.array([[0.0, 0.0, 1.0]])
+    expected = -half - start if start < -half else (half - start if start <= half else -1.0)
+    assert first_hits(obstacles, data, np.array([0.0, 0.0, start]), up, np.inf)[0] == pytest.approx(expected, abs=1e-12)
+    assert first_hits(obstacles, data, np.array([0.51, 0.0, start]), up, np.inf)[0] == -1.0
+
+
+def test_nothing_is_met_beyond_the_reach(crowd) -> None:
+    model, data = crowd
+    expected = _mujocos_hits(model, data, EYE, _directions(2000))
+    expected[expected >= 11.0] = -1.0
+    assert (expected >= 0.0).sum() > 100
+    np.testing.assert_allclose(first_hits(Obstacles.of(model), data, EYE, _directions(2000), 11.0), expected, atol=1e-9)
+
+
+def test_directions_are_clear_where_mujocos_rays_meet_nothing(crowd) -> None:
+    model, data = crowd
+    clear = clear_directions(Obstacles.of(model), data, EYE, _directions(2000))
+    assert 0.2 < clear.mean() < 0.98
+    assert np.array_equal(clear, _mujocos_hits(model, data, EYE, _directions(2000)) < 0.0)
+
+
+def test_targets_are_hidden_where_mujocos_rays_end_before_them(crowd) -> None:
+    model, data = crowd
+    distances = np.random.default_rng(7).uniform(1.0, 25.0, 2000)
+    together = hidden(Obstacles.of(model), data, EYE, _directions(2000) * distances[:, None], 0.05)
+    hits = _mujocos_hits(model, data, EYE, _directions(2000))
     assert 0.05 < together.mean() < 0.9
-    assert np.array_equal(together, one_by_one)
+    assert np.array_equal(together, (hits >= 0.0) & (hits < distances - 0.05))
+
+
+def test_a_visible_geom_that_is_no_solid_is_refused_by_name() -> None:
+    model, _ = _model({"type": _G.mjGEOM_PLANE, "size": [1.0, 1.0, 1.0], "name": "floor"})
+    with pytest.raises(DockairError, match="geom floor"):
+        Obstacles.of(model)
 
 
 def test_a_ray_is_clear_up_to_what_it_meets() -> None:
@@ -95,10 +153,11 @@ def test_no_targets_and_no_directions_give_empty_answers() -> None:
 
 def test_rays_change_nothing_in_the_world(crowd) -> None:
     model, data = crowd
+    obstacles = Obstacles.of(model)
     before = np.empty(mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_INTEGRATION))
     mujoco.mj_getState(model, data, before, mujoco.mjtState.mjSTATE_INTEGRATION)
     poses = data.geom_xpos.copy()
-    clear_directions(model, data, EYE, _directions(10))
+    clear_directions(obstacles, data, EYE, _directions(10))
     after = np.empty_like(before)
     mujoco.mj_getState(model, data, after, mujoco.mjtState.mjSTATE_INTEGRATION)
     assert np.array_equal(before, after) and np.array_equal(poses, data.geom_xpos)

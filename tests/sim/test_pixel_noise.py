@@ -20,7 +20,7 @@ from dockair.sim.camera.sheets import SensorParameters
 FINE = replace(
     load_parameters("sensor", SensorParameters), photo_response_nonuniformity=0.0, dark_signal_nonuniformity_e=0.0,
     column_pattern_e=0.0, dark_current_e_s=0.0, parasitic_light_sensitivity=0.0, converter_bits=12, outputs=4,
-    conversion_gain_dn_e=0.25, black_level_dn=50.0,
+    clock_hz=40e6, conversion_gain_dn_e=0.25, black_level_dn=50.0,
 )  # fmt: skip
 COUNTING = replace(FINE, read_noise_e=0.0, black_level_dn=0.0)
 FULL = (1088, 2048)

@@ -7,12 +7,12 @@ import mujoco
 import numpy as np
 
 from dockair.rotations import exp
-from dockair.sim.camera.camera import CameraSheets
 from dockair.sim.camera.glints import find_glints
 from dockair.sim.camera.led_reflections import find_led_reflections
 from dockair.sim.camera.mirrors import Mirrors
 from dockair.sim.camera.point_sources import PointSources, Sources
 from dockair.sim.camera.radiometry import Responses, extinction_1_m, responses
+from dockair.sim.camera.sheets import CameraSheets
 from dockair.sim.camera.sky import Sky, Weather
 from dockair.sim.camera.sun_view import SunView
 

@@ -30,10 +30,11 @@ def test_a_full_frame_is_read_in_2_96_ms_and_a_window_in_proportion_to_its_rows(
 
 
 def test_a_quarter_of_the_outputs_takes_four_times_as_long_for_a_row_but_not_for_the_fixed_overhead() -> None:
-    """129/48 MHz x (4 x 1088 + 10 + 2 x 4) = 11.74 ms: 85 frames of 12 bits per second."""
-    twelve = replace(SENSOR, converter_bits=12, outputs=4)
-    assert readout_time_s(1088, twelve) == pytest.approx(129.0 / 48e6 * 4370.0, rel=1e-12)
-    assert row_time_s(twelve) == pytest.approx(4.0 * row_time_s(SENSOR), rel=1e-12)
+    """12 bits, 129/40 MHz x (4 x 1088 + 10 + 2 x 4) = 14.09 ms: 71 frames per second."""
+    twelve = replace(SENSOR, converter_bits=12, outputs=4, clock_hz=40e6)
+    assert readout_time_s(1088, twelve) == pytest.approx(129.0 / 40e6 * 4370.0, rel=1e-12)
+    assert 1.0 / readout_time_s(1088, twelve) == pytest.approx(71.0, abs=0.1)
+    assert row_time_s(twelve) == pytest.approx(4.0 * 48.0 / 40.0 * row_time_s(SENSOR), rel=1e-12)
 
 
 def test_latency_counts_rows_and_not_columns() -> None:

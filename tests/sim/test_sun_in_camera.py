@@ -8,8 +8,9 @@ import pytest
 
 from dockair.messages import Window
 from dockair.rotations import exp
-from dockair.sim.camera.camera import CameraSheets, NearInfraredCamera
+from dockair.sim.camera.camera import NearInfraredCamera
 from dockair.sim.camera.radiometry import Responses, responses
+from dockair.sim.camera.sheets import CameraSheets
 
 SHEETS = CameraSheets.load()
 EXPOSURE_S = SHEETS.exposure.exposure_s

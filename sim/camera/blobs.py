@@ -1,0 +1,106 @@
+"""Point sources on the image: which of them reach into the window, and their light there.
+
+A source of side a at depth x is imaged f a/x wide. Up to WIDE_PX it is spread by the lens [optics], beyond that it is
+a patch of its own width [patches]. Whether something hides a source is asked only of those whose light would reach the
+window: rays cost more than the rest, and what does not reach it leaves every pixel as it is.
+"""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from dockair.calibration import Camera
+from dockair.rotations import Array
+from dockair.sim.camera.dirt import Dirt
+from dockair.sim.camera.optics import PointSpread
+from dockair.sim.camera.patches import add_patches
+from dockair.sim.camera.point_sources import WIDE_PX, Sources
+from dockair.sim.camera.splat import reach_window
+
+_FAINTEST_E = 0.5  # a whole blob with fewer electrons is left out
+_SQUARE_SIGMAS = float(np.sqrt(12.0))  # side of a square over its standard deviation
+
+Lens = tuple[float, float, float, float, float, float, float, float]  # f, c_u, c_v [px], k1, k2, p1, p2, k3
+
+
+class Blobs:
+    """Adds the light of point sources to images.
+
+    Args:
+        camera: as built.
+        spread: of its lens.
+    """
+
+    def __init__(self, camera: Camera, spread: PointSpread) -> None:
+        self._camera, self._spread = camera, spread
+        u, v = camera.principal_point_px
+        self._lens: Lens = camera.focal_length_px, float(u), float(v), *(camera.distortion or (0.0,) * 5)
+
+    def add(
+        self,
+        image: NDArray[np.float32],
+        start: tuple[int, int],
+        sources: Sources,
+        dirt: Dirt | None,
+        are_seen: Callable[[NDArray[np.intp]], NDArray[np.bool_]],
+    ) -> None:
+        """Add what can be seen of sources to expected electrons, in place.
+
+        Args:
+            image: (rows, columns) of the window.
+            start: (row, column) of its first pixel on the sensor.
+            sources: what might be seen.
+            dirt: dims the light; None for none.
+            are_seen: tells of some of the sources (k,) which are not hidden, (k,).
+        """
+        bright = np.flatnonzero((sources.p_C[:, 0] > 0.0) & (sources.electrons > _FAINTEST_E))
+        if len(bright) == 0:
+            return
+        p_C, size, electrons = sources.p_C[bright], sources.size_m[bright], sources.electrons[bright]
+        pixels, smear = np.empty((2, len(bright), 2))
+        _image(p_C, sources.way_C_m[bright], self._lens, pixels, smear)
+        width_px = size * self._camera.focal_length_px / p_C[:, 0]
+        sizes = size.tolist()
+        halves_px = {size_m: float(self._spread.half_width_px(size_m)) for size_m in set(sizes)}
+        half_px = np.array([halves_px[size_m] for size_m in sizes])
+        near = reach_window(image.shape, start, pixels, smear, electrons, width_px, half_px, self._spread.wing)
+        near = near[are_seen(bright[near])]
+        if dirt is not None:
+            electrons = electrons * dirt.at(pixels)
+        is_wide = width_px[near] >= WIDE_PX
+        wide, narrow = near[is_wide], near[~is_wide]
+        if len(wide):
+            add_patches(image, start, pixels[wide], electrons[wide], width_px[wide] / _SQUARE_SIGMAS)
+        for size_m in sorted(set(size[narrow].tolist())):
+            of = narrow[size[narrow] == size_m]
+            self._spread.splat(image, start, pixels[of], electrons[of], p_C[of, 0], size_m, smear[of])
+
+
+@njit(cache=True)
+def _image(p_C: Array, way_C: Array, lens: Lens, pixels: Array, smear: Array) -> None:
+    """Fill (n, 2) pixels of points in front of the lens, and their motion: `Camera.pixels_from_points`, compiled."""
+    for i in range(len(p_C)):
+        x, y, z = p_C[i]
+        dx, dy, dz = 0.5 * way_C[i, 0], 0.5 * way_C[i, 1], 0.5 * way_C[i, 2]
+        pixels[i, 0], pixels[i, 1] = _pixel(x, y, z, lens)
+        u1, v1 = _pixel(x + dx, y + dy, z + dz, lens)
+        u0, v0 = _pixel(x - dx, y - dy, z - dz, lens)
+        smear[i, 0], smear[i, 1] = u1 - u0, v1 - v0
+
+
+@njit(cache=True)
+def _pixel(x: float, y: float, z: float, lens: Lens) -> tuple[float, float]:
+    """[calibration, eq 1]; NaN behind the lens."""
+    if x <= 0.0:
+        return math.nan, math.nan
+    f, c_u, c_v, k1, k2, p1, p2, k3 = lens
+    a, b = -y / x, -z / x
+    r2 = a * a + b * b
+    s = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
+    return (
+        c_u + f * (a * s + 2 * p1 * a * b + p2 * (r2 + 2 * a * a)),
+        c_v + f * (b * s + p1 * (r2 + 2 * b * b) + 2 * p2 * a * b),
+    )
