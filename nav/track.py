@@ -2,23 +2,33 @@
 
     x = [u v du dv],   x_k = F x_{k-1} + w,   F = [[I, dt I], [0, I]],   z = [u v] = H x + v,  H = [I 0]
                                                                               [Yoon 2018, eqs 27-37]
-The radius has a filter of the same form, x_r = [r dr]. The source's Q = 0.01 I and R = 4 I suit a target that rests or
-drifts. A drogue in gusts accelerates; to Q comes white acceleration of a r [px/s^2], in units of the ring's radius so
-that one number serves all ranges (a = 8 radii/s^2 is 2 m/s^2 for a 0.5 m ring):
+Radius r and roll phi have filters of the same form; filterpy runs all in one, x = [u v r phi du dv dr dphi]. The
+source's Q = 0.01 I and R = 4 I suit a target that rests or drifts. A drogue in gusts accelerates; to Q comes white
+acceleration of a r [px/s^2], in units of the ring's radius so that one number serves all ranges (a = 8 radii/s^2 is
+2 m/s^2 for a 0.5 m ring), and of alpha [rad/s^2] for the roll:
 
     Q = 0.01 I + (a r)^2 [[dt^4/4 I, dt^3/2 I], [dt^3/2 I, dt^2 I]]                        (1)
 
-With a = 0 it is the source's filter. The camera's own rotation is no motion of the drogue: `predict` takes the shift
-that the gyro says it made (f w dt), and the filter sees only the rest.
+With a = 0 it is the source's filter. The camera's own rotation is no motion of the drogue: `predict` takes the turn
+that the gyro measured and moves the ring as one at rest would be seen to move; the filter sees only the rest.
+
+Every LED is carried by itself, seen or hidden, at its place q_k on the ring of the last frame (radius 1, roll 0):
+
+    (u, v)_k = (u, v) + r R(phi) q_k                                                       (2)
+
+so that LEDs which hide and come back keep their numbers; those of a lost ring do while three sigma of its roll are less
+than half a place (22.5 degrees), which is for 0.8 to 1 s.
 
 A measurement counts when its innovation passes a chi-square gate of three degrees of freedom (centre and radius);
 otherwise the frame is a miss, like one without a ring. The window is the predicted ring with three sigma and a margin,
-shifted by the rotation to come, and wider with every miss; after `misses_until_lost` there is none (full frame), and
-the next ring found starts the filter afresh.
+shifted by the turn to come, and wider with every miss; after `misses_until_lost` there is none (full frame), and the
+next ring found starts the filter afresh.
 
-Not modelled: the ring's tilt (its window is a square around the circle), correlation between centre and radius.
+Not modelled: the ring's tilt (its window is a square around the circle), correlation between the four, what a turn does
+to the ring's shape (2 px at the frame's corner at 2 m and 45 deg/s), distortion in a turn.
 """
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -28,11 +38,20 @@ from scipy.special import chdtri
 from dockair.calibration import Camera
 from dockair.errors import DockairError
 from dockair.messages import Window
+from dockair.nav.identify.perspective import SLOTS
 from dockair.nav.identify.ring import Identification, IdentificationStatus
-from dockair.rotations import Array
+from dockair.rotations import Array, exp
 
 if TYPE_CHECKING:
     from filterpy.kalman import KalmanFilter
+
+_U, _R, _PHI = slice(0, 2), 2, 3
+_AXES = 4  # u, v, r, phi: their rates follow in the same order
+_PLACES, _RATES = np.arange(_AXES), np.arange(_AXES, 2 * _AXES)
+_CENTRE = np.array([0, 1, _AXES, _AXES + 1])
+_COMPLEX = np.array([1.0, 1.0j])
+_NEAREST_M = 0.1  # depth of a ring that a turn has brought to the lens
+_HALF_PLACE = np.pi / SLOTS  # a roll off by more is another numbering
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,6 +62,9 @@ class TrackSettings:
     measurement_variance: float = 4.0  # R's diagonal; sigma = 2 px, as the source's plots imply
     acceleration_radii_s2: float = 8.0  # a of Eq. (1): gusts of 2 m/s^2 on a 0.25 m ring
     start_velocity_radii_s: float = 4.0  # 1 sigma at the first frame: 1 m/s
+    roll_sigma_px: float = 0.5  # of a measured roll, at the ring's rim: a fit's, tilt and hidden LEDs included
+    roll_acceleration_rad_s2: float = 1.5  # alpha: a drogue that turns to and fro at 30 deg/s in 2 s
+    start_roll_rate_rad_s: float = 0.5  # 1 sigma at the first frame: 30 deg/s
     gate_probability: float = 0.9999  # of a true measurement to pass
     window_sigmas: float = 3.0
     window_margin_px: float = 12.0  # the LEDs' own spots and the rim beyond the ring's circle
@@ -58,26 +80,42 @@ class RingTracker:
         camera: whose pixels these are.
         frame_interval_s: time between frames.
         settings: None for the defaults.
+        ring_radius_m: for the range, which matters to a lever alone.
+        lever_C: (3,) the camera from the point about which it turns, in its own axes [m]; None for itself.
 
     Raises:
         DockairError: frame interval not positive.
     """
 
-    def __init__(self, camera: Camera, frame_interval_s: float, settings: TrackSettings | None = None) -> None:
+    def __init__(
+        self,
+        camera: Camera,
+        frame_interval_s: float,
+        settings: TrackSettings | None = None,
+        *,
+        ring_radius_m: float = 0.25,
+        lever_C: Array | None = None,
+    ) -> None:
         if not frame_interval_s > 0.0:
             raise DockairError("tracker.frame_interval_s", expected="a number > 0", got=frame_interval_s)
         self._camera, self._dt, self._settings = camera, frame_interval_s, settings or TrackSettings()
+        self._ring_radius_m, self._lever_C = ring_radius_m, np.zeros(3) if lever_C is None else lever_C
         self._gate = float(chdtri(3, 1.0 - self._settings.gate_probability))
-        self._centre: KalmanFilter | None = None
-        self._radius: KalmanFilter | None = None
-        self._led_offsets_px: Array = np.full((8, 2), np.nan)  # from the centre, at radius 1
+        self._kalman: KalmanFilter | None = None
+        self._places: Array = np.full(SLOTS, np.nan + 0j)  # q_k of Eq. (2), as complex numbers
         self._misses = 0
         self.normalised_innovation_squared = float("nan")  #: of the last measurement, 3 degrees of freedom
+
+    def lose(self) -> None:
+        """Give the ring up; its roll is remembered."""
+        self._misses = self._settings.misses_until_lost
+        if self._kalman is not None:
+            self._kalman.x[_AXES : _AXES + 3] = 0.0  # nothing is followed but the roll
 
     @property
     def tracking(self) -> bool:
         """Whether there is a ring to follow."""
-        return self._centre is not None
+        return self._kalman is not None and self._misses < self._settings.misses_until_lost
 
     @property
     def misses(self) -> int:
@@ -87,135 +125,175 @@ class RingTracker:
     @property
     def centre_px(self) -> Array:
         """(2,) of the ring; NaN when there is none."""
-        return np.full(2, np.nan) if self._centre is None else np.array(self._centre.x[:2, 0])
+        return self._state[_U]
 
     @property
     def velocity_px_s(self) -> Array:
         """(2,) of the centre, camera rotation taken out; NaN when there is none."""
-        return np.full(2, np.nan) if self._centre is None else np.array(self._centre.x[2:, 0])
+        return self._state[_AXES : _AXES + 2]
 
     @property
     def radius_px(self) -> float:
         """Of the ring; NaN when there is none."""
-        return float("nan") if self._radius is None else float(self._radius.x[0, 0])
+        return float(self._state[_R])
 
     @property
     def covariance(self) -> Array:
         """(4, 4) of (u, v, du, dv) [px, px/s]; NaN when there is none."""
-        return np.full((4, 4), np.nan) if self._centre is None else np.array(self._centre.P)
+        if self._kalman is None or not self.tracking:
+            return np.full((4, 4), np.nan)
+        return np.array(self._kalman.P[np.ix_(_CENTRE, _CENTRE)])
+
+    @property
+    def roll_rad(self) -> float:
+        """Expected roll of LED 0, as `identify` defines it; NaN when it no longer tells one numbering from the next."""
+        if self._kalman is None or not 3.0 * np.sqrt(self._kalman.P[_PHI, _PHI]) < _HALF_PLACE:
+            return float("nan")
+        return math.remainder(self._kalman.x[_PHI, 0], 2.0 * math.pi)
 
     @property
     def expected_led_px(self) -> Array | None:
         """(8, 2) where each numbered LED should be now, for `identify`; None when there is no ring."""
-        if self._centre is None:
+        if self._kalman is None or not self.tracking:
             return None
-        return self.centre_px + self.radius_px * self._led_offsets_px
+        u, v, r, phi = self._kalman.x[:_AXES, 0]
+        z = r * np.exp(1j * phi) * self._places  # Eq. (2)
+        return np.column_stack([u + z.real, v + z.imag])
 
     @property
     def expected_sigma_px(self) -> float:
         """Standard deviation of the expected centre, the larger axis; NaN when there is none."""
         return float(np.sqrt(np.linalg.eigvalsh(self.covariance[:2, :2])[-1])) if self.tracking else float("nan")
 
-    def predict(self, shift_px: Array | None = None) -> None:
-        """Advance by one frame interval.
+    def predict(self, turn_C: Array | None = None, interval_s: float | None = None) -> None:
+        """Advance to the next frame.
 
         Args:
-            shift_px: (2,) image shift since the last frame that the camera's own rotation made [px].
+            turn_C: (3,) rotation vector of the camera since the last frame, in its own axes [rad].
+            interval_s: time since the last frame; None for the frame interval.
         """
-        if self._centre is None or self._radius is None:
+        if self._kalman is None:
             return
-        acceleration = self._settings.acceleration_radii_s2 * self.radius_px
-        self._centre.predict(Q=self._process_noise(2, acceleration))
-        self._radius.predict(Q=self._process_noise(1, acceleration))
-        if shift_px is not None:
-            self._centre.x[:2, 0] += shift_px
+        dt = self._dt if interval_s is None else interval_s
+        self._kalman.F[_PLACES, _RATES] = dt
+        self._kalman.predict(Q=self._process_noise(dt))
+        if turn_C is not None:
+            x = self._kalman.x[:, 0]
+            x[0], x[1], x[_R], roll = self._turned(x, turn_C)
+            x[_PHI] += roll
+            velocity = (x[_AXES] + 1j * x[_AXES + 1]) * np.exp(1j * roll)
+            x[_AXES], x[_AXES + 1] = velocity.real, velocity.imag
 
     def update(self, identification: Identification) -> bool:
         """Take what was identified in the frame; true when it was accepted (or began a track)."""
         found = identification.status is IdentificationStatus.FOUND
-        if self._centre is None or self._radius is None:
+        if not self.tracking:
             if found:
                 self._begin(identification)
             return found
         if not found or not self._passes(identification):
-            self._miss()
+            self._misses += 1
+            if not self.tracking:
+                self.lose()
             return False
-        self._centre.update(identification.centre_px.reshape(2, 1))
-        self._radius.update(np.array([[identification.radius_px]]))
+        self._correct(identification)
         self._remember(identification)
         return True
 
-    def window(self, shift_px: Array | None = None) -> Window | None:
+    def window(self, turn_C: Array | None = None, interval_s: float | None = None) -> Window | None:
         """What the camera should read next; None for the full frame.
 
         Args:
-            shift_px: (2,) image shift until then that the camera's rotation is expected to make [px].
+            turn_C: (3,) rotation vector of the camera expected until then, in its own axes [rad].
+            interval_s: from the last frame to that one; None for the frame interval.
         """
-        if self._centre is None or self._radius is None:
+        if self._kalman is None or not self.tracking:
             return None
-        s = self._settings
-        F, H = self._centre.F, self._centre.H
-        Q = self._process_noise(2, s.acceleration_radii_s2 * self.radius_px)
-        centre = (H @ F @ self._centre.x)[:, 0] + (0.0 if shift_px is None else np.asarray(shift_px))
-        sigma = np.sqrt(np.diag(H @ (F @ self._centre.P @ F.T + Q) @ H.T))
-        radius = self.radius_px + float(self._radius.x[1, 0]) * self._dt
-        radius += s.window_sigmas * float(np.sqrt(self._radius.P[0, 0]))
-        half = radius * (1.0 + s.window_margin_radii) + s.window_margin_px + s.window_sigmas * sigma
+        s, x, P = self._settings, self._kalman.x[:, 0], self._kalman.P
+        dt = self._dt if interval_s is None else interval_s
+        predicted = x[_PLACES] + dt * x[_RATES]
+        variance = P[_PLACES, _PLACES] + 2.0 * dt * P[_PLACES, _RATES] + dt**2 * P[_RATES, _RATES]
+        sigma = np.sqrt(variance + np.diag(self._process_noise(dt))[_PLACES])
+        centre = predicted[_U] if turn_C is None else self._turned(predicted, turn_C)[:2]
+        radius = predicted[_R] + s.window_sigmas * sigma[_R]
+        half = radius * (1.0 + s.window_margin_radii) + s.window_margin_px + s.window_sigmas * sigma[_U]
         half = half * s.growth_per_miss**self._misses
-        u, v = np.floor(centre - half).astype(int)
-        u_stop, v_stop = np.ceil(centre + half).astype(int) + 1
-        window = Window(
-            max(int(v), 0), min(int(v_stop), self._camera.height_px),
-            max(int(u), 0), min(int(u_stop), self._camera.width_px),
-        )  # fmt: skip
+        sensor = np.array([self._camera.width_px, self._camera.height_px])
+        u, v = np.maximum(np.floor(centre - half), 0).astype(int).tolist()
+        u_stop, v_stop = np.minimum(np.ceil(centre + half) + 1, sensor).astype(int).tolist()
+        window = Window(v, v_stop, u, u_stop)
         rows, columns = window.shape
         return window if rows > 0 and columns > 0 and window != self._camera.full_window else None
 
-    def reset(self) -> None:
-        """Forget the ring."""
-        self._centre = self._radius = None
-        self._led_offsets_px = np.full((8, 2), np.nan)
-        self._misses = 0
+    @property
+    def _state(self) -> Array:
+        if self._kalman is None or not self.tracking:
+            return np.full(2 * _AXES, np.nan)
+        return np.array(self._kalman.x[:, 0])
 
-    def _process_noise(self, axes: int, acceleration: float) -> Array:
-        dt, eye = self._dt, np.eye(axes)
-        walk = np.block([[dt**4 / 4.0 * eye, dt**3 / 2.0 * eye], [dt**3 / 2.0 * eye, dt**2 * eye]])
-        return self._settings.process_variance * np.eye(2 * axes) + acceleration**2 * walk  # Eq. (1)
+    def _turned(self, state: Array, turn_C: Array) -> tuple[float, float, float, float]:
+        """u, v, r of a ring at rest when the camera has turned, and by what its roll has changed."""
+        f, (cu, cv) = self._camera.focal_length_px, self._camera.principal_point_px
+        u, v, r = float(state[0]), float(state[1]), max(float(state[_R]), 1.0)
+        a, b, ahead_m = (cu - u) / f, (cv - v) / f, f * self._ring_radius_m / r
+        p_C = np.array([ahead_m, a * ahead_m, b * ahead_m]) + self._lever_C
+        x, y, z = (p_C @ exp(turn_C) - self._lever_C).tolist()  # p <- exp(-turn) p about the end of the lever
+        nearer = ahead_m / max(x, _NEAREST_M)
+        roll = -float(turn_C[0] + 0.5 * (a * turn_C[1] + b * turn_C[2]))  # curl of the image's flow
+        return u + f * (a - y / ahead_m * nearer), v + f * (b - z / ahead_m * nearer), r * nearer, roll
 
-    def _filter(self, start: Array, velocity_sigma: float) -> "KalmanFilter":
+    def _process_noise(self, dt: float) -> Array:
+        """(8, 8) Q, Eq. (1)."""
+        assert self._kalman is not None
+        s, r = self._settings, max(float(self._kalman.x[_R, 0]), 1.0)
+        a2 = np.array([*3 * ((s.acceleration_radii_s2 * r) ** 2,), s.roll_acceleration_rad_s2**2])
+        q = s.process_variance * np.array([1.0, 1.0, 1.0, r**-2.0])
+        Q = np.zeros((2 * _AXES, 2 * _AXES))
+        Q[_PLACES, _PLACES], Q[_RATES, _RATES] = q + 0.25 * dt**4 * a2, q + dt**2 * a2
+        Q[_PLACES, _RATES] = Q[_RATES, _PLACES] = 0.5 * dt**3 * a2
+        return Q
+
+    def _measurement_noise(self, radius_px: float) -> Array:
+        variance = self._settings.measurement_variance
+        return np.array([variance, variance, variance, (self._settings.roll_sigma_px / radius_px) ** 2])
+
+    def _begin(self, found: Identification) -> None:
         from filterpy.kalman import KalmanFilter  # takes a second to import, so only where it is used
 
-        axes = len(start)
-        eye, zero = np.eye(axes), np.zeros((axes, axes))
-        kalman = KalmanFilter(dim_x=2 * axes, dim_z=axes)
-        kalman.F = np.block([[eye, self._dt * eye], [zero, eye]])
-        kalman.H = np.hstack([eye, zero])
-        kalman.R = self._settings.measurement_variance * eye
-        kalman.P = np.diag([self._settings.measurement_variance] * axes + [velocity_sigma**2] * axes)
-        kalman.x = np.concatenate([start, np.zeros(axes)]).reshape(-1, 1)
-        return kalman
-
-    def _begin(self, identification: Identification) -> None:
-        velocity_sigma = self._settings.start_velocity_radii_s * identification.radius_px
-        self._centre = self._filter(identification.centre_px, velocity_sigma)
-        self._radius = self._filter(np.array([identification.radius_px]), velocity_sigma)
+        s, r = self._settings, found.radius_px
+        rates = np.array([*3 * (s.start_velocity_radii_s * r,), s.start_roll_rate_rad_s])
+        kalman = KalmanFilter(dim_x=2 * _AXES, dim_z=_AXES)
+        kalman.F, kalman.H = np.eye(2 * _AXES), np.eye(_AXES, 2 * _AXES)
+        kalman.P = np.diag(np.concatenate([self._measurement_noise(r), rates**2]))
+        kalman.x = np.concatenate([_measured(found), np.zeros(_AXES)]).reshape(-1, 1)
+        self._kalman = kalman
         self.normalised_innovation_squared = float("nan")
-        self._remember(identification)
+        self._remember(found)
 
-    def _remember(self, identification: Identification) -> None:
+    def _correct(self, found: Identification) -> None:
+        assert self._kalman is not None
+        z, x, P = _measured(found), self._kalman.x, self._kalman.P
+        off = math.remainder(z[_PHI] - x[_PHI, 0], 2.0 * math.pi)
+        if abs(off) > _HALF_PLACE:  # the numbers have changed: a code was read
+            x[_PHI], off, P[_PHI], P[:, _PHI] = z[_PHI], 0.0, 0.0, 0.0
+            P[_PHI, _PHI] = _HALF_PLACE**2
+        z[_PHI] = x[_PHI, 0] + off  # without a jump at half a turn
+        self._kalman.update(z, R=np.diag(self._measurement_noise(found.radius_px)))
+
+    def _remember(self, found: Identification) -> None:
         self._misses = 0
-        self._led_offsets_px = (identification.led_pixels_px - identification.centre_px) / identification.radius_px
+        offset = (found.led_pixels_px - found.centre_px) @ _COMPLEX
+        self._places = offset / found.radius_px * np.exp(-1j * found.roll_rad)
 
-    def _passes(self, identification: Identification) -> bool:
-        nis = 0.0
-        for kalman, z in ((self._centre, identification.centre_px), (self._radius, [identification.radius_px])):
-            assert kalman is not None
-            innovation = np.asarray(z) - (kalman.H @ kalman.x)[:, 0]
-            nis += float(innovation @ np.linalg.solve(kalman.H @ kalman.P @ kalman.H.T + kalman.R, innovation))
-        self.normalised_innovation_squared = nis
-        return nis <= self._gate
+    def _passes(self, found: Identification) -> bool:
+        assert self._kalman is not None
+        kept = slice(0, _PHI)  # a roll that is off is another numbering, which `identify` has to settle
+        S = self._kalman.P[kept, kept] + np.diag(self._measurement_noise(found.radius_px)[kept])
+        innovation = _measured(found)[kept] - self._kalman.x[kept, 0]
+        self.normalised_innovation_squared = float(innovation @ np.linalg.solve(S, innovation))
+        return self.normalised_innovation_squared <= self._gate
 
-    def _miss(self) -> None:
-        self._misses += 1
-        if self._misses >= self._settings.misses_until_lost:
-            self.reset()
+
+def _measured(found: Identification) -> Array:
+    """(4,) z."""
+    return np.array([*found.centre_px, found.radius_px, found.roll_rad])

@@ -18,12 +18,13 @@ is the expected number of impostors.
 
 rho of Eq. (1) is the larger of two densities, of all candidates but three over their box and of those that are no
 members within 1.6 radii: reflections crowd about the drogue. Eq. (2) counts no members in either, and a fifth of a blob
-more near by, so that a member may be the only blob there is.
+more near by, so that a member may be the only blob there is. Both look at places only; see `brightness`.
 """
 
 from math import comb
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from dockair.nav.identify.perspective import SLOTS, RingFit
@@ -31,6 +32,7 @@ from dockair.rotations import Array
 
 Count = NDArray[np.int64] | int
 
+_WAYS = np.array([comb(SLOTS - 3, k) for k in range(SLOTS - 2)])
 _NEIGHBOURHOOD_RADII = 1.6
 _UNSEEN = 0.2  # blobs
 _LARGEST_EXPONENT = 50.0
@@ -38,7 +40,8 @@ _LARGEST_EXPONENT = 50.0
 
 def box_area_px2(points: Array) -> float:
     """Area of the candidates' box, at least one pixel."""
-    return max(float(np.prod(np.ptp(points, axis=0))), 1.0)
+    (left, top), (right, bottom) = points.min(axis=0), points.max(axis=0)
+    return max(float((right - left) * (bottom - top)), 1.0)
 
 
 def log10_false_rings(tested: Count, count: Count, p: Array | float) -> Array:
@@ -49,22 +52,31 @@ def log10_false_rings(tested: Count, count: Count, p: Array | float) -> Array:
         count: m, 3 to 8.
         p: as above.
     """
-    ways = np.array([comb(SLOTS - 3, k) for k in range(SLOTS - 2)])[np.asarray(count) - 3]
-    return np.asarray(
-        np.log10(np.maximum(tested, 1) * ways) + (np.asarray(count) - 3) * np.log10(np.clip(p, 1e-12, 1.0))
-    )
+    more = np.asarray(count) - 3
+    p = np.minimum(np.maximum(p, 1e-12), 1.0)
+    return np.asarray(np.log10(np.maximum(tested, 1) * _WAYS[more]) + more * np.log10(p))
 
 
 def densities_px2(points: Array, fit: RingFit) -> tuple[float, float]:
     """Clutter by Eq. (1) and by Eq. (2), rho, about a fitted ring [1/px^2]."""
-    other = np.ones(len(points), bool)
-    other[fit.candidate[fit.candidate >= 0]] = False
-    neighbourhood = np.pi * (_NEIGHBOURHOOD_RADII * fit.radius_px) ** 2
-    near = np.count_nonzero(np.pi * ((points[other] - fit.centre_px) ** 2).sum(axis=1) < neighbourhood)
+    reach = _NEIGHBOURHOOD_RADII * fit.radius_px
+    neighbourhood = np.pi * reach**2
+    near = _others_near(points, fit.candidate, fit.centre_px, reach)
     # a box that the ring fills holds at least the ring's own area
     area = max(box_area_px2(points), np.pi * fit.radius_px**2)
     accident = max(max(len(points) - 3, 1) / area, near / neighbourhood)
     return accident, max((len(points) - fit.count) / area, (near + _UNSEEN) / neighbourhood)
+
+
+@njit(cache=True)
+def _others_near(points, candidate, centre, reach):  # type: ignore[no-untyped-def]
+    """Number of points nearer to the centre than reach, without the candidates."""
+    near = 0
+    for k in range(len(points)):
+        inside = (points[k, 0] - centre[0]) ** 2 + (points[k, 1] - centre[1]) ** 2 < reach * reach
+        if inside and not (candidate == k).any():
+            near += 1
+    return near
 
 
 def member_odds(points: Array, fit: RingFit, density: float, tolerance_sigmas: float) -> Array:
@@ -78,8 +90,7 @@ def member_odds(points: Array, fit: RingFit, density: float, tolerance_sigmas: f
     """
     filled = fit.candidate >= 0
     variance = (fit.tolerance_px / tolerance_sigmas) ** 2
-    squares = np.zeros(SLOTS)
-    squares[filled] = ((points[fit.candidate[filled]] - fit.slots_px[filled]) ** 2).sum(axis=1)
+    squares = np.where(filled, ((points[fit.candidate] - fit.slots_px) ** 2).sum(axis=1), 0.0)
     m = fit.count
     g = m / (m - 3)
     exponent = np.minimum(0.5 * g * squares / variance, _LARGEST_EXPONENT)

@@ -11,9 +11,17 @@ so the accumulator can be checked against (1), and no rounding of drawn circles 
 a coarse grid for a large ring, a fine one for a small ring, and radii stand in a geometric row, so the cost of a radius
 does not depend on it: about 2 pi / cell votes a candidate times the band's width in cells.
 
+Among clutter the highest vote is the largest circle's, whose band holds the most clutter. With n candidates over an
+area A a band holds 4 pi gate r^2 n/A of them by accident, and a peak of m votes is as good as it is seldom,
+
+    -ln(expected accidental cells like it) = m ln(m/mu) - m + mu - ln(A/(cell r)^2),   mu = 4 pi gate r^2 n/A      (2)
+
+by Chernoff's bound of the Poisson tail. `find_circles` ranks by (2) when it is told n/A, else by votes as the source.
+
 Bounded by the range of radii (give the prior's when there is one), the disc in which the centre can be, and the number
-of candidates; those too far from all others to be on a common circle do not vote. Fooled by any second ring of the same
-size; a tilted ring spreads its votes over the gate.
+of candidates: of n only groups vote of which each is within reach of the next, on a grid of no more than
+(2 n (1 + gate) + 2)^2 / cell^2 cells, whatever the radius. Fooled by any second ring of the same size; a tilted ring
+spreads its votes over the gate.
 """
 
 from dataclasses import dataclass
@@ -90,8 +98,9 @@ def find_circles(
     gate: float = 0.15,
     peaks: int = 12,
     min_votes: int = 4,
+    clutter_px2: float | None = None,
 ) -> Peaks:
-    """The cells with most votes over all radii.
+    """The best cells over all radii.
 
     Args:
         points: (n, 2) candidates [px].
@@ -101,72 +110,126 @@ def find_circles(
         gate: half width of the band as a fraction of the radius.
         peaks: how many to return.
         min_votes: cells with fewer are no peaks.
+        clutter_px2: n/A of Eq. (2) [1/px^2]; None: the most votes are the best.
     """
-    gate_centre = np.array(centre_gate[:2])
+    middle, reach = np.array(centre_gate[:2]), centre_gate[2]
     table = _peaks(
-        np.ascontiguousarray(points), radii, gate_centre - centre_gate[2], gate_centre + centre_gate[2],
-        cell, gate, peaks, min_votes,
+        np.ascontiguousarray(points), radii, middle - reach, middle + reach,
+        cell, gate, peaks, min_votes, clutter_px2 or 0.0,
     )  # fmt: skip
     return Peaks(centre_px=table[:, :2], radius_px=table[:, 2], votes=table[:, 3].astype(np.int64))
 
 
+def triples_near(points: Array, peaks: Peaks, band: float) -> NDArray[np.int64]:
+    """(m, 3) indices, ascending, of points (n, 2) that are three in one peak's band: within `band` r of its circle."""
+    distance = np.hypot(*(points[:, None] - peaks.centre_px).transpose(2, 0, 1))
+    member = np.abs(distance - peaks.radius_px) <= band * peaks.radius_px
+    bits = (member * (np.uint64(1) << np.arange(len(peaks.votes), dtype=np.uint64))).sum(axis=1, dtype=np.uint64)
+    return np.asarray(_triples_sharing_a_bit(bits))
+
+
 @njit(cache=True)
-def _insert(table, filled, u, v, r, votes, spacing):  # type: ignore[no-untyped-def]
-    """Put a cell among the best unless a better one lies near it; it takes the place of worse ones near it."""
+def _triples_sharing_a_bit(bits):  # type: ignore[no-untyped-def]
+    n = len(bits)
+    triples = np.empty((n * (n - 1) * (n - 2) // 6, 3), np.int64)
+    m = 0
+    for i in range(n):
+        for j in range(i + 1, n):
+            both = bits[i] & bits[j]
+            if both != 0:
+                for k in range(j + 1, n):
+                    if both & bits[k] != 0:
+                        triples[m, 0], triples[m, 1], triples[m, 2] = i, j, k
+                        m += 1
+    return triples[:m]
+
+
+@njit(cache=True)
+def _insert(table, filled, u, v, r, votes, worth, spacing):  # type: ignore[no-untyped-def]
+    """Put a cell among the best unless a better one lies near it; it takes the place of a worse one near it."""
+    place, worst = filled, 0
     for k in range(filled):
         near = np.hypot(table[k, 0] - u, table[k, 1] - v) + abs(table[k, 2] - r) <= spacing * max(r, table[k, 2])
         if near:
-            if table[k, 3] < votes:
-                table[k, 0], table[k, 1], table[k, 2], table[k, 3] = u, v, r, votes
-            return filled
-    if filled < len(table):
-        filled += 1
-        table[filled - 1, 3] = -1.0
-    worst = 0
-    for k in range(filled):
-        if table[k, 3] < table[worst, 3]:
+            place = k
+            break
+        if table[k, 4] < table[worst, 4]:
             worst = k
-    if votes > table[worst, 3]:
-        table[worst, 0], table[worst, 1], table[worst, 2], table[worst, 3] = u, v, r, votes
-    return filled
+    if place == len(table):
+        place = worst
+    if place < filled and worth <= table[place, 4]:
+        return filled
+    table[place, 0], table[place, 1], table[place, 2], table[place, 3], table[place, 4] = u, v, r, votes, worth
+    return max(filled, place + 1)
 
 
 @njit(cache=True)
-def _in_company(points, reach, needed):  # type: ignore[no-untyped-def]
-    """Points with at least so many, themselves included, within reach."""
-    keep = np.zeros(len(points), np.bool_)
+def _groups(points, reach):  # type: ignore[no-untyped-def]
+    """(n,) number of each point's group: all whom steps within reach join."""
+    group = np.full(len(points), -1)
+    todo = np.empty(len(points), np.int64)
+    count = 0
     for i in range(len(points)):
-        near = 0
-        for j in range(len(points)):
-            near += (points[i, 0] - points[j, 0]) ** 2 + (points[i, 1] - points[j, 1]) ** 2 <= reach * reach
-        keep[i] = near >= needed
-    return points[keep]
+        if group[i] >= 0:
+            continue
+        group[i], todo[0], left = count, i, 1
+        while left > 0:
+            left -= 1
+            j = todo[left]
+            for k in range(len(points)):
+                near = (points[j, 0] - points[k, 0]) ** 2 + (points[j, 1] - points[k, 1]) ** 2 <= reach * reach
+                if group[k] < 0 and near:
+                    group[k], todo[left] = count, k
+                    left += 1
+        count += 1
+    return group
 
 
 @njit(cache=True)
-def _peaks(all_points, radii, gate_lower, gate_upper, cell, gate, capacity, min_votes):  # type: ignore[no-untyped-def]
-    table = np.zeros((capacity, 4))
+def _worth(most, r, cell, gate, clutter, candidates):  # type: ignore[no-untyped-def]
+    """(most + 1,) Eq. (2) for every number of votes; the votes themselves without clutter."""
+    worth = np.arange(most + 1).astype(np.float64)
+    if clutter > 0.0:
+        mu = 4.0 * np.pi * gate * r * r * clutter
+        cells = np.log(candidates / clutter / (cell * r) ** 2)
+        for m in range(1, most + 1):
+            worth[m] = (m * np.log(m / mu) - m + mu if m > mu else 0.0) - cells
+    return worth
+
+
+@njit(cache=True)
+def _peaks(  # type: ignore[no-untyped-def]
+    all_points, radii, gate_lower, gate_upper, cell, gate, capacity, min_votes, clutter
+):
+    table = np.zeros((capacity, 5))
     filled = 0
+    lower, upper = np.empty(2), np.empty(2)
     for r in radii:
         width = cell * r
-        # all that vote for a cell lie within the band's outer diameter: the lonely need not vote
-        points = _in_company(all_points, 2.0 * (1.0 + gate) * r, min_votes)
-        if len(points) == 0:
-            continue
-        lower, upper = np.empty(2), np.empty(2)
-        for axis in range(2):
-            lower[axis] = max(points[:, axis].min(), gate_lower[axis])
-            upper[axis] = min(points[:, axis].max(), gate_upper[axis])
-        if lower[0] > upper[0] or lower[1] > upper[1]:
-            continue
-        # the centre of a ring of which at least four LEDs are seen may lie outside their box, by less than a radius
-        u0, v0 = lower[0] - r, lower[1] - r
-        rows = int((upper[1] - lower[1] + 2.0 * r) / width) + 1
-        columns = int((upper[0] - lower[0] + 2.0 * r) / width) + 1
-        votes = _accumulate(points, r, u0, v0, rows, columns, width, gate)
-        for i in range(rows):
-            for j in range(columns):
-                if votes[i, j] >= min_votes:
-                    filled = _insert(table, filled, u0 + j * width, v0 + i * width, r, votes[i, j], 3.0 * cell)
-    order = np.argsort(-table[:filled, 3])
+        # all that vote for a cell lie within the band's outer diameter
+        group = _groups(all_points, 2.0 * (1.0 + gate) * r)
+        worth = _worth(len(all_points), r, cell, gate, clutter, len(all_points))
+        for g in range(group.max() + 1 if len(group) else 0):
+            points = all_points[group == g]
+            if len(points) < min_votes:
+                continue
+            for axis in range(2):
+                lower[axis] = max(points[:, axis].min(), gate_lower[axis])
+                upper[axis] = min(points[:, axis].max(), gate_upper[axis])
+            if lower[0] > upper[0] or lower[1] > upper[1]:
+                continue
+            # the centre of a ring of which at least four LEDs are seen may lie outside their box, by less than a radius
+            u0, v0 = lower[0] - r, lower[1] - r
+            rows = int((upper[1] - lower[1] + 2.0 * r) / width) + 1
+            columns = int((upper[0] - lower[0] + 2.0 * r) / width) + 1
+            votes = _accumulate(points, r, u0, v0, rows, columns, width, gate)
+            least = table[:, 4].min() if filled == capacity else -np.inf
+            for i in range(rows):
+                for j in range(columns):
+                    m = votes[i, j]
+                    if m >= min_votes and worth[m] > least:
+                        u, v = u0 + j * width, v0 + i * width
+                        filled = _insert(table, filled, u, v, r, m, worth[m], 3.0 * cell)
+                        least = table[:, 4].min() if filled == capacity else -np.inf
+    order = np.argsort(-table[:filled, 4])
     return table[:filled][order]

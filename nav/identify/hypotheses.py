@@ -1,22 +1,27 @@
 """Rings that the candidates may form: triples proposed, octagons looked up, the exact image fitted, chance weighed.
 
 Both methods of the source propose triples of candidates; the octagon look-up and the fit of the ring's exact
-perspective image judge them, because a tilted ring is no circle, and `chance` says how likely each is an accident.
+perspective image judge them, because a tilted ring is no circle; `chance` says how likely each is an accident of where
+the candidates are, and `brightness` how likely one of how bright they are.
 
-Cost: triples of n candidates, each looked up at a cost that does not grow with n (beyond `few_candidates` only three
-patterns of slots are tried); of different ones the `_KEPT` least accidental compete for at most `max_fits` fits. A
-hypothesis that an earlier fit already contains is not fitted again, nor one with too few LEDs to be believed, but for
-`_HOPELESS` of them when there is nothing better.
+Cost: at most n(n-1)(n-2)/6 triples of n candidates in 21 patterns of slots, three beyond `few_candidates`, at most two
+rings each, each looked up at a cost that does not grow with n; of the different ones that have four LEDs the `_KEPT`
+least accidental compete for at most `max_fits` fits. A hypothesis that an earlier fit already contains is not fitted
+again, nor one with too few LEDs to be believed, but for `_HOPELESS` of them when there is nothing better; and after two
+whole rings of which none is preferred the answer is known.
 """
 
+import math
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from dockair.calibration import Camera
+from dockair.nav.identify.brightness import BrightnessModel, BrightnessSettings
 from dockair.nav.identify.chance import box_area_px2, densities_px2, log10_false_rings, member_odds
-from dockair.nav.identify.circle_hough import find_circles, radius_row
+from dockair.nav.identify.circle_hough import find_circles, radius_row, triples_near
 from dockair.nav.identify.code import CodeSettings
 from dockair.nav.identify.octagon import ALL_PATTERNS, RIGHT_ANGLES, Octagons, find_octagons
 from dockair.nav.identify.perspective import SLOTS, RingFit, fit_ring
@@ -27,7 +32,7 @@ from dockair.rotations import Array
 METHODS = ("three_point", "circle_hough")
 MIN_LEDS = 4
 _HOUGH_BAND = 0.25  # half width around a peak's circle, of its radius: a ring tilted by 40 deg is 0.77 to 1
-_TURNS = (np.arange(SLOTS) + np.arange(SLOTS)[:, None]) % SLOTS  # a row is the slots turned by one more place
+_PEAKS = 32  # of the Hough transform whose candidates make triples
 _KEPT = 64  # octagons kept for ranking
 _HOPELESS = 3  # fits of rings that cannot be believed, so that what is there is AMBIGUOUS
 _EXTRAPOLATION = 2.5  # how much three LEDs blow up their errors at the other places, for all but short arcs
@@ -41,7 +46,7 @@ class IdentifySettings:
     max_tilt_rad: float = np.deg2rad(40.0)  # more, and four LEDs of a frontal ring pass for four of a tilted one
     max_candidates: int = 60  # 34 220 triples
     few_candidates: int = 24  # up to here every three LEDs propose a ring, beyond it only those at right angles
-    max_fits: int = 16
+    max_fits: int = 12  # a ring that is found has seldom needed more than three
     sigma_px: float = 0.10  # of a centroid when the caller does not say, without what the LEDs' places add
     ring_sigma: float = 0.0012  # LED position error over the ring's radius: 0.3 mm of 250 mm
     tolerance_sigmas: float = 4.0  # one true LED in 3000 falls outside in either coordinate
@@ -56,57 +61,70 @@ class IdentifySettings:
     max_false_rings: float = 3e-4  # accidental rings a frame of pure clutter may show, see `chance` Eq. (1)
     max_false_rings_with_prior: float = 1e-2  # one that is also where, and as large as, the ring should be
     max_false_rings_predicted: float = 5e-2  # one that moreover is turned as it should be: few hypotheses are left
-    max_impostors: float = 1e-3  # expected among the members of a ring, see `chance` Eq. (2)
-    max_impostors_with_prior: float = 5e-3
+    max_impostors: float = 8e-4  # expected among the members of a ring, see `chance` Eq. (2)
+    max_impostors_with_prior: float = 2e-3
+    brightness: BrightnessSettings = field(default_factory=BrightnessSettings)
     code: CodeSettings = field(default_factory=CodeSettings)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Candidates:
+    """What may be LEDs."""
+
+    points: Array  #: (n, 2) undistorted [px]
+    sigma_px: float  #: of a coordinate
+    brightness: BrightnessModel | None = None  #: None: it says nothing
+
+    def likelihood_ratios(self, rings: NDArray[np.int64]) -> tuple[Array, Array]:
+        """Eqs. (1) and (2) of `brightness` for hypotheses (m, 8): 1 where nothing is known."""
+        if self.brightness is None:
+            return np.ones(len(rings)), np.ones(rings.shape)
+        return self.brightness.likelihood_ratios(rings)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ScoredFit:
     """A fit and what chance says of it."""
 
-    log10_false_rings: float  #: of Eq. (1) of `chance`
-    odds: Array  #: (8,) that a slot's candidate is an impostor, Eq. (2) of `chance`
+    log10_false_rings: float  #: Eq. (1) of `chance` over Eq. (1) of `brightness`
+    odds: Array  #: (8,) that a slot's candidate is an impostor, Eq. (2) of `chance` over Eq. (2) of `brightness`
     fit: RingFit
 
 
 def ring_fits(
-    points: Array,
+    candidates: Candidates,
     method: str,
     prior: RingPrior,
     camera: Camera,
-    sigma_px: float,
     settings: IdentifySettings,
     most_false_rings: float,
 ) -> list[ScoredFit]:
     """Different fits with at least four LEDs, the least accidental first.
 
     Args:
-        points: (n, 2) candidates, undistorted [px].
+        candidates: blobs.
         method: of METHODS.
         prior: gates.
         camera: its focal length and principal point.
-        sigma_px: of a candidate's coordinate.
         settings: of the identification.
-        most_false_rings: NFA above which no ring is believed.
+        most_false_rings: expected accidental rings above which no ring is believed.
     """
-    octagons = _octagons(points, method, prior, camera, sigma_px, settings)
+    octagons = _octagons(candidates, method, prior, camera, settings)
+    hypotheses, hopeless = _ranked(candidates, octagons, most_false_rings, settings)
     scored: list[ScoredFit] = []
-    hypotheses, hopeless = _ranked(points, octagons, sigma_px, most_false_rings, settings)
-    fits = doubtful = 0
+    fits = doubtful = whole = 0
     believed = False
     while len(hypotheses) and fits < settings.max_fits and doubtful < _HOPELESS and not (believed and hopeless[0]):
         fits, doubtful = fits + 1, doubtful + int(hopeless[0])
-        fit = fit_ring(
-            points, hypotheses[0], camera.focal_length_px, camera.principal_point_px,
-            tolerance_px=settings.tolerance_sigmas * sigma_px,
-            tolerance_per_radius=settings.tolerance_sigmas * settings.ring_sigma,
-            max_tilt_rad=settings.max_tilt_rad,
-        )  # fmt: skip
-        different = not any(_contained(one.fit.candidate, fit.candidate[None])[0] for one in scored)
+        fit = _fit(candidates, hypotheses[0], camera, settings)
+        different = not any(_is_contained(one.fit.candidate, fit.candidate) for one in scored)
         if fit.count >= MIN_LEDS and different and fit.tilt_rad <= settings.max_tilt_rad:
-            scored.append(_scored(points, fit, octagons, settings))
-            believed |= scored[-1].log10_false_rings <= np.log10(most_false_rings)
+            scored.append(_scored(candidates, fit, octagons, settings))
+            if scored[-1].log10_false_rings <= math.log10(most_false_rings):
+                believed = True
+                whole += int(fit.count == SLOTS and prior.allows(fit.centre_px, fit.radius_px))
+                if whole == 2 and not prior.prefers:
+                    break  # neither can be the other less well seen, nor part of a third
         # a hypothesis with an impostor may lose the wrong LEDs in its fit: parts of it still get their own
         size = (hypotheses >= 0).sum(axis=1)
         repeated = _contained(hypotheses[0], hypotheses) & (size == size[0])
@@ -115,27 +133,38 @@ def ring_fits(
     return sorted(scored, key=lambda one: (one.log10_false_rings, one.fit.rms_px))
 
 
+def _fit(candidates: Candidates, hypothesis: NDArray[np.int64], camera: Camera, settings: IdentifySettings) -> RingFit:
+    return fit_ring(
+        candidates.points, hypothesis, camera.focal_length_px, camera.principal_point_px,
+        tolerance_px=settings.tolerance_sigmas * candidates.sigma_px,
+        tolerance_per_radius=settings.tolerance_sigmas * settings.ring_sigma,
+        max_tilt_rad=settings.max_tilt_rad,
+    )  # fmt: skip
+
+
 def _octagons(
-    points: Array, method: str, prior: RingPrior, camera: Camera, sigma_px: float, settings: IdentifySettings
+    candidates: Candidates, method: str, prior: RingPrior, camera: Camera, settings: IdentifySettings
 ) -> Octagons:
     """What the method's triples suggest."""
-    spread = _EXTRAPOLATION * settings.tolerance_sigmas
+    spread, points = _EXTRAPOLATION * settings.tolerance_sigmas, candidates.points
     return find_octagons(
         points, _triples_of(points, method, prior),
         ALL_PATTERNS if len(points) <= settings.few_candidates else RIGHT_ANGLES,
         focal_length_px=camera.focal_length_px, principal_point_px=camera.principal_point_px,
         radius_range_px=prior.radius_range_px, centre_gate=prior.gate, roll_gate=prior.roll_gate,
         min_axis_ratio=float(np.cos(settings.max_tilt_rad)),
-        tolerance_px=max(1.0, spread * sigma_px), tolerance_per_radius=spread * settings.ring_sigma,
+        tolerance_px=max(1.0, spread * candidates.sigma_px), tolerance_per_radius=spread * settings.ring_sigma,
     )  # fmt: skip
 
 
-def _scored(points: Array, fit: RingFit, octagons: Octagons, settings: IdentifySettings) -> ScoredFit:
-    accident, impostor = densities_px2(points, fit)
+def _scored(candidates: Candidates, fit: RingFit, octagons: Octagons, settings: IdentifySettings) -> ScoredFit:
+    accident, impostor = densities_px2(candidates.points, fit)
     p = accident * np.pi * fit.tolerance_px**2
+    likelier, of_each = candidates.likelihood_ratios(fit.candidate[None])
+    rings = float(log10_false_rings(_tested(octagons, fit.count), fit.count, p))
     return ScoredFit(
-        log10_false_rings=float(log10_false_rings(_tested(octagons, fit.count), fit.count, p)),
-        odds=member_odds(points, fit, impostor, settings.tolerance_sigmas),
+        log10_false_rings=rings - max(math.log10(likelier[0]), 0.0),
+        odds=member_odds(candidates.points, fit, impostor, settings.tolerance_sigmas) / of_each[0],
         fit=fit,
     )
 
@@ -152,25 +181,35 @@ def without_impostors(scored: ScoredFit, most: float) -> RingFit | None:
     return replace(scored.fit, candidate=candidate)
 
 
-def _contained(larger: NDArray[np.int64], smaller: NDArray[np.int64]) -> NDArray[np.bool_]:
+@njit(cache=True)
+def _is_contained(larger, smaller):  # type: ignore[no-untyped-def]
+    for turn in range(SLOTS):
+        same = True
+        for s in range(SLOTS):
+            same = same and (smaller[s] < 0 or smaller[s] == larger[(s + turn) % SLOTS])
+        if same:
+            return True
+    return False
+
+
+@njit(cache=True)
+def _contained(larger, smaller):  # type: ignore[no-untyped-def]
     """(m,) whether every LED of a hypothesis (m, 8) has the same place in the larger one, up to the symmetry."""
-    fits = (smaller[:, None, :] < 0) | (smaller[:, None, :] == larger[_TURNS])
-    return np.asarray(fits.all(axis=2).any(axis=1))
+    inside = np.zeros(len(smaller), np.bool_)
+    for row in range(len(smaller)):
+        inside[row] = _is_contained(larger, smaller[row])
+    return inside
 
 
 def _triples_of(points: Array, method: str, prior: RingPrior) -> NDArray[np.int64]:
     """(m, 3) triples of candidates that the method proposes."""
     if method == "three_point":
         return all_triples(len(points))
-    peaks = find_circles(points, radius_row(*prior.radius_range_px), centre_gate=prior.gate)
-    proposed = [np.empty((0, 3), np.int64)]
-    for centre, radius in zip(peaks.centre_px, peaks.radius_px, strict=True):
-        distance = np.hypot(*(points - centre).T)
-        members = np.flatnonzero(np.abs(distance - radius) <= _HOUGH_BAND * radius)
-        proposed.append(members[all_triples(len(members))])
-    n = len(points)
-    keys = np.unique(np.vstack(proposed) @ np.array([n * n, n, 1]))  # neighbouring peaks share their triples
-    return np.column_stack([keys // (n * n), keys // n % n, keys % n])
+    density = len(points) / box_area_px2(points)
+    peaks = find_circles(
+        points, radius_row(*prior.radius_range_px), centre_gate=prior.gate, peaks=_PEAKS, clutter_px2=density
+    )
+    return triples_near(points, peaks, _HOUGH_BAND)
 
 
 def _tested(octagons: Octagons, count: NDArray[np.int64] | int) -> NDArray[np.int64]:
@@ -186,7 +225,7 @@ def _keys(candidate: NDArray[np.int64]) -> NDArray[np.uint64]:
 
 
 def _ranked(
-    points: Array, octagons: Octagons, sigma_px: float, most_false_rings: float, settings: IdentifySettings
+    candidates: Candidates, octagons: Octagons, most_false_rings: float, settings: IdentifySettings
 ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
     """(m, 8) hypotheses, the least accidental first, the more trusted circle first among equals.
 
@@ -194,18 +233,21 @@ def _ranked(
     """
     if not len(octagons.count):
         return octagons.candidate, np.empty(0, np.bool_)
+    points = candidates.points
     area = box_area_px2(points)
     p = len(points) * np.pi * octagons.tolerance_px**2 / area
     accident = np.round((octagons.count - 3) * np.log(np.clip(p, 1e-12, 0.5)), 6)
     best = np.argsort(accident, kind="stable")
     best = best[np.sort(np.unique(_keys(octagons.candidate[best]), return_index=True)[1])][:_KEPT]
+    likelier = np.maximum(candidates.likelihood_ratios(octagons.candidate[best])[0], 1.0)
     centres, radii = circles_through(points, octagons.triple[best])
     trusted = trust(centres, radii, cap_px=RADIUS_GATE * float(np.median(radii)))
-    best = best[np.lexsort((-trusted, accident[best]))]
+    order = np.lexsort((-trusted, accident[best] - np.log(likelier)))
+    best, likelier = best[order], likelier[order]
     count, radius = octagons.count[best], octagons.radius_px[best]
-    t2 = settings.tolerance_sigmas**2 * (sigma_px**2 + (settings.ring_sigma * radius) ** 2)
+    t2 = settings.tolerance_sigmas**2 * (candidates.sigma_px**2 + (settings.ring_sigma * radius) ** 2)
     p = max(len(points) - 3, 1) * np.pi * t2 / area
-    rings = log10_false_rings(_tested(octagons, count), count, p)
+    rings = log10_false_rings(_tested(octagons, count), count, p) - np.log10(likelier)
     hopeless = rings > np.log10(most_false_rings)
     order = np.argsort(hopeless, kind="stable")
     return octagons.candidate[best[order]], hopeless[order]

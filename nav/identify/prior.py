@@ -17,7 +17,7 @@ from dockair.rotations import Array
 Expectation = TypeVar("Expectation", Array, float)
 
 _EVEN = np.column_stack([np.cos(np.arange(8) * np.pi / 4), np.sin(np.arange(8) * np.pi / 4)])
-_ANYWHERE_PX = 1e6  # radius of a gate that lets everything pass
+ANYWHERE_PX = 1e6  #: radius of a gate that lets everything pass
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -36,7 +36,7 @@ class RingPrior:
     @property
     def has_centre(self) -> bool:
         """Whether the ring is expected somewhere."""
-        return self.centre_tolerance_px < _ANYWHERE_PX
+        return self.centre_tolerance_px < ANYWHERE_PX
 
     @property
     def gate(self) -> tuple[float, float, float]:
@@ -47,6 +47,16 @@ class RingPrior:
     def roll_gate(self) -> tuple[float, float]:
         """Roll and tolerance of an affine octagon; open when there is no roll."""
         return (0.0, np.pi) if np.isnan(self.roll_rad) else (self.roll_rad, self.roll_tolerance_rad)
+
+    @property
+    def prefers(self) -> bool:
+        """Whether of several rings one may be preferred, for its size or its roll."""
+        return not (np.isnan(self.expected_radius_px) and np.isnan(self.roll_rad))
+
+    def allows(self, centre_px: Array, radius_px: float) -> bool:
+        """Whether a fitted ring lies where, and is as large as, it should."""
+        inside = not self.has_centre or np.hypot(*(centre_px - self.centre_px)) <= self.centre_tolerance_px
+        return bool(inside and self.radius_range_px[0] <= radius_px <= self.radius_range_px[1])
 
     def tightened(self, radius_tolerance: float, roll_tolerance_rad: float) -> "RingPrior":
         """The same with the gates of a prediction: radius to a fraction, roll to an angle."""
@@ -130,7 +140,7 @@ def make_prior(
         roll_rad = roll if roll_rad is None else roll_rad
     if radius_px is not None:
         radius_range_px = (radius_px * (1.0 - radius_tolerance), radius_px * (1.0 + radius_tolerance))
-    tolerance = _ANYWHERE_PX
+    tolerance = ANYWHERE_PX
     if centre_px is not None:
         centre_px = np.asarray(centre_px, dtype=float)
         if centre_px.shape != (2,):

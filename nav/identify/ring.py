@@ -4,7 +4,8 @@
                                                                                    ellipse ► numbering ◄ roll
 
 `hypotheses` proposes rings and fits them, `chance` says how likely each is an accident and how many impostors it may
-hold; both must be less than the settings allow. Two rings that both pass and are not the same are `AMBIGUOUS`, so is
+hold, `brightness` how much less likely if its blobs are about equally bright; both must be less than the settings
+allow. Two rings that both pass and are not the same are `AMBIGUOUS`, so is
 one whose roll prior falls between two numberings, one whose code contradicts it, one that may be an accident, and one
 so crowded that a blob may pass for a hidden LED (the most doubtful member is left out if that is enough). No ring of at
 least four LEDs is `NOT_FOUND`; four LEDs without a prior are seldom more than an accident.
@@ -14,8 +15,9 @@ ring (`code`) the LEDs get their numbers; without, LED 0 is the LED nearest to t
 are right up to that symmetry (`absolute` says which). Roll is the angle of LED 0 in the image seen from the centre,
 from left (0) toward up (pi/2), averaged over the LEDs less their 45 degrees each: without tilt the drogue's roll.
 
-Cost is bounded: at most `max_candidates` (nearest to the prior, else the brightest, else the first), all their triples,
-beyond `few_candidates` in three patterns of slots only, and `max_fits` exact fits.
+The order in which candidates come does not matter. Cost is bounded: at most `max_candidates` (nearest to the prior's
+circle, else the brightest, else the uppermost), all their triples, beyond `few_candidates` in three patterns of slots
+only, and `max_fits` exact fits; twice that when a prediction fails and the ring is looked for as without.
 """
 
 import numpy as np
@@ -23,10 +25,12 @@ from numpy.typing import NDArray
 
 from dockair.calibration import Camera, LedRing
 from dockair.errors import DockairError
+from dockair.nav.identify.brightness import brightness_model
 from dockair.nav.identify.code import code_of
 from dockair.nav.identify.hypotheses import (
     METHODS,
     MIN_LEDS,
+    Candidates,
     IdentifySettings,
     ScoredFit,
     ring_fits,
@@ -34,7 +38,7 @@ from dockair.nav.identify.hypotheses import (
 )
 from dockair.nav.identify.numbering import numbered, roll_of
 from dockair.nav.identify.perspective import SLOTS, RingFit
-from dockair.nav.identify.prior import RingPrior, make_prior
+from dockair.nav.identify.prior import ANYWHERE_PX, RingPrior, make_prior
 from dockair.nav.identify.result import Identification, IdentificationStatus, nothing
 from dockair.rotations import Array
 
@@ -65,8 +69,8 @@ def identify(
         camera: for its focal length, principal point and distortion; None for the default one.
         ring: for its code, if it has one; None for the default one, which has none.
         sigma_px: of a candidate's coordinate, in place of the settings'.
-        brightness: (n,) fluxes, any unit; decides who stays when there are too many candidates and no prior, and reads
-            the code of a ring that has one.
+        brightness: (n,) fluxes, any unit, NaN where unknown; tells LEDs from clutter, decides who stays when there are
+            too many candidates and no prior, and reads the code of a ring that has one.
         expected_centre_px: (2,) where the ring's centre should be.
         expected_radius_px: what its radius should be.
         expected_roll_rad: what its roll should be, as the module defines it.
@@ -89,29 +93,44 @@ def identify(
         settings.radius_range_px, settings.centre_tolerance_radii, settings.radius_tolerance,
         expected_centre_px, expected_radius_px, expected_roll_rad, expected_led_px, expected_sigma_px, ring.angles_rad,
     )  # fmt: skip
-    index = _candidates(points, prior, brightness, settings.max_candidates)
+    flux = np.full(len(points), np.nan) if brightness is None else np.asarray(brightness, dtype=float)
+    if flux.shape != (len(points),):
+        raise DockairError("identify.brightness", expected=f"an array of shape ({len(points)},)", got=flux.shape)
+    index = _candidates(points, prior, flux, settings.max_candidates)
     if len(index) < MIN_LEDS:
         return nothing(IdentificationStatus.NOT_FOUND)
-    chosen = _undistorted(points[index], camera)
-    sigma = settings.sigma_px if sigma_px is None else sigma_px
+    code = code_of(ring, settings.code)
+    spread = 0.0 if code.log_brightness is None else float(code.log_brightness.std())
+    candidates = Candidates(
+        points=_undistorted(points[index], camera), sigma_px=settings.sigma_px if sigma_px is None else sigma_px,
+        brightness=None if brightness is None else brightness_model(flux[index], settings.brightness, spread),
+    )  # fmt: skip
+    status, fit = _found(candidates, method, prior, camera, settings)
+    if fit is None:
+        return nothing(status)
+    flux_or_none = None if brightness is None else flux[index]
+    return numbered(candidates.points, index, flux_or_none, fit, prior, camera, code, settings.roll_tolerance_rad)
+
+
+def _found(
+    candidates: Candidates, method: str, prior: RingPrior, camera: Camera, settings: IdentifySettings
+) -> tuple[IdentificationStatus, RingFit | None]:
+    """The ring where a prediction has it, or else anywhere that the prior allows."""
     status, fit = IdentificationStatus.NOT_FOUND, None
     if prior.prediction_px is not None:
         tight = prior.tightened(settings.predicted_radius_tolerance, settings.predicted_roll_tolerance_rad)
-        fits = ring_fits(chosen, method, tight, camera, sigma, settings, settings.max_false_rings_predicted)
-        shape = settings.predicted_shape_tolerance * tight.expected_radius_px + settings.predicted_shape_sigmas * sigma
-        fits = [one for one in fits if _shape_error(chosen, one.fit, tight) <= shape]
+        fits = ring_fits(candidates, method, tight, camera, settings, settings.max_false_rings_predicted)
+        shape = settings.predicted_shape_tolerance * tight.expected_radius_px
+        shape += settings.predicted_shape_sigmas * candidates.sigma_px
+        fits = [one for one in fits if _shape_error(candidates.points, one.fit, tight) <= shape]
         status, fit = _decide(fits, tight, settings.max_false_rings_predicted, settings)
     if fit is None:
         # a ring that contradicts a prediction needs as good a case as one that nothing was known of
         nominal = prior.has_centre and prior.prediction_px is None
         limit = settings.max_false_rings_with_prior if nominal else settings.max_false_rings
-        fits = ring_fits(chosen, method, prior, camera, sigma, settings, limit)
+        fits = ring_fits(candidates, method, prior, camera, settings, limit)
         status, fit = _decide(fits, prior, limit, settings)
-    if fit is None:
-        return nothing(status)
-    flux = None if brightness is None else np.asarray(brightness, dtype=float)[index]
-    code = code_of(ring, settings.code)
-    return numbered(chosen, index, flux, fit, prior, camera, code, settings.roll_tolerance_rad)
+    return status, fit
 
 
 def _undistorted(points: Array, camera: Camera) -> Array:
@@ -122,9 +141,10 @@ def _undistorted(points: Array, camera: Camera) -> Array:
     return -camera.focal_length_px * rays[:, 1:] / rays[:, :1] + np.array(camera.principal_point_px)
 
 
-def _candidates(points: Array, prior: RingPrior, brightness: Array | None, most: int) -> NDArray[np.int64]:
-    """Indices of the candidates that take part."""
-    index = np.flatnonzero(np.isfinite(points).all(axis=1))
+def _candidates(points: Array, prior: RingPrior, flux: Array, most: int) -> NDArray[np.int64]:
+    """Indices of the candidates that take part, in reading order: the order they come in does not matter."""
+    index = np.flatnonzero((np.abs(points) < ANYWHERE_PX).all(axis=1))  # no frame is so large; false for NaN
+    index = index[np.lexsort((flux[index], points[index, 0], points[index, 1]))]
     if prior.has_centre:
         # perspective makes the near side of a ring larger, by at most a tenth beyond 2 m
         reach = prior.gate[2] + 1.15 * prior.radius_range_px[1]
@@ -132,8 +152,8 @@ def _candidates(points: Array, prior: RingPrior, brightness: Array | None, most:
         index, distance = index[distance <= reach], distance[distance <= reach]
         rank = np.abs(distance - prior.expected_radius_px)
     else:
-        rank = np.zeros(len(index)) if brightness is None else -np.asarray(brightness, dtype=float)[index]
-    return np.sort(index[np.argsort(rank, kind="stable")[:most]])
+        rank = -flux[index]
+    return index[np.sort(np.argsort(rank, kind="stable")[:most])]
 
 
 def _decide(
@@ -143,7 +163,7 @@ def _decide(
     settings: IdentifySettings,
 ) -> tuple[IdentificationStatus, RingFit | None]:
     """The one ring that is no accident, if there is one."""
-    expected = [one for one in fits if _is_expected(one.fit, prior)]
+    expected = [one for one in fits if prior.allows(one.fit.centre_px, one.fit.radius_px)]
     if not expected:
         return IdentificationStatus.NOT_FOUND, None
     credible = [one for one in expected if one.log10_false_rings <= np.log10(most_false_rings)]
@@ -172,12 +192,6 @@ def _is_close(fit: RingFit, prior: RingPrior, settings: IdentifySettings) -> boo
 def _is_rightly_rolled(fit: RingFit, prior: RingPrior, settings: IdentifySettings) -> bool:
     """Whether a fitted ring is turned as expected."""
     return roll_of(fit, prior)[1] <= settings.roll_tolerance_rad
-
-
-def _is_expected(fit: RingFit, prior: RingPrior) -> bool:
-    """Whether a fitted ring lies where, and is as large as, the prior says."""
-    inside = not prior.has_centre or np.hypot(*(fit.centre_px - prior.centre_px)) <= prior.centre_tolerance_px
-    return bool(inside and prior.radius_range_px[0] <= fit.radius_px <= prior.radius_range_px[1])
 
 
 def _shape_error(points: Array, fit: RingFit, prior: RingPrior) -> float:

@@ -20,33 +20,40 @@ by Newton steps, J being the derivative. d_i is the distance from (u, v), R a mu
 A constant error of b drops out, the skirt's noise enters less, and a canopy's edge beside the LED pulls less: half the
 error of (1) where the background is dark and even, a fifth where it is not.
 
+To (5) comes what a spot that is not round has merged with. Two points d apart with shares x and 1 - x of the light
+have a centre x d away from the second, and second moments, windowed as in (4), that differ by a = x (1 - x) d^2 between
+their longer and their shorter axis. If the LED has a third to a half of the light, that is an error of a/2 to a in each
+coordinate's square; taken is
+
+    sigma^2 += max(0, a - 1.5 s_a - 0.07 (M_uu + M_vv)),    s_a^2 = sum G_i^2 d_i^4 s_i^2 / (sum G_i w_i)^2    (6)
+
+s_a being the noise of a, and the last term what phase and a tilted source make of a single point. A reflection in the
+drogue's ribs a pixel or two beside a far LED is the rule in sunlight from 16 m on: without (6) errors are three sigma.
+
 To (2) and (5) comes a floor for what is not noise: the sub-pixel phase of an undersampled spot. A clipped blob has lost
 its core, inside the plateau every pixel weighs the same, and its error is almost all phase: 0.01 to 0.05 px, up and
 down with brightness as one ring of pixels after another fills. A wider window is its better estimate, and a larger
-floor, the rms over brightness, stands for what is left; it falls with the root of the blob's area.
+floor, the rms over brightness, stands for what is left; it grows with the root of the clipped pixels up to four.
 
-Not modelled: asymmetric spots, neighbours closer than three pixels, smear.
+A centre outside the pixels it was made from (their sum above the background can vanish, where the threshold given is
+below the background) is none: such a blob gets the centre of what its pixels have above the threshold, and the spread
+of its width as sigma.
+
+Not modelled: neighbours closer than three pixels but for (6), smear.
 Sources: the window's idea is that of SExtractor's XWIN_IMAGE (Bertin & Arnouts 1996).
 """
 
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from dockair.nav.image.binarise import Image
+from dockair.nav.image.centroid_kernels import measure
 from dockair.nav.image.labelling import Runs
 from dockair.rotations import Array
 
-_MIN_BACKGROUND_PIXELS = 12  # fewer say less about b than the whole frame does
-_WINDOW_RADII = 1.9  # R in equivalent radii of the blob: least error from 2 m to 30 m
-_CLIPPED_WINDOW_RADII = 2.8
-_LEAST_WINDOW_PX = 1.9
-_CORRELATION = 2.0  # neighbouring pixels of structure go together: their variance counts as often
-_RINGS_SHARE = 0.01  # of the peak: rms of the lens's rings two and three pixels outside a blob
-_STEPS = 12  # Newton's; four are the rule
-_CONVERGED_PX = 1e-5
+_PHASES_PX = 4  # clipped pixels from which on the error no longer grows
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,7 +64,7 @@ class NoiseModel:
     noise_dn: float  #: read noise and quantisation; shot noise comes from the pixels' levels
     saturation_dn: int
     floor_px: float
-    clipped_floor_px: float  #: of one pixel; falls with the root of the area
+    clipped_floor_px: float  #: of one clipped pixel; grows with their root up to four
     response_spread: float = 0.0  #: p
 
 
@@ -67,7 +74,7 @@ class BlobMeasurements:
 
     centroids_px: Array  #: (n, 2)
     sigma_px: Array  #: (n,) of each coordinate, the larger of the two
-    flux: Array  #: (n,) F [DN]
+    flux: Array  #: (n,) F [DN]; above the threshold where F is not positive
     peak: NDArray[np.int64]  #: (n,) brightest pixel [DN], background included
     clipped: NDArray[np.bool_]  #: (n,) a pixel is at or above the saturation level
     elongation: Array  #: (n,) ratio of the longer to the shorter axis of the blob's pixels
@@ -96,13 +103,13 @@ def measure_blobs(
     """
     thresholds, backgrounds = np.empty(runs.count, np.int64), np.empty(runs.count)
     thresholds[:], backgrounds[:] = threshold, background_dn
-    table = _measure(
+    table = measure(
         np.ascontiguousarray(image), runs.row, runs.start, runs.stop, runs.offset, thresholds,
         (noise.gain_dn_per_electron, noise.noise_dn, noise.response_spread), backgrounds, local_background,
         windowed, noise.saturation_dn,
     )  # fmt: skip
-    clipped = table[:, 4] >= noise.saturation_dn
-    floor = np.where(clipped, noise.clipped_floor_px / np.sqrt(runs.area_px), noise.floor_px)
+    clipped = table[:, 6] > 0
+    floor = np.where(clipped, noise.clipped_floor_px * np.sqrt(np.minimum(table[:, 6], _PHASES_PX)), noise.floor_px)
     return BlobMeasurements(
         centroids_px=table[:, :2].copy(),
         sigma_px=np.hypot(table[:, 2], floor),
@@ -111,170 +118,3 @@ def measure_blobs(
         clipped=clipped,
         elongation=table[:, 5].copy(),
     )
-
-
-@njit(cache=True)
-def _paint(row, start, stop, top, left, rows, columns):  # type: ignore[no-untyped-def]
-    """Patch of 2 for the blob's pixels, 1 for those that touch it, 0 elsewhere."""
-    patch = np.zeros((rows, columns), np.uint8)
-    for k in range(len(row)):
-        for i in range(max(row[k] - 1 - top, 0), min(row[k] + 2 - top, rows)):
-            for j in range(max(start[k] - 1 - left, 0), min(stop[k] + 1 - left, columns)):
-                patch[i, j] = max(patch[i, j], 1)
-        patch[row[k] - top, start[k] - left : stop[k] - left] = 2
-    return patch
-
-
-@njit(cache=True)
-def _background(image, patch, top, left, threshold):  # type: ignore[no-untyped-def]
-    """Mean and variance of the patch's pixels outside the blob and not above the threshold, and their number."""
-    total, squares, n = 0.0, 0.0, 0
-    for i in range(patch.shape[0]):
-        for j in range(patch.shape[1]):
-            level = float(image[top + i, left + j])
-            if patch[i, j] == 0 and level <= threshold:
-                total += level
-                squares += level * level
-                n += 1
-    mean = total / max(n, 1)
-    return mean, squares / max(n, 1) - mean * mean, n
-
-
-@njit(cache=True)
-def _elongation(patch):  # type: ignore[no-untyped-def]
-    """Ratio of the axes of the blob's pixels, each a unit square (hence the 1/12)."""
-    n, si, sj, sii, sij, sjj = 0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for i in range(patch.shape[0]):
-        for j in range(patch.shape[1]):
-            if patch[i, j] == 2:
-                n += 1
-                si += i
-                sj += j
-                sii += i * i
-                sij += i * j
-                sjj += j * j
-    a, b, c = sii / n - (si / n) ** 2 + 1 / 12, sij / n - si * sj / n**2, sjj / n - (sj / n) ** 2 + 1 / 12
-    root = np.sqrt((a - c) ** 2 + 4 * b * b)
-    return np.sqrt((a + c + root) / max(a + c - root, 1e-9))
-
-
-@njit(cache=True)
-def _variance(level, background, model, texture):  # type: ignore[no-untyped-def]
-    """Eq. (3)."""
-    gain, noise, spread = model
-    return gain * level + noise * noise + (spread * (level - background)) ** 2 + texture
-
-
-@njit(cache=True)
-def _weighted(image, patch, top, left, model, background, texture, background_variance):  # type: ignore[no-untyped-def]
-    """Eqs. (1)-(3) on one patch, in its coordinates: u, v, sigma, flux."""
-    flux, su, sv = 0.0, 0.0, 0.0
-    for i in range(patch.shape[0]):
-        for j in range(patch.shape[1]):
-            if patch[i, j]:
-                w = image[top + i, left + j] - background
-                flux += w
-                su += w * j
-                sv += w * i
-    flux = max(flux, 1e-9)
-    u, v = su / flux, sv / flux
-    var_u, var_v, du, dv = 0.0, 0.0, 0.0, 0.0
-    for i in range(patch.shape[0]):
-        for j in range(patch.shape[1]):
-            if patch[i, j]:
-                variance = _variance(float(image[top + i, left + j]), background, model, texture)
-                var_u += (j - u) ** 2 * variance
-                var_v += (i - v) ** 2 * variance
-                du += j - u
-                dv += i - v
-    var_u += du * du * background_variance
-    var_v += dv * dv * background_variance
-    return u, v, np.sqrt(max(var_u, var_v)) / flux, flux
-
-
-@njit(cache=True)
-def _start(image, patch, top, left, threshold):  # type: ignore[no-untyped-def]
-    """Centre of what the blob's pixels have above the threshold, their number and the brightest."""
-    total, u, v, n, peak = 0.0, 0.0, 0.0, 0, 0
-    for i in range(patch.shape[0]):
-        for j in range(patch.shape[1]):
-            if patch[i, j] == 2:
-                level = int(image[top + i, left + j])
-                w = float(level - threshold)
-                total += w
-                u += w * j
-                v += w * i
-                n += 1
-                peak = max(peak, level)
-    total = max(total, 1e-9)
-    return u / total, v / total, n, peak
-
-
-@njit(cache=True)
-def _window_sums(image, patch, top, left, u, v, radius, model, background, texture):  # type: ignore[no-untyped-def]
-    """Sums of Eqs. (4) and (5) for both coordinates: equation, derivative, variance of the equation."""
-    sums = np.zeros(6)
-    for i in range(max(int(np.ceil(v - radius)), 0), min(int(v + radius) + 1, patch.shape[0])):
-        for j in range(max(int(np.ceil(u - radius)), 0), min(int(u + radius) + 1, patch.shape[1])):
-            dv, du = i - v, j - u
-            root = 1.0 - (du * du + dv * dv) / radius**2
-            if root <= 0.0 or not patch[i, j]:
-                continue
-            level = float(image[top + i, left + j])
-            G, w = root * root, level - background
-            variance = _variance(level, background, model, texture)
-            sums[0] += G * w * du
-            sums[1] += G * w * dv
-            sums[2] += w * (G - 4.0 * root * du * du / radius**2)
-            sums[3] += w * (G - 4.0 * root * dv * dv / radius**2)
-            sums[4] += G * G * du * du * variance
-            sums[5] += G * G * dv * dv * variance
-    return sums
-
-
-@njit(cache=True)
-def _windowed(image, patch, top, left, start, radius, model, background, texture):  # type: ignore[no-untyped-def]
-    """Eqs. (4) and (5) from a start, in the patch's coordinates: u, v, sigma; sigma -1 if the steps go astray."""
-    u, v = start
-    for _ in range(_STEPS):
-        sums = _window_sums(image, patch, top, left, u, v, radius, model, background, texture)
-        if sums[2] <= 0.0 or sums[3] <= 0.0:
-            return u, v, -1.0
-        du, dv = sums[0] / sums[2], sums[1] / sums[3]
-        u, v = u + du, v + dv
-        if (u - start[0]) ** 2 + (v - start[1]) ** 2 > 0.25 * radius**2:
-            return u, v, -1.0
-        if abs(du) + abs(dv) < _CONVERGED_PX:
-            break
-    return u, v, np.sqrt(max(sums[4] / sums[2] ** 2, sums[5] / sums[3] ** 2))
-
-
-@njit(cache=True)
-def _measure(image, row, start, stop, offset, threshold, model, given_background, local, windowed, saturation):  # type: ignore[no-untyped-def]
-    table = np.empty((len(offset) - 1, 6))
-    margin = 3
-    for c in range(len(table)):
-        first, last = offset[c], offset[c + 1]
-        top, bottom = max(row[first] - margin, 0), min(row[last - 1] + 1 + margin, image.shape[0])
-        left = max(start[first:last].min() - margin, 0)
-        right = min(stop[first:last].max() + margin, image.shape[1])
-        patch = _paint(row[first:last], start[first:last], stop[first:last], top, left, bottom - top, right - left)
-        background, spread, n = _background(image, patch, top, left, threshold[c])
-        if not local or n < _MIN_BACKGROUND_PIXELS:
-            background, spread, n = given_background[c], 0.0, 1 << 30
-        own = _variance(background, background, model, 0.0)
-        su, sv, area, peak = _start(image, patch, top, left, threshold[c])
-        clipped = peak >= saturation
-        # the lens's own rings vary too, but alike on all sides: they are no texture
-        rings = (_RINGS_SHARE * (peak - background)) ** 2
-        texture = 0.0 if clipped else _CORRELATION * max(spread - own - rings, 0.0)
-        u, v, sigma, flux = _weighted(image, patch, top, left, model, background, texture, (own + texture) / n)
-        if windowed:
-            radii = _CLIPPED_WINDOW_RADII if clipped else _WINDOW_RADII
-            radius = max(radii * np.sqrt(area / np.pi), _LEAST_WINDOW_PX)
-            found = _windowed(image, patch, top, left, (su, sv), radius, model, background, texture)
-            if found[2] >= 0.0:
-                u, v, sigma = found
-        table[c, 0], table[c, 1], table[c, 2], table[c, 3], table[c, 4] = u + left, v + top, sigma, flux, peak
-        table[c, 5] = _elongation(patch)
-    return table

@@ -9,7 +9,8 @@ it is, like one of the frame.
 
 Components come before opening, not after as in [Yoon 2018, Fig 2]: the result is the same (see `morphology`), and on a
 dark frame nothing but the blobs is ever touched. Whatever is wider than an LED can be (the Sun, broad reflections)
-falls to the area filter before it is opened or measured.
+falls to the area filter before it is opened or measured. Gaps in cloud are as small as a near LED but softer than any:
+their flux is that of ten and more pixels as bright as their peak (the *equivalent area*), and that is what tells them.
 """
 
 from dataclasses import dataclass, replace
@@ -36,11 +37,16 @@ class DetectSettings:
 
     method: Literal["local", "frame"] = "local"
     threshold_dn: int | None = None  # fixed threshold, in place of either method's
-    spot_contrast_dn: float = 4.0  # an LED at 20 m in 14 us (the Sun in view) has 6
+    spot_contrast_dn: float = 2.0  # of the smallest spots: an LED at 30 m in 14 us (the Sun in view) has 2 to 4
+    middle_spot_contrast_dn: float = 4.0  # what is fainter is left to the smallest ring, which meets less texture
     wide_spot_contrast_dn: float = 48.0  # of spots wider than 7 px: an LED as near as that is bright
-    spot_noise_factor: float = 5.0  # and three pixels have to be above it
+    spot_isolation: float = 3.0  # standard deviations of noise between a peak and the brightest around it
+    texture: float = 0.2  # range of sea, cloud and canopy within a ring, in shares of their level
+    spot_detection: float = 6.0  # standard deviations of a spot's nine pixels: noise makes one in 500 frames of them
+    spot_beside: float = 1.0  # of seven of them, for hot pixels; the bright ones fail by their share
+    spot_pixel: float = 2.5  # of a pixel that belongs to a spot, connected as it is
     spot_share: float = 0.1  # of the peak that a spot's pixels are above: the skirt below it is measured as it touches
-    texture: float = 0.04  # rms of sea, cloud and canopy within a ring, in shares of their level
+    max_equivalent_area_px: float = 7.0  # flux over peak of an unclipped spot: an LED has 2 to 6.4, gaps in cloud 10
     noise_factor: float = 8.0  # of "frame": in 2.2 million pixels of normal noise none passes
     min_contrast_dn: float = 8.0  # above sunlit cloud (5 DN at f/8, 20 us); a spot of peak 60 DN keeps 6 pixels
     max_contrast_dn: float = 40.0  # half of a mean LED's peak at 10 m (80 DN)
@@ -48,7 +54,7 @@ class DetectSettings:
     element_shape: str = "square"  # the source's structuring element
     element_size_px: int = 3  # 1 switches opening off
     spare_below_px: int = 13  # smaller blobs are not opened, see `morphology`
-    min_area_px: int = 3  # a far LED has four pixels, with one to spare; two hot pixels side by side are none
+    min_area_px: int = 2  # an LED at the limit has four pixels, and noise takes two of them
     max_area_px: int = 400  # the Sun's disc has 570; a clipped LED at 2 m about 200
     max_elongation: float = 3.5  # ratio of axes; streaks and edges are longer, a row of three pixels is 3.0
     centroid: Literal["windowed", "weighted"] = "windowed"  # the source's is the second, see `centroid`
@@ -58,7 +64,7 @@ class DetectSettings:
     response_spread: float = 0.01  # of the pixels, as their maker states it
     saturation_dn: int | None = None  # None for the data type's largest level
     sigma_floor_px: float = 0.001  # phase error of a sampled spot, from the tests' frames
-    clipped_sigma_floor_px: float = 0.14  # of a clipped one of one pixel, falls with the root of the area
+    clipped_sigma_floor_px: float = 0.0145  # of one with one clipped pixel, grows with their root up to four
 
     def __post_init__(self) -> None:
         for name, value, exists in (
@@ -138,7 +144,7 @@ def detect(
         local_background=settings.local_background,
         windowed=settings.centroid == "windowed",
     )
-    return _blobs(found, measured, measured.elongation <= settings.max_elongation, window)
+    return _blobs(found, measured, _right_shape(found, measured, settings), window)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -165,11 +171,15 @@ class _Components:
 def _spots(image: Image, settings: DetectSettings, gain: float) -> _Components:
     noise_dn = float(np.sqrt(settings.noise_dn**2 + _QUANTISATION_VARIANCE))
     limits = SpotLimits(
-        min_contrast_dn=settings.spot_contrast_dn,
+        small_contrast_dn=settings.spot_contrast_dn,
+        middle_contrast_dn=settings.middle_spot_contrast_dn,
         wide_contrast_dn=settings.wide_spot_contrast_dn,
-        noise_factor=settings.spot_noise_factor,
-        min_share=settings.spot_share,
+        isolation=settings.spot_isolation,
         texture=settings.texture,
+        detection=settings.spot_detection,
+        beside=settings.spot_beside,
+        pixel=settings.spot_pixel,
+        share=settings.spot_share,
         gain_dn_per_electron=gain,
         noise_dn=noise_dn,
     )
@@ -236,6 +246,15 @@ def _opened(found: _Components, settings: DetectSettings) -> _Components:
 def _of_right_area(found: _Components, settings: DetectSettings) -> _Components:
     keep = (found.area_px >= settings.min_area_px) & (found.area_px <= settings.max_area_px)
     return found if keep.all() else found.select(keep)
+
+
+def _right_shape(found: _Components, measured: BlobMeasurements, settings: DetectSettings) -> Mask:
+    """Which are not too long, and, of the spots that are not clipped, not wider than a lens makes a point."""
+    keep = measured.elongation <= settings.max_elongation
+    if found.threshold_dn is None:
+        height = measured.peak - found.backgrounds_dn
+        keep &= measured.clipped | (measured.flux <= settings.max_equivalent_area_px * height)
+    return np.asarray(keep)
 
 
 def _blobs(found: _Components, measured: BlobMeasurements, keep: Mask, window: Window | None) -> Blobs:

@@ -1,12 +1,13 @@
 """Connected components of a binary image, three ways with one result: same partition, numbered in raster order.
 
-* `label_contour_tracing`: one pass over the pixels; an outer contour is followed when its first pixel is met, an inner
-  one when its hole is, and everything else takes its left neighbour's label [Yoon 2018, Fig 9;
-  Chang, Chen & Lu 2004]. The background pixels that a contour looked at are marked, so no hole is followed twice.
+* `label_contour_tracing`: one pass, following contours [Yoon 2018, Fig 9]; see `contour_tracing`.
 * `label_two_pass`: provisional labels from the neighbours already seen, with a table of equivalences (a forest of
-  parents) that the source leaves out; the second pass replaces them [Yoon 2018, Figs 7-8].
+  parents) that the source leaves out; the second pass replaces them [Yoon 2018, Figs 7-8]. With 8 neighbours, what
+  touches the pixel above is known to be equal to it: only where that one is background are two labels compared.
 * `foreground_runs`: the same two passes on runs of foreground pixels instead of pixels. On a dark frame with a few
   blobs whole dark rows are passed over at once; it is what the detector uses.
+
+The first two pass over 64 pixels at once where all of them are background, which is most of a frame.
 
 Connectivity is 8 (edges and corners) or 4 (edges). Labels count from 1; 0 is background. The frame's outside is
 background.
@@ -20,13 +21,13 @@ from numpy.typing import NDArray
 
 from dockair.errors import DockairError
 from dockair.nav.image.binarise import Image, Mask
+from dockair.nav.image.contour_tracing import label_contour_tracing
+from dockair.nav.image.segments import SEGMENT, busy_segments, checked_mask
+
+__all__ = ["Indices", "Labels", "Runs", "first_pass", "foreground_runs", "label_contour_tracing", "label_two_pass"]
 
 Labels = NDArray[np.int32]
 Indices = NDArray[np.int32]
-
-# Clockwise from east, rows downward: E SE S SW W NW N NE.
-_ROW_STEP = np.array([0, 1, 1, 1, 0, -1, -1, -1])
-_COLUMN_STEP = np.array([1, 1, 0, -1, -1, -1, 0, 1])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -58,96 +59,15 @@ class Runs:
         return Runs(row=self.row[mine], start=self.start[mine], stop=self.stop[mine], offset=offset)
 
 
-def _checked(mask: Mask, connectivity: int) -> Mask:
-    if connectivity not in (4, 8):
-        raise DockairError("connectivity", expected="4 or 8", got=connectivity)
-    mask = np.asarray(mask)
-    if mask.ndim != 2 or mask.dtype != np.bool_:
-        raise DockairError("mask", expected="a (rows, columns) bool array", got=f"{mask.shape} {mask.dtype}")
-    return mask
-
-
-def label_contour_tracing(mask: Mask, connectivity: int = 8) -> tuple[Labels, int]:
-    """Labels (rows, columns) int32 and their number, by contour tracing.
-
-    Args:
-        mask: (rows, columns) bool.
-        connectivity: 8 or 4.
-
-    Raises:
-        DockairError: wrong shape, dtype or connectivity.
-    """
-    mask = _checked(mask, connectivity)
-    # a frame of background spares the tracer all tests for the image's edge
-    padded = np.zeros((mask.shape[0] + 2, mask.shape[1] + 2), np.bool_)
-    padded[1:-1, 1:-1] = mask
-    labels, count = _contour_tracing(padded, 8 // connectivity)
-    return np.ascontiguousarray(labels[1:-1, 1:-1]), int(count)
-
-
-@njit(cache=True)
-def _next_direction(mask, labels, row, column, first, stride):  # type: ignore[no-untyped-def]
-    """Direction of the next foreground neighbour, clockwise from `first`; -1 if none. Marks the background seen."""
-    for turn in range(0, 8, stride):
-        direction = (first + turn) % 8
-        i, j = row + _ROW_STEP[direction], column + _COLUMN_STEP[direction]
-        if mask[i, j]:
-            return direction
-        labels[i, j] = -1
-    return -1
-
-
-@njit(cache=True)
-def _trace(mask, labels, row, column, label, first, stride):  # type: ignore[no-untyped-def]
-    """Follow one contour all round and label it."""
-    labels[row, column] = label
-    first_move = _next_direction(mask, labels, row, column, first, stride)
-    if first_move < 0:
-        return  # a single pixel
-    direction = first_move
-    i, j = row + _ROW_STEP[direction], column + _COLUMN_STEP[direction]
-    while True:
-        labels[i, j] = label
-        # the pixel just left lies at direction + 4; clockwise of it, + 5 was seen from there, + 6 was not
-        direction = _next_direction(mask, labels, i, j, (direction + 6) % 8, stride)
-        if i == row and j == column and direction == first_move:
-            return  # a contour may touch its first pixel more than once: it ends when it would begin again
-        i, j = i + _ROW_STEP[direction], j + _COLUMN_STEP[direction]
-
-
-@njit(cache=True)
-def _contour_tracing(mask, stride):  # type: ignore[no-untyped-def]
-    rows, columns = mask.shape
-    labels = np.zeros((rows, columns), np.int32)
-    count = 0
-    outer = 7 if stride == 1 else 0  # above and to the left of an outer contour's first pixel there is background
-    inner = 3 if stride == 1 else 4  # below an inner contour's first pixel (direction 2) there is the hole
-    for i in range(1, rows - 1):
-        for j in range(1, columns - 1):
-            if not mask[i, j]:
-                continue
-            if labels[i, j] == 0 and not mask[i - 1, j]:
-                count += 1
-                _trace(mask, labels, i, j, count, outer, stride)
-            if labels[i, j] == 0:
-                labels[i, j] = labels[i, j - 1]
-            if not mask[i + 1, j] and labels[i + 1, j] == 0:
-                labels[i + 1, j] = -1
-                _trace(mask, labels, i, j, labels[i, j], inner, stride)
-    for i in range(rows):
-        for j in range(columns):
-            if labels[i, j] < 0:
-                labels[i, j] = 0
-    return labels, count
-
-
 def label_two_pass(mask: Mask, connectivity: int = 8) -> tuple[Labels, int]:
     """Labels (rows, columns) int32 and their number, by two passes with a table of equivalences.
 
     Arguments and errors as for `label_contour_tracing`.
     """
-    labels, parent = first_pass(mask, connectivity)
-    return _second_pass(labels, parent)
+    mask = np.ascontiguousarray(checked_mask(mask, connectivity))
+    busy = busy_segments(mask)
+    labels, parent = _first_pass(mask, busy, SEGMENT, connectivity == 8)
+    return labels, int(_second_pass(labels, busy, SEGMENT, parent))
 
 
 def first_pass(mask: Mask, connectivity: int = 8) -> tuple[Labels, Indices]:
@@ -155,7 +75,9 @@ def first_pass(mask: Mask, connectivity: int = 8) -> tuple[Labels, Indices]:
 
     Arguments and errors as for `label_contour_tracing`.
     """
-    return _first_pass(np.ascontiguousarray(_checked(mask, connectivity)), connectivity == 8)
+    mask = np.ascontiguousarray(checked_mask(mask, connectivity))
+    labels, parent = _first_pass(mask, busy_segments(mask), SEGMENT, connectivity == 8)
+    return labels, parent
 
 
 @njit(cache=True)
@@ -167,37 +89,50 @@ def _root(parent, label):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _first_pass(mask, corners):  # type: ignore[no-untyped-def]
+def _joined(parent, label, other):  # type: ignore[no-untyped-def]
+    """Label of a pixel that touches two, either of them 0 for none; that they are equal is noted."""
+    if label == 0 or other == 0 or label == other:
+        return max(label, other)
+    a, b = _root(parent, label), _root(parent, other)
+    parent[max(a, b)] = min(a, b)
+    return label
+
+
+@njit(cache=True)
+def _first_pass(mask, busy, segment, corners):  # type: ignore[no-untyped-def]
     rows, columns = mask.shape
-    labels = np.zeros((rows, columns), np.int32)
+    labels = np.zeros((rows + 1, columns + 2), np.int32)  # a frame of background above and on both sides
     # a new label needs background to its left and above: at most every second pixel of a row
     parent = np.zeros(rows * ((columns + 1) // 2) + 1, np.int32)
     count = 0
     for i in range(rows):
-        for j in range(columns):
-            if not mask[i, j]:
+        above, here = labels[i], labels[i + 1]
+        for s in range(busy.shape[1]):
+            if not busy[i, s]:
                 continue
-            label = labels[i, j - 1] if j > 0 else 0
-            if i > 0:
-                for k in range(max(j - 1, 0) if corners else j, min(j + 2, columns) if corners else j + 1):
-                    other = labels[i - 1, k]
-                    if other == 0:
-                        continue
-                    if label == 0:
-                        label = other
-                    elif label != other:
-                        a, b = _root(parent, label), _root(parent, other)
-                        parent[max(a, b)] = min(a, b)
-            if label == 0:
-                count += 1
-                label = count
-                parent[count] = count
-            labels[i, j] = label
-    return labels, parent[: count + 1]
+            for j in range(s * segment, min((s + 1) * segment, columns)):
+                if not mask[i, j]:
+                    continue
+                label = here[j]
+                if not corners:
+                    label = _joined(parent, label, above[j + 1])
+                else:
+                    label = label if label else above[j]
+                    if not above[j + 1]:
+                        label = _joined(parent, label, above[j + 2])
+                    elif not label:  # what touches the pixel above is known to be equal to it
+                        label = above[j + 1]
+                if label == 0:
+                    count += 1
+                    label = count
+                    parent[count] = count
+                here[j + 1] = label
+    return labels[1:, 1:-1], parent[: count + 1]
 
 
 @njit(cache=True)
-def _second_pass(labels, parent):  # type: ignore[no-untyped-def]
+def _second_pass(labels, busy, segment, parent):  # type: ignore[no-untyped-def]
+    """Replace the provisional labels by final ones; their number."""
     final = np.zeros(len(parent), np.int32)
     count = 0
     for label in range(1, len(parent)):
@@ -207,11 +142,12 @@ def _second_pass(labels, parent):  # type: ignore[no-untyped-def]
             final[label] = count
         else:
             final[label] = final[_root(parent, label)]
-    result = np.empty_like(labels)
     for i in range(labels.shape[0]):
-        for j in range(labels.shape[1]):
-            result[i, j] = final[labels[i, j]]
-    return result, count
+        for s in range(busy.shape[1]):
+            if busy[i, s]:
+                for j in range(s * segment, min((s + 1) * segment, labels.shape[1])):
+                    labels[i, j] = final[labels[i, j]]
+    return count
 
 
 def foreground_runs(image: Image, threshold: int, connectivity: int = 8) -> Runs:

@@ -1,4 +1,4 @@
-"""The loops of `spots`, whose symbols and equation numbers they use."""
+"""From hits to spots: the loops of `spots`, whose symbols and equation numbers they use."""
 
 import numpy as np
 from numba import njit
@@ -10,9 +10,8 @@ WIDE_PX = 8  #: reaches from here on are of wide spots
 CUT_PX = 2  #: reach at which a spot's pixels are cut at the ring
 CELL_PX = 16  #: side of the cells that hold earlier spots, not less than the largest reach
 SPARE = 9  #: one pixel in so many of a ring may be as bright as it likes
-ARC = 3  #: pixels side by side of the smallest ring that may be as bright as they like
-RISES = (0.0, 0.125, 0.25, 0.5)  #: h of Eq. (2)
-_SEGMENT = 64  # pixels that are passed over at once
+ARC = 5  #: pixels side by side of the smallest ring that may be as bright as they like: a side of the square
+RISES = (0.0, 0.125, 0.25, 0.5)  #: h of Eq. (3)
 
 
 def ring_steps(reach: int) -> NDArray[np.int32]:
@@ -20,73 +19,14 @@ def ring_steps(reach: int) -> NDArray[np.int32]:
     steps = np.indices((2 * reach + 3,) * 2).reshape(2, -1).T - (reach + 1)
     if reach == CUT_PX:  # of the smallest circle the corners are needed, or diagonal ribs slip through; in order
         steps = steps[np.abs(steps).max(axis=1) == reach]
-        return steps[np.argsort(np.arctan2(*steps.T))].astype(np.int32)
-    return steps[np.abs(np.hypot(*steps.T) - reach) <= 0.5].astype(np.int32)
+        steps = steps[np.argsort(np.arctan2(*steps.T))]
+    else:
+        steps = steps[np.abs(np.hypot(*steps.T) - reach) <= 0.5]
+    return np.asarray(steps, np.int32)
 
 
 _RINGS = np.concatenate([ring_steps(reach) for reach in REACHES_PX])
 _RING_STARTS = tuple(sum(len(ring_steps(reach)) for reach in REACHES_PX[:k]) for k in range(len(REACHES_PX) + 1))
-
-
-@njit(cache=True)
-def _best_contrast(centre, above, below, left, right, zero):  # type: ignore[no-untyped-def]
-    """Largest 7/8 x - n of a segment.
-
-    A constant length, indices from 0 and no type but the image's: only so does it become vector instructions.
-    """
-    best = zero
-    for k in range(_SEGMENT):
-        high_1, low_1 = max(above[k], below[k]), min(above[k], below[k])
-        high_2, low_2 = max(left[k], right[k]), min(left[k], right[k])
-        second = max(min(high_1, high_2), max(low_1, low_2))
-        x = centre.dtype.type(centre[k] - (centre[k] >> 3))
-        best = max(best, centre.dtype.type(max(x, second) - second))
-    return best
-
-
-@njit(cache=True)
-def _segments(image, i, zero, contrast, reach, found):  # type: ignore[no-untyped-def]
-    """First columns of the segments of row i that may hold a pixel of a spot; their number."""
-    n = 0
-    end = image.shape[1] - reach
-    for first in range(reach, end, _SEGMENT):
-        s = min(first, end - _SEGMENT)  # the last segment begins earlier than its own pixels
-        if s >= reach:
-            e = s + _SEGMENT
-            above, below = image[i - reach, s:e], image[i + reach, s:e]
-            left, right = image[i, s - reach : e - reach], image[i, s + reach : e + reach]
-            if _best_contrast(image[i, s:e], above, below, left, right, zero) < contrast:
-                continue
-        found[n] = first
-        n += 1
-    return n
-
-
-@njit(cache=True)
-def _hits(image, zero, contrast, reach, row_step):  # type: ignore[no-untyped-def]
-    """(n, 3) row, column and n of the pixels that may belong to a spot."""
-    rows, columns = image.shape
-    found = np.empty(columns // _SEGMENT + 1, np.int64)
-    hits, n = np.empty((256, 3), np.int32), 0
-    for i in range(reach, rows - reach, row_step):
-        for first in found[: _segments(image, i, zero, contrast, reach, found)]:
-            for j in range(first, min(first + _SEGMENT, columns - reach)):
-                x = np.int64(image[i, j])
-                most = x - (x >> 3) - contrast  # that the second brightest may have
-                if most < 0:
-                    continue
-                a, b = np.int64(image[i, j - reach]), np.int64(image[i, j + reach])
-                if a > most and b > most:
-                    continue
-                c, d = np.int64(image[i - reach, j]), np.int64(image[i + reach, j])
-                second = max(min(max(a, b), max(c, d)), max(min(a, b), min(c, d)))
-                if second > most:
-                    continue
-                if n == len(hits):
-                    hits = _grown(hits)
-                hits[n, 0], hits[n, 1], hits[n, 2] = i, j, second
-                n += 1
-    return hits[:n]
 
 
 @njit(cache=True)
@@ -155,29 +95,41 @@ def _surroundings(image, i, j, ring, limit, brightest):  # type: ignore[no-untyp
         brightest[k] = level
         if brightest[spare] > limit:
             return -1, 0.0
-    return brightest[spare], (total - brightest[:spare].sum()) / (len(ring) - spare)
+    m, brighter = brightest[spare], 0
+    while brighter < spare and brightest[brighter] > m:
+        total -= brightest[brighter]
+        brighter += 1
+    return m, total / (len(ring) - brighter)
 
 
 @njit(cache=True)
-def _beside_an_arc(image, i, j, ring, limit):  # type: ignore[no-untyped-def]
-    """As `_surroundings` for the smallest ring, with the ARC pixels side by side left out that lessen m most."""
-    n, bright, total = len(ring), 0, np.int64(0)
+def _beside_an_arc(image, i, j, ring, limit, levels):  # type: ignore[no-untyped-def]
+    """As `_surroundings` for the smallest ring, with the ARC pixels side by side left out that lessen m most.
+
+    What of the arc is no brighter than m counts for b, which would be too low without noise's brightest.
+    """
+    n, bright, top = len(ring), 0, 0
     for k in range(n):
-        level = np.int64(image[i + ring[k, 0], j + ring[k, 1]])
-        bright += level > limit
-        total += level
-    m, best = np.int64(-1), 0
+        levels[k] = image[i + ring[k, 0], j + ring[k, 1]]
+        bright += levels[k] > limit
+        if levels[k] > levels[top]:
+            top = k
     if bright > ARC:
-        return m, 0.0
-    for first in range(n):
+        return np.int64(-1), 0.0
+    m = levels[top]
+    for first in range(top - ARC + 1, top + 1):  # of no other arc is the brightest a part
         highest = np.int64(0)
         for k in range(first + ARC, first + n):
-            highest = max(highest, np.int64(image[i + ring[k % n, 0], j + ring[k % n, 1]]))
-        if m < 0 or highest < m:
-            m, best = highest, first
-    for k in range(best, best + ARC):
-        total -= image[i + ring[k % n, 0], j + ring[k % n, 1]]
-    return (m if m <= limit else np.int64(-1)), total / (n - ARC)
+            highest = max(highest, levels[k % n])
+        m = min(m, highest)
+    if m > limit:
+        return np.int64(-1), 0.0
+    total, count = np.int64(0), 0
+    for k in range(n):
+        if levels[k] <= m:
+            total += levels[k]
+            count += 1
+    return m, total / count
 
 
 @njit(cache=True)
@@ -187,8 +139,6 @@ def _flood(image, peak, centre, level, reach, patch, stack):  # type: ignore[no-
     It is none if it meets the ring, or a pixel brighter than the peak: that one has a spot of its own.
     """
     top, left, limit = centre[0] - reach, centre[1] - reach, (reach - 0.5) ** 2
-    if (peak[0] - centre[0]) ** 2 + (peak[1] - centre[1]) ** 2 >= limit:
-        return False
     patch[: 2 * reach + 1, : 2 * reach + 1] = 0
     patch[peak[0] - top, peak[1] - left] = 1
     stack[0, 0], stack[0, 1], depth = peak[0], peak[1], 1
@@ -212,17 +162,35 @@ def _flood(image, peak, centre, level, reach, patch, stack):  # type: ignore[no-
 
 
 @njit(cache=True)
+def _is_point(image, i, j, b, least, least_beside):  # type: ignore[no-untyped-def]
+    """Eq. (2), its limits in DN."""
+    total, brightest = 0.0, 0.0
+    for u in range(-1, 2):
+        for v in range(-1, 2):
+            w = (2 - abs(u)) * (2 - abs(v)) * (image[i + u, j + v] - b)
+            total += w
+            if u or v:
+                brightest = max(brightest, w)
+    return total >= 6.0 * least and total - 4.0 * (image[i, j] - b) - brightest >= 4.0 * least_beside
+
+
+@njit(cache=True)
 def _cut_out(image, peak, centre, reach, ring, contrast, model, patch, stack):  # type: ignore[no-untyped-def]
     """Threshold t and background b of the spot of a peak, its pixels marked in the patch; t = -1 if there is none."""
-    factor, share, texture, gain, noise = model
+    isolation, texture, detection, beside, pixel, share, gain, noise = model
+    if (peak[0] - centre[0]) ** 2 + (peak[1] - centre[1]) ** 2 >= (reach - 0.5) ** 2:
+        return -1, 0.0
     P = np.int64(image[peak])
     if reach == CUT_PX:
-        m, b = _beside_an_arc(image, centre[0], centre[1], ring, P - contrast)
+        m, b = _beside_an_arc(image, centre[0], centre[1], ring, P - contrast, stack[:, 0])
     else:
         m, b = _surroundings(image, centre[0], centre[1], ring, P - contrast, stack[:, 0])
-    if m < 0 or P - m < factor * np.sqrt(gain * m + noise**2 + (texture * m) ** 2) or P - m < m - b:
+    if m < 0 or P - m < max(np.sqrt(isolation**2 * (gain * m + noise**2) + (texture * m) ** 2), m - b):
         return -1, 0.0
-    lowest = b + max(factor * np.sqrt(gain * b + noise**2), share * (P - b))
+    s = np.sqrt(gain * b + noise**2)
+    if not _is_point(image, peak[0], peak[1], b, detection * s, max(beside * s, share * (P - b))):
+        return -1, 0.0
+    lowest = b + max(pixel * s, share * (P - b))
     for rise in RISES:
         level = min(np.int64(lowest + rise * (P - lowest)), P - 1)  # rounding must not lift it to the peak
         if _flood(image, peak, centre, level, reach, patch, stack):
@@ -264,44 +232,42 @@ def _append_runs(patch, top, left, size, runs, n):  # type: ignore[no-untyped-de
 
 
 @njit(cache=True)
-def find(image, zero, contrast, wide_contrast, model):  # type: ignore[no-untyped-def]
+def grow(image, hits, contrasts, model):  # type: ignore[no-untyped-def]
     """Spots of all reaches in raster order: runs' rows, starts, stops and each spot's first; levels; backgrounds.
 
     Args:
         image: contiguous.
-        zero: of the image's type.
-        contrast: c of Eq. (1), whole.
-        wide_contrast: the same for spots of the wide reaches.
-        model: k, f, q, g, s_n.
+        hits: of `find_hits`.
+        contrasts: c of Eq. (1) for each of REACHES_PX, whole.
+        model: k, q, d, e, p, f, g, s_n.
     """
     rows, columns = image.shape
     head = np.full((rows // CELL_PX + 3, columns // CELL_PX + 3), -1, np.int32)
     spots, backgrounds, runs = np.empty((64, 4), np.int32), np.empty((64, 1)), np.empty((1024, 3), np.int32)
     largest = 2 * max(REACHES_PX) + 1
     patch, stack = np.empty((largest, largest), np.uint8), np.empty((largest**2, 2), np.int64)
-    count, n = 0, 0
-    for scale in range(len(REACHES_PX)):
-        reach, ring = REACHES_PX[scale], _RINGS[_RING_STARTS[scale] : _RING_STARTS[scale + 1]]
-        c = wide_contrast if reach >= WIDE_PX else contrast
-        last = (-1, -1)
-        for hit in _hits(image, zero, c, reach, ROW_STEPS[scale]):
-            peak = _climb(image, hit[0], hit[1], 2 * reach)
-            if peak == last or _inside_earlier(peak[0], peak[1], head, spots, runs):
-                continue
-            last = peak
-            i, j = _middle(image, peak[0], peak[1], (np.int64(image[peak]) + hit[2]) // 2, reach)
-            if not (reach <= i < rows - reach and reach <= j < columns - reach):
-                continue
-            level, b = _cut_out(image, peak, (i, j), reach, ring, c, model, patch, stack)
-            if level < 0:
-                continue
-            if count == len(spots):
-                spots, backgrounds = _grown(spots), _grown(backgrounds)
-            spots[count, 0], spots[count, 3], backgrounds[count, 0] = n, level, b
-            runs, n = _append_runs(patch, i - reach, j - reach, 2 * reach + 1, runs, n)
-            spots[count, 1], spots[count, 2] = n, head[i // CELL_PX + 1, j // CELL_PX + 1]
-            head[i // CELL_PX + 1, j // CELL_PX + 1] = count
-            count += 1
+    count, n, last, scale = 0, 0, (-1, -1), -1
+    for hit in hits:
+        if hit[0] != scale:
+            scale, last = hit[0], (-1, -1)
+            reach, ring = REACHES_PX[scale], _RINGS[_RING_STARTS[scale] : _RING_STARTS[scale + 1]]
+        peak = _climb(image, hit[1], hit[2], 2 * reach)
+        if peak == last or _inside_earlier(peak[0], peak[1], head, spots, runs):
+            continue
+        last = peak
+        i, j = _middle(image, peak[0], peak[1], (np.int64(image[peak]) + hit[3]) // 2, reach)
+        if not (reach <= i < rows - reach and reach <= j < columns - reach):
+            continue
+        level, b = _cut_out(image, peak, (i, j), reach, ring, contrasts[scale], model, patch, stack)
+        if level < 0:
+            continue
+        if count == len(spots):
+            spots, backgrounds = _grown(spots), _grown(backgrounds)
+        spots[count, 0], spots[count, 3], backgrounds[count, 0] = n, level, b
+        runs, n = _append_runs(patch, i - reach, j - reach, 2 * reach + 1, runs, n)
+        spots[count, 1], spots[count, 2] = n, head[i // CELL_PX + 1, j // CELL_PX + 1]
+        head[i // CELL_PX + 1, j // CELL_PX + 1] = count
+        count += 1
     return _in_raster_order(runs, spots[:count], backgrounds[:count, 0])
 
 

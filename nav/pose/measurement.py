@@ -1,11 +1,13 @@
-"""Measured lines of sight with their weights, from pixels; see `model` for what they mean."""
+"""What the camera says about named LEDs: lines of sight with their weights, from pixels; see `model`."""
 
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
+from numpy.typing import NDArray
 
 from dockair.calibration import Camera
+from dockair.errors import DockairError
+from dockair.nav.pose import model
 from dockair.rotations import Array
 
 
@@ -17,21 +19,78 @@ class LinesOfSight:
     weights: Array  #: (n, 3, 3) W of `model`'s Eq. (2), or isotropic
     points_D: Array  #: (n, 3) LEDs in drogue axes [m]
     sigma_px: Array  #: (n,) standard deviation of each pixel coordinate
+    pixels: Array | None = None  #: (n, 2) when residuals are to be formed in pixels instead
+    lens: Array | None = None  #: (8,) of `lens_of`, with pixels
 
 
-def lines_of_sight_from_pixels(pixels: Array, points_D: Array, camera: Camera, sigma_px: Array) -> LinesOfSight:
+def lens_of(camera: Camera) -> Array:
+    """(8,) focal length, centre u, v [px], k1, k2, p1, p2, k3."""
+    return np.array((camera.focal_length_px, *camera.principal_point_px, *(camera.distortion or (0.0,) * 5)))
+
+
+def lines_of_sight_from_pixels(
+    pixels: Array, points_D: Array, camera: Camera, sigma_px: Array, *, isotropic: bool = False
+) -> LinesOfSight:
     """Return lines of sight with the efficient weight, Eq. (2) of `model`.
 
     Args:
-        pixels: (n, 2) LEDs' pixels (u, v), finite.
+        pixels: (n, 2) LEDs' pixels (u, v); what is not finite, or what no ray makes, is left out.
         points_D: (n, 3) the same LEDs in drogue axes [m].
         camera: its calibration, distortion included.
         sigma_px: (n,) standard deviation of each pixel coordinate.
+        isotropic: the source's weight instead.
     """
-    rays = camera.rays_from_pixels(pixels)
-    distortion = np.zeros(5) if camera.distortion is None else np.array(camera.distortion)
-    weights = tangent_weights(rays, camera.focal_length_px, distortion, sigma_px)
-    return LinesOfSight(rays=rays, weights=weights, points_D=points_D, sigma_px=sigma_px)
+    sight, _, _ = seen_lines_of_sight(pixels, points_D, lens_of(camera), sigma_px, isotropic=isotropic)
+    return sight
+
+
+def seen_lines_of_sight(
+    pixels: Array, points_D: Array, lens: Array, sigma_px: Array, *, isotropic: bool = False, in_pixels: bool = False
+) -> tuple[LinesOfSight, NDArray[np.bool_], int]:
+    """Return lines of sight of the LEDs that were seen, which these are (n,), and how many of them stand apart."""
+    seen, rays, weights, points, sigma, measured_px, apart = model.seen_leds(
+        pixels, points_D, sigma_px, lens, isotropic
+    )
+    if in_pixels:
+        sight = LinesOfSight(rays=rays, weights=weights, points_D=points, sigma_px=sigma, pixels=measured_px, lens=lens)
+    else:
+        sight = LinesOfSight(rays=rays, weights=weights, points_D=points, sigma_px=sigma)
+    return sight, seen, apart
+
+
+def measure(
+    pixels: Array, points_D: Array, camera: Camera, sigma_px: float | Array, *, residuals: str, weight: str
+) -> tuple[LinesOfSight, NDArray[np.bool_], int]:
+    """Check what a person gave, then `seen_lines_of_sight`.
+
+    Raises:
+        DockairError: wrong shapes, points that are not finite, sigma not positive.
+    """
+    try:
+        pixels = np.ascontiguousarray(pixels, dtype=float)
+        points_D = np.ascontiguousarray(points_D, dtype=float)
+    except (TypeError, ValueError):
+        raise DockairError("pixels, points_D", expected="arrays (n, 2) and (n, 3) of numbers", got=pixels) from None
+    if pixels.ndim != 2 or pixels.shape[1] != 2:
+        raise DockairError("pixels", expected="an array (n, 2)", got=pixels.shape)
+    n = len(pixels)
+    sigma = np.empty(n)
+    try:
+        sigma[:] = sigma_px
+    except (TypeError, ValueError):
+        sigma = np.empty(0)
+    if points_D.shape == (n, 3) and len(sigma) == n:
+        seen = seen_lines_of_sight(
+            pixels, points_D, lens_of(camera), sigma, isotropic=weight == "isotropic", in_pixels=residuals == "pixels"
+        )
+        if seen[2] >= 0:
+            return seen
+        bad_points = seen[2] == model.BAD_POINTS
+    else:
+        bad_points = points_D.shape != (n, 3)
+    if bad_points:
+        raise DockairError("points_D", expected=f"an array ({n}, 3) of finite numbers", got=points_D.shape)
+    raise DockairError("sigma_px", expected=f"one number > 0, or {n} of them", got=sigma_px)
 
 
 def isotropic_weights(count: int, sigma: float) -> Array:
@@ -39,7 +98,6 @@ def isotropic_weights(count: int, sigma: float) -> Array:
     return np.asarray(np.tile(np.eye(3) / sigma**2, (count, 1, 1)))
 
 
-@njit(cache=True)
 def tangent_weights(rays: Array, focal_length_px: float, distortion: Array, sigma_px: Array) -> Array:
     """(n, 3, 3) weights G'G/sigma^2, G = d(pixel)/dh at the ray.
 
@@ -49,20 +107,5 @@ def tangent_weights(rays: Array, focal_length_px: float, distortion: Array, sigm
         distortion: (5,) k1, k2, p1, p2, k3; zeros for none.
         sigma_px: (n,) standard deviation of each pixel coordinate.
     """
-    k1, k2, p1, p2, k3 = distortion
-    weights, G = np.empty((len(rays), 3, 3)), np.empty((2, 3))
-    for i in range(len(rays)):
-        x = rays[i, 0]
-        a, b = -rays[i, 1] / x, -rays[i, 2] / x
-        r2 = a * a + b * b
-        s, ds = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3)), 2.0 * (k1 + r2 * (2.0 * k2 + 3.0 * k3 * r2))
-        aa = s + ds * a * a + 2.0 * p1 * b + 6.0 * p2 * a  # derivative of calibration's Eq. (1)
-        ab = ds * a * b + 2.0 * p1 * a + 2.0 * p2 * b
-        bb = s + ds * b * b + 6.0 * p1 * b + 2.0 * p2 * a
-        scale = focal_length_px / (sigma_px[i] * x)
-        G[0, 0], G[0, 1], G[0, 2] = -(aa * a + ab * b) * scale, -aa * scale, -ab * scale
-        G[1, 0], G[1, 1], G[1, 2] = -(ab * a + bb * b) * scale, -ab * scale, -bb * scale
-        for j in range(3):
-            for k in range(3):
-                weights[i, j, k] = G[0, j] * G[0, k] + G[1, j] * G[1, k]
-    return weights
+    lens = np.array((focal_length_px, 0.0, 0.0, *distortion))
+    return np.asarray(model.sight_weights(np.ascontiguousarray(rays), lens, np.ascontiguousarray(sigma_px)))

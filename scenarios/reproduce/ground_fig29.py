@@ -21,6 +21,7 @@ import numpy as np
 
 from dockair.calibration import NavigationSheets
 from dockair.messages import CameraFrame, Window
+from dockair.nav.identify.result import nothing
 from dockair.nav.identify.ring import IdentificationStatus, identify
 from dockair.nav.image.detect import detect
 from dockair.nav.navigator import NavigatorSettings
@@ -87,10 +88,10 @@ class PixelChain:
 
     Args:
         sheets: nominal.
-        roll_rad: of the drogue when it is first seen; settles which LED is which.
+        roll_rad: of the drogue when it is first seen; settles which LED is which. None leaves that to the ring's code.
     """
 
-    def __init__(self, sheets: NavigationSheets, roll_rad: float = 0.0) -> None:
+    def __init__(self, sheets: NavigationSheets, roll_rad: float | None = 0.0) -> None:
         self._sheets, self._roll_rad = sheets, roll_rad
         self._tracker = RingTracker(sheets.camera, 1.0 / sheets.camera_rate_hz)
         self._last: tuple[Array, Array] | None = None
@@ -109,15 +110,18 @@ class PixelChain:
         found = identify(
             blobs.centroids_px,
             camera=camera,
+            ring=self._sheets.ring,
             brightness=blobs.flux,
             expected_led_px=tracker.expected_led_px,
             expected_sigma_px=tracker.expected_sigma_px if tracker.tracking else None,
-            expected_roll_rad=None if tracker.tracking else self._roll_rad,
+            expected_roll_rad=tracker.roll_rad if np.isfinite(tracker.roll_rad) else self._roll_rad,
         )
+        if not found.absolute:  # numbers that may be any of eight are none
+            found = nothing(IdentificationStatus.AMBIGUOUS)
         tracker.update(found)
         if found.status is not IdentificationStatus.FOUND:
             return None
-        self._roll_rad = found.roll_rad
+        self._roll_rad = None if self._roll_rad is None else found.roll_rad
         misplaced_px = NavigatorSettings().led_position_sigma_m / (0.5 * self._sheets.ring.diameter_m) * found.radius_px
         pose = solve_pose(
             blobs.centroids_px[found.members],

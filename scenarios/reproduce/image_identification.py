@@ -1,115 +1,110 @@
-"""Rings of eight LEDs among clutter, named without a prior: found, ambiguous and wrong by LEDs seen and clutter.
+"""Rings of eight LEDs among clutter: found, ambiguous and wrong by LEDs seen and clutter, and what it takes.
 
-Random drogues at 2 to 30 m anywhere in the field of view, axis up to 30 degrees off the camera's, any roll, 0.1 px of
-noise; clutter uniform over the frame, or within 1.5 radii of the ring's centre. *Found*: FOUND with all visible LEDs
-but at most one, rightly named up to the ring's symmetry, and no clutter. *Wrong*: FOUND with clutter or a wrong name
-among the members. A second ring of another size is AMBIGUOUS without a prior and resolved by an expected radius. The
-source compares Hough and three-point circles by one picture each (figs 16 and 17): no figures to set beside.
+*Found*: FOUND with all visible LEDs but at most one, rightly named, and no clutter. *Wrong*: FOUND with clutter or a
+wrong name among the members. Names count up to the ring's symmetry, but absolutely where a prediction settles them. The
+tables: nothing known, by three-point circles and by Hough; where a track predicts the LEDs; clutter within 1.5 radii of
+the ring, by place alone and by brightness too. A second ring of another size is AMBIGUOUS without a prior and resolved
+by a radius to 15 %. Times are of one core, the least of some repetitions: forty candidates of every kind.
+
+The source compares Hough and three-point circles by one picture each (figs 16 and 17): no figures to set beside.
 """
 
 import time
-from collections.abc import Callable, Iterable
-from functools import partial
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from dockair.calibration import Camera, LedRing
 from dockair.nav.identify.ring import METHODS, Identification, IdentificationStatus, identify
-from dockair.rotations import Array, exp
+from dockair.scenarios.reproduce.identification_scenes import CROWDS, Scene
 from dockair.scenarios.reproduce.reference import picture_name
 
 ID = "image/identification"
 TITLE = "rings named among clutter: found, ambiguous, wrong by LEDs seen and clutter; Hough and three-point circles"
 VISIBLE = (8, 7, 6, 5, 4)
 CLUTTER = (0, 5, 10, 20, 30, 40)
-CASES = 670  # a cell of the first table, 20 100 in all
-NEAR_CASES, HOUGH_CASES, PAIR_CASES = 200, 60, 300
-NEAR_RADII = 1.5
+PAIR_CASES, CROWD_CASES, REPETITIONS = 300, 12, 5
 _SOURCE = "[Yoon 2018, II.3, figs 16 and 17]"
-_RANGE_M, _TILT_RAD, _SIGMA_PX = (2.0, 30.0), np.deg2rad(30.0), 0.1
-_SIZE_IN, _DPI = (11.0, 7.0), 110
+_SEED = 2026
+_SIZE_IN, _DPI = (12.0, 14.0), 100
 _OUTCOMES = ("found", "fewer", "ambiguous", "not_found", "wrong")
 
 
-class Scene:
-    """One case: candidates in random order, and which LED each of them is (-1 for clutter)."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Setting:
+    """What is known, and where clutter is."""
 
-    def __init__(
-        self, rng: np.random.Generator, visible: int = 8, clutter: int = 0, near_radii: float | None = None
-    ) -> None:
-        camera, ring = Camera(), LedRing()
-        frame = np.array([camera.width_px - 1.0, camera.height_px - 1.0])
-        while True:
-            range_m, self.centre_px = rng.uniform(*_RANGE_M), rng.uniform(0.0, frame)
-            ray = camera.rays_from_pixels(self.centre_px[None])[0]
-            axis, roll = rng.uniform(-np.pi, np.pi, 2)
-            tilt = exp(rng.uniform(0.0, _TILT_RAD) * np.array([0.0, np.cos(axis), np.sin(axis)]))
-            p_CL = range_m * ray / ray[0] + ring.positions_D @ (tilt @ exp(np.array([roll, 0.0, 0.0]))).T
-            self.led_px: Array = camera.pixels_from_points(p_CL)
-            if ((self.led_px > 0.0) & (self.led_px < frame)).all():
-                break
-        self.radius_px: float = camera.focal_length_px * 0.5 * ring.diameter_m / range_m
-        low, high = np.zeros(2), frame
-        if near_radii is not None:
-            low, high = (self.centre_px + side * near_radii * self.radius_px for side in (-1.0, 1.0))
-        seen = rng.permutation(ring.count)[:visible]
-        noise = _SIGMA_PX * rng.standard_normal((visible, 2))
-        points = np.vstack([self.led_px[seen] + noise, rng.uniform(low, high, (clutter, 2))])
-        order = rng.permutation(len(points))
-        self.points, self.visible = points[order], visible
-        self.numbers = np.concatenate([seen, np.full(clutter, -1)])[order]
+    method: str = METHODS[0]
+    cases: int = 100  #: of each cell
+    near_radii: float | None = None  #: None: clutter over the frame
+    predicted: bool = False
+    brightness: bool = False
+
+    def identify(self, scene: Scene) -> Identification:
+        """What is made of a scene."""
+        return identify(
+            scene.points, self.method,
+            brightness=scene.flux if self.brightness else None,
+            expected_led_px=scene.predicted_px if self.predicted else None,
+            expected_sigma_px=scene.sigma_px if self.predicted else None,
+        )  # fmt: skip
+
+
+TABLES = {
+    "three points": Setting(cases=670),  # 20 100 in all
+    "Hough": Setting(method="circle_hough", cases=200),
+    "predicted": Setting(predicted=True),
+    "crowded": Setting(near_radii=1.5),
+    "crowded, with brightness": Setting(near_radii=1.5, brightness=True),
+}
+Cells = dict[tuple[int, int], dict[str, float]]
 
 
 def outcome(scene: Scene, result: Identification) -> str:
-    """One of found, fewer, ambiguous, not_found, wrong; names count up to the ring's symmetry."""
+    """One of found, fewer, ambiguous, not_found, wrong."""
     if result.status is not IdentificationStatus.FOUND:
         return result.status.name.lower()
     true = scene.numbers[result.members]
     shift = (true - result.led_numbers) % len(scene.led_px)
-    if (true < 0).any() or (shift != shift[0]).any():
+    if (true < 0).any() or (shift != (0 if result.absolute else shift[0])).any():
         return "wrong"
     return "found" if len(true) >= scene.visible - 1 else "fewer"
 
 
 def reproduce(out: Path | None) -> dict[str, Any]:
-    """Count outcomes; the first table's picture in `out`."""
-    tables = {
-        "frame": table(METHODS[0], CASES),
-        "near the ring": table(METHODS[0], NEAR_CASES, NEAR_RADII),
-        "Hough, frame": table(METHODS[1], HOUGH_CASES),
-    }
-    rows = [
-        {"case": f"clutter over the {name}" if name == "frame" else name, "ours": pooled(cells), "reference": {}}
-        for name, cells in tables.items()
-    ]
+    """Count outcomes and take times; the tables' picture in `out`."""
+    tables = {name: table(setting) for name, setting in TABLES.items()}
+    speeds = {name: speed(name) for name in CROWDS}
+    rows = [{"case": name, "ours": pooled(cells), "reference": {}} for name, cells in tables.items()]
     for name, cells in tables.items():
         for (visible, clutter), ours in cells.items():
             rows.append({"case": f"{name}: {visible} LEDs, {clutter} others", "ours": ours, "reference": {}})
     rows += [{"case": f"second ring, {name}", "ours": ours, "reference": {}} for name, ours in second_ring().items()]
+    rows += [{"case": f"time: {name}", "ours": ours, "reference": {}} for name, ours in speeds.items()]
     if out is not None:
-        _draw(tables, out / picture_name(ID))
+        _draw(tables, speeds, out / picture_name(ID))
     return {"id": ID, "source": _SOURCE, "rows": rows}
 
 
-def table(method: str, cases: int, near_radii: float | None = None) -> dict[tuple[int, int], dict[str, float]]:
+def table(setting: Setting, seed: int = _SEED) -> Cells:
     """Percentages by visible LEDs and clutter."""
-    return {
-        (visible, clutter): cell(method, cases, visible, clutter, near_radii)
-        for visible in VISIBLE
-        for clutter in CLUTTER
-    }
+    return {(visible, clutter): cell(setting, visible, clutter, seed) for visible in VISIBLE for clutter in CLUTTER}
 
 
-def cell(method: str, cases: int, visible: int, clutter: int, near_radii: float | None = None) -> dict[str, float]:
-    """Percentages of outcomes, and milliseconds; the same cases for both methods."""
-    rng = np.random.default_rng([visible, clutter, near_radii is not None])
-    scenes = (Scene(rng, visible, clutter, near_radii) for _ in range(cases))
-    return _counted(scenes, partial(_identify, method))
+def cell(setting: Setting, visible: int, clutter: int, seed: int = _SEED) -> dict[str, float]:
+    """Percentages of outcomes; the same scenes whatever is known of them."""
+    rng = np.random.default_rng([seed, visible, clutter, setting.near_radii is not None])
+    scenes = (Scene(rng, visible, clutter, setting.near_radii) for _ in range(setting.cases))
+    return _percentages([outcome(scene, setting.identify(scene)) for scene in scenes])
 
 
-def pooled(cells: dict[tuple[int, int], dict[str, float]]) -> dict[str, float]:
+def _percentages(outcomes: list[str]) -> dict[str, float]:
+    shares = {f"{one}_percent": 100.0 * outcomes.count(one) / len(outcomes) for one in _OUTCOMES}
+    return {"cases": len(outcomes), **shares}
+
+
+def pooled(cells: Cells) -> dict[str, float]:
     """Least found with five LEDs or more and up to twenty others, and wrong answers of all cells and the worst one."""
     wrong = [ours["wrong_percent"] for ours in cells.values()]
     found = [ours["found_percent"] for (visible, clutter), ours in cells.items() if visible >= 5 and clutter <= 20]
@@ -122,10 +117,10 @@ def pooled(cells: dict[tuple[int, int], dict[str, float]]) -> dict[str, float]:
     }
 
 
-def second_ring(cases: int = PAIR_CASES) -> dict[str, dict[str, float]]:
+def second_ring(cases: int = PAIR_CASES, seed: int = _SEED) -> dict[str, dict[str, float]]:
     """A true ring and one 1.36 to 2 times larger or smaller beside it: without prior, and with a radius to 15 %."""
-    rng = np.random.default_rng(2)
-    pairs: list[Scene] = []
+    rng = np.random.default_rng([seed, 2])
+    pairs: list[tuple[Scene, float]] = []
     while len(pairs) < cases:
         scene, other = Scene(rng), Scene(rng)
         ratio = max(scene.radius_px / other.radius_px, other.radius_px / scene.radius_px)
@@ -133,56 +128,73 @@ def second_ring(cases: int = PAIR_CASES) -> dict[str, dict[str, float]]:
         if apart and 1.36 < ratio < 2.0:
             scene.points = np.vstack([scene.points, other.points])
             scene.numbers = np.concatenate([scene.numbers, np.full(len(other.points), -1)])
-            pairs.append(scene)
+            pairs.append((scene, scene.radius_px / rng.uniform(0.85, 1.15)))
     result = {}
     for method in METHODS:
-        result[f"{method}, no prior"] = _counted(pairs, partial(_identify, method))
-        result[f"{method}, radius to 15 %"] = _counted(pairs, partial(_identify_with_radius, method))
+        alone = [outcome(scene, identify(scene.points, method)) for scene, _ in pairs]
+        told = [outcome(scene, identify(scene.points, method, expected_radius_px=guess)) for scene, guess in pairs]
+        result[f"{method}, no prior"], result[f"{method}, radius to 15 %"] = _percentages(alone), _percentages(told)
     return result
 
 
-def _identify(method: str, scene: Scene) -> Identification:
-    return identify(scene.points, method)
+def speed(crowd: str, cases: int = CROWD_CASES, repetitions: int = REPETITIONS) -> dict[str, float]:
+    """Milliseconds of both methods, no prior: median and worst case, each case's least of some repetitions."""
+    times = {}
+    for method in METHODS:
+        rng = np.random.default_rng([_SEED, list(CROWDS).index(crowd)])
+        least = [min(_seconds(points, method) for _ in range(repetitions)) for points in _crowds(crowd, cases, rng)]
+        times[f"{method}_median_ms"], times[f"{method}_worst_ms"] = 1e3 * float(np.median(least)), 1e3 * max(least)
+    return {"cases": cases, **times}
 
 
-def _identify_with_radius(method: str, scene: Scene) -> Identification:
-    return identify(scene.points, method, expected_radius_px=_guess(scene))
+def _crowds(name: str, cases: int, rng: np.random.Generator) -> list[Any]:
+    return [CROWDS[name](rng) for _ in range(cases)]
 
 
-def _guess(scene: Scene) -> float:
-    """A radius off by up to 15 %, the same each time it is asked for."""
-    return scene.radius_px / (0.85 + 0.3 * float(scene.points[0, 0] % 1.0))
+def _seconds(points: Any, method: str) -> float:
+    start = time.perf_counter()
+    identify(points, method)
+    return time.perf_counter() - start
 
 
-def _counted(scenes: Iterable[Scene], name: Callable[[Scene], Identification]) -> dict[str, float]:
-    outcomes, seconds = [], []
-    for scene in scenes:
-        start = time.perf_counter()
-        result = name(scene)
-        seconds.append(time.perf_counter() - start)
-        outcomes.append(outcome(scene, result))
-    ours: dict[str, float] = {"cases": len(outcomes)}
-    ours |= {f"{one}_percent": 100.0 * outcomes.count(one) / len(outcomes) for one in _OUTCOMES}
-    return ours | {"median_ms": 1e3 * float(np.median(seconds))}
-
-
-def _draw(tables: dict[str, dict[tuple[int, int], dict[str, float]]], path: Path) -> None:
+def _draw(tables: dict[str, Cells], speeds: dict[str, dict[str, float]], path: Path) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=_SIZE_IN, dpi=_DPI, layout="constrained")
     FigureCanvasAgg(figure)
+    upper, lower = figure.subfigures(2, 1, squeeze=False, height_ratios=(len(tables), 1.4))[:, 0]
     shown = ("found", "ambiguous", "wrong")
-    for row, axes_row in zip(tables.items(), figure.subplots(len(tables), len(shown)), strict=True):
+    for row, axes_row in zip(tables.items(), upper.subplots(len(tables), len(shown), sharex=True), strict=True):
         name, cells = row
         for what, axes in zip(shown, axes_row, strict=True):
             values = np.array([[cells[v, c][f"{what}_percent"] for c in CLUTTER] for v in VISIBLE])
             full = 100.0 if what != "wrong" else 1.0
-            axes.imshow(values, vmin=0.0, vmax=full, cmap="Blues", aspect="auto")
+            axes.imshow(values, vmin=0.0, vmax=full, cmap="Reds" if what == "wrong" else "Blues", aspect="auto")
             for (i, j), value in np.ndenumerate(values):
                 colour = "white" if value > 0.6 * full else "black"
                 axes.text(j, i, f"{value:.3g}", ha="center", va="center", fontsize=8, color=colour)
-            axes.set(title=f"{name}: {what} [%]", xlabel="clutter", ylabel="LEDs seen")
+            axes.set_title(f"{name}: {what} [%]", fontsize=10)
             axes.set_xticks(range(len(CLUTTER)), [str(c) for c in CLUTTER])
             axes.set_yticks(range(len(VISIBLE)), [str(v) for v in VISIBLE])
+        axes_row[0].set_ylabel("LEDs seen")
+    for axes in axes_row:
+        axes.set_xlabel("clutter")
+    _draw_speeds(lower.subplots(), speeds)
     figure.savefig(path)
+
+
+def _draw_speeds(axes: Any, speeds: dict[str, dict[str, float]]) -> None:
+    place = np.arange(len(speeds))
+    for k, method in enumerate(METHODS):
+        median, worst = (
+            np.array([ours[f"{method}_{what}_ms"] for ours in speeds.values()]) for what in ("median", "worst")
+        )
+        y = place + 0.2 * (2 * k - 1)
+        axes.barh(y, median, height=0.35, color=f"C{k}", label=f"{method}: median")
+        axes.plot(worst, y, "|", color=f"C{k}", markersize=10, label="worst")
+    axes.set_yticks(place, list(speeds))
+    axes.invert_yaxis()
+    axes.set(xlabel="ms", title="time of forty candidates, nothing known")
+    axes.grid(axis="x", alpha=0.3)
+    axes.legend(fontsize=8)

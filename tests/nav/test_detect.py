@@ -75,7 +75,8 @@ def test_ten_bit_frames_in_sixteen_bit_words_give_the_same_centres(render):
     image = render((200, 200), ring_spots((100, 100), 50, 3e4), np.random.default_rng(11))
     wide = image.astype(np.uint16) * 4
     settings = DetectSettings(
-        spot_contrast_dn=16.0,
+        spot_contrast_dn=8.0,
+        middle_spot_contrast_dn=16.0,
         wide_spot_contrast_dn=192.0,
         min_contrast_dn=32.0,
         max_contrast_dn=160.0,
@@ -128,7 +129,7 @@ def test_random_frames_give_finite_blobs_of_allowed_area():
         image = (rng.random(shape) ** rng.uniform(0.2, 8.0) * 255).astype(np.uint8)
         blobs = detect(image)
         assert np.isfinite(blobs.centroids_px).all() and np.isfinite(blobs.sigma_px).all()
-        assert ((blobs.area_px >= 3) & (blobs.area_px <= 400)).all()
+        assert ((blobs.area_px >= 2) & (blobs.area_px <= 400)).all()
         assert (blobs.sigma_px > 0).all()
 
 
@@ -163,3 +164,47 @@ def test_a_spot_s_threshold_is_reported_and_lies_between_background_and_peak(ren
     assert (blobs.thresholds_dn > 5).all() and (blobs.thresholds_dn < blobs.peak).all()
     assert blobs.threshold_dn == blobs.thresholds_dn.min()
     assert detect(np.zeros((9, 9), np.uint8)).threshold_dn == -1
+
+
+def test_gaps_in_cloud_are_dropped_by_their_softness_and_an_led_before_them_is_kept():
+    """Gaussians of sigma 1.8 px: flux over peak is 2 pi sigma^2 = 20 pixels, where 7 are allowed."""
+    rng = np.random.default_rng(18)
+    rows, columns = np.indices((200, 300))
+    gaps = [(u, v) for u in range(30, 280, 40) for v in range(30, 180, 40)]
+    image = 20.0 + sum(40.0 * np.exp(-((columns - u) ** 2 + (rows - v) ** 2) / (2 * 1.8**2)) for u, v in gaps)
+    image += 60.0 * np.exp(-((columns - 130.3) ** 2 + (rows - 91.2) ** 2) / (2 * 0.7**2))
+    image = np.rint(image + rng.normal(0.0, 0.8, image.shape)).astype(np.uint8)
+    assert len(detect(image, DetectSettings(max_equivalent_area_px=100.0))) > len(gaps) / 2
+    blobs = detect(image)
+    assert len(blobs) == 1
+    np.testing.assert_allclose(blobs.centroids_px, [[130.3, 91.2]], atol=0.05)
+
+
+def test_pairs_of_hot_pixels_are_no_leds():
+    rng = np.random.default_rng(19)
+    image = np.rint(rng.normal(3.2, 0.45, (500, 900))).clip(0, 255).astype(np.uint8)
+    places = [(i, j) for i in range(10, 490, 12) for j in range(10, 880, 12)]
+    for i, j in places:
+        image[i, j] = rng.integers(6, 256)
+        image[i + rng.integers(0, 2), j + 1] = rng.integers(6, 256)
+    assert len(detect(image)) < 0.005 * len(places)  # faint ones, under 10 DN, of which noise makes a third pixel
+
+
+@pytest.mark.parametrize(("ratio", "least"), [(8.0, 0.35), (12.0, 0.85), (18.0, 0.99)])
+def test_leds_are_found_as_their_ratio_of_signal_to_noise_allows(ratio, least):
+    """Gaussian spots of sigma 0.65 px at random phases in the noise of 14 us; the ratio is the matched filter's.
+
+    Noise is 0.35 DN before rounding, which adds 1/12 DN^2; of 400 LEDs a share of 0.85 has a standard error of 0.018.
+    """
+    rng = np.random.default_rng(20)
+    x, image = np.arange(820), np.full((820, 820), 3.2)
+    places = np.array([(20 + 40 * k, 20 + 40 * m) for k in range(20) for m in range(20)])
+    true = places + rng.uniform(-0.5, 0.5, (400, 2))
+    for u, v in true:
+        spot = np.outer(*(np.exp(-((x[int(c) - 8 : int(c) + 9] - c) ** 2) / (2 * 0.65**2)) for c in (v, u)))
+        spot *= ratio * np.hypot(0.35, 12**-0.5) / np.linalg.norm(spot)
+        image[int(v) - 8 : int(v) + 9, int(u) - 8 : int(u) + 9] += spot
+    blobs = detect(np.rint(image + rng.normal(0.0, 0.35, image.shape)).astype(np.uint8))
+    near = np.linalg.norm(blobs.centroids_px[:, None] - true[None], axis=2) < 2.0
+    assert near.any(axis=0).mean() >= least
+    assert (~near.any(axis=1)).sum() <= 1

@@ -13,6 +13,9 @@ SETTINGS = [
     DetectSettings(threshold_dn=90, centroid="weighted"),
     DetectSettings(min_area_px=1, max_area_px=10**6, max_elongation=1e9, element_size_px=1),
     DetectSettings(method="frame", connectivity=4, element_shape="cross", element_size_px=5, spare_below_px=1),
+    DetectSettings(threshold_dn=1, min_area_px=1, max_area_px=10**6, max_elongation=1e9, local_background=False),
+    DetectSettings(threshold_dn=0, min_area_px=1, max_area_px=10**6, centroid="weighted", max_elongation=1e9),
+    DetectSettings(threshold_dn=-5, min_area_px=1, max_area_px=10**6, local_background=False, spare_below_px=1),
 ]
 
 
@@ -50,7 +53,10 @@ def _check(blobs: Blobs, image: np.ndarray, settings: DetectSettings) -> None:
         assert values.shape == (n,)
         assert np.isfinite(values).all()
     assert np.isfinite(blobs.centroids_px).all()
+    assert (blobs.centroids_px >= -0.5).all()
+    assert (blobs.centroids_px <= np.array(image.shape[::-1]) - 0.5).all()
     assert (blobs.sigma_px > 0.0).all()
+    assert (blobs.flux > 0.0).all()
     assert ((blobs.area_px >= settings.min_area_px) & (blobs.area_px <= settings.max_area_px)).all()
     assert (blobs.peak > blobs.thresholds_dn).all()
     if n:

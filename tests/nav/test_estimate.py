@@ -10,9 +10,11 @@ from scipy.stats import chi2
 
 from dockair.calibration import Camera, LedRing
 from dockair.errors import DockairError
-from dockair.nav.pose.descent import PosePrior
-from dockair.nav.pose.estimate import PoseEstimate, PoseStatus, solve_pose
-from dockair.rotations import Array, exp, log, matrix_from_yaw_pitch_roll
+from dockair.nav.pose import model
+from dockair.nav.pose.estimate import PoseEstimate, PoseOptions, PoseStatus, solve_pose
+from dockair.nav.pose.measurement import lens_of
+from dockair.nav.pose.prior import AttitudePrior, DirectionPrior, PosePrior
+from dockair.rotations import Array, exp, log, matrix_from_yaw_pitch_roll, mrp_from_matrix
 
 RING, CAMERA = LedRing().positions_D, Camera()
 LENS = replace(CAMERA, distortion=(-0.12, 0.06, 8e-4, -5e-4, -0.01))
@@ -235,31 +237,160 @@ def test_start_with_the_range_far_off_still_arrives():
         assert min(np.abs(error(e, R, p)).max() for e in (estimate, estimate.alternative or estimate)) < 1e-5
 
 
-@pytest.mark.parametrize(
-    "points", [RING[[0, 4, 0, 4]], RING[[2, 2, 2, 2]], np.outer([0.0, 1.0, 2.0, 3.0], [0.0, 0.1, 0.2])]
-)
+@pytest.mark.parametrize("count", [4, 6])
 @pytest.mark.parametrize("with_start", [False, True])
-def test_leds_on_a_line_are_degenerate(points, with_start):
+def test_leds_on_a_line_are_degenerate(count, with_start):
     R, p = tilted(10.0, 8.0)
+    points = np.outer(np.arange(count), [0.0, 0.1, 0.2])
     start = (R, p) if with_start else None
     estimate = solve_pose(pixels_of(R, p, points=points), points, CAMERA, initial=start)
     assert estimate.status is PoseStatus.DEGENERATE
     assert np.isnan(estimate.covariance).all()
 
 
-@settings(max_examples=200, deadline=None)
+@pytest.mark.parametrize("leds", [[0, 4, 0, 4], [2, 2, 2, 2], [0, 3, 5, 3, 0, 5]])
+def test_an_led_that_comes_twice_counts_once(leds):
+    R, p = tilted(10.0, 8.0)
+    points = RING[leds]
+    assert solve_pose(pixels_of(R, p, points=points), points, CAMERA).status is PoseStatus.TOO_FEW_LEDS
+    with_start = solve_pose(pixels_of(R, p, points=points), points, CAMERA, initial=(R, p))
+    three = len(set(leds)) == 3
+    assert with_start.status is (PoseStatus.CONVERGED if three else PoseStatus.TOO_FEW_LEDS)
+
+
+def test_second_minimum_is_found_when_both_guesses_lead_to_the_first():
+    """Frontal at 25 m, 100 noisy frames: orthography guesses nearly the same pose twice; mirror images still come."""
+    rng, (R, p), pairs = np.random.default_rng(48), tilted(0.0, 25.0), 0
+    for _ in range(100):
+        pixels = pixels_of(R, p) + 0.1 * rng.normal(size=(8, 2))
+        estimate = solve_pose(pixels, RING, CAMERA)
+        assert estimate.status is PoseStatus.CONVERGED
+        again = solve_pose(pixels, RING, CAMERA, initial=(estimate.R_CD, estimate.p_CD))
+        assert (again.alternative is None) == (estimate.alternative is None)
+        if estimate.alternative is not None:
+            pairs += 1
+            assert estimate.ambiguous and again.alternative is not None
+            assert again.alternative.cost == pytest.approx(estimate.alternative.cost, rel=1e-3)
+    assert pairs > 60
+
+
+def test_mirror_can_be_left_out_with_a_start_and_nothing_else_changes():
+    R, p = tilted(10.0, 20.0)
+    pixels = pixels_of(R, p) + 0.1 * np.random.default_rng(49).normal(size=(8, 2))
+    both = solve_pose(pixels, RING, CAMERA, initial=(R, p))
+    alone = solve_pose(pixels, RING, CAMERA, initial=(R, p), options=PoseOptions(mirror=False))
+    assert both.alternative is not None and alone.alternative is None
+    assert not alone.ambiguous and alone.reprojection_ratio == 0.0
+    np.testing.assert_array_equal(alone.covariance, both.covariance)
+    np.testing.assert_array_equal(alone.p_CD, both.p_CD)
+
+
+def test_reprojection_ratio_and_ambiguity_follow_the_two_minima():
+    """Near 1 for a far ring, small for a near one; ambiguous below a difference of 25 in cost, counted anew here."""
+    rng = np.random.default_rng(50)
+    far, near = tilted(5.0, 30.0), tilted(20.0, 8.0)
+    ratios = []
+    for R, p in (far, near):
+        pose = solve_pose(pixels_of(R, p) + 0.1 * rng.normal(size=(8, 2)), RING, CAMERA)
+        assert pose.alternative is not None
+        rms = [
+            np.sqrt(np.mean((pixels_of(e.R_CD, e.p_CD) - pixels_of(pose.R_CD, pose.p_CD)) ** 2))
+            for e in (pose, pose.alternative)
+        ]
+        assert rms[0] == 0.0 < rms[1]
+        assert pose.reprojection_ratio == pytest.approx(pose.rms_px / pose.alternative.rms_px)
+        assert pose.ambiguous == (pose.alternative.chi2 - pose.chi2 < 25.0)
+        ratios.append(pose.reprojection_ratio)
+    assert ratios[0] > 0.9 > 0.2 > ratios[1] > 0.0
+
+
+def test_condition_is_that_of_the_pixel_jacobian_in_metres():
+    """By NumPy: squared, since the information is its square; a frontal far ring stands out."""
+    for range_m, tilt_deg, low, high in ((3.0, 20.0, 10.0, 300.0), (30.0, 1.0, 1e4, 1e6)):
+        R, p = tilted(tilt_deg, range_m)
+        estimate = solve_pose(pixels_of(R, p), RING, CAMERA, initial=(R, p))
+        _, J = model.pixels(mrp_from_matrix(R), p, RING, lens_of(CAMERA), model.LOCAL)
+        J = J.reshape(-1, 6) / np.array([0.25, 0.25, 0.25, 1.0, 1.0, 1.0])
+        assert estimate.condition == pytest.approx(np.linalg.cond(J) ** 2, rel=1e-3)
+        assert low < estimate.condition < high
+    assert np.isnan(solve_pose(np.full((8, 2), np.nan), RING, CAMERA).condition)
+
+
+@pytest.mark.parametrize("camera", [CAMERA, LENS], ids=["pinhole", "distorted"])
+def test_residuals_in_pixels_give_the_same_pose(camera):
+    rng = np.random.default_rng(51)
+    for R, p in random_poses(20, 2.0, 12.0):
+        pixels = pixels_of(R, p, camera) + 0.1 * rng.normal(size=(8, 2))
+        first = solve_pose(pixels, RING, camera)
+        second = solve_pose(pixels, RING, camera, options=PoseOptions(residuals="pixels"))
+        d = error(first, second.R_CD, second.p_CD)
+        assert d @ np.linalg.solve(first.covariance, d) < 1e-4
+        residual = pixels - pixels_of(second.R_CD, second.p_CD, camera)
+        assert second.rms_px == pytest.approx(np.sqrt(np.mean(residual**2)), rel=1e-9)
+
+
+def test_isotropic_weight_is_near_the_efficient_one_on_the_axis_and_worse_off_it():
+    """At 20 degrees off the axis a pixel is worth cos^2 = 0.88 of one direction and cos of the other."""
+    (R, p), isotropic = tilted(10.0, 5.0), PoseOptions(weight="isotropic")
+    on_axis = [solve_pose(pixels_of(R, p), RING, CAMERA, options=o).covariance for o in (PoseOptions(), isotropic)]
+    np.testing.assert_allclose(on_axis[1], on_axis[0], rtol=0.02, atol=0.02 * on_axis[0].max())
+    p = 5.0 * np.array([1.0, 0.33, 0.0])
+    ratio = np.divide(
+        *[solve_pose(pixels_of(R, p), RING, CAMERA, options=o).covariance[3, 3] for o in (isotropic, PoseOptions())]
+    )
+    assert ratio > 1.1
+
+
+def test_hubers_loss_leaves_a_wrong_led_where_it_is_and_shows_it():
+    rng, (R, p) = np.random.default_rng(52), tilted(15.0, 8.0)
+    pixels = pixels_of(R, p) + 0.1 * rng.normal(size=(8, 2))
+    pixels[5] += [6.0, -8.0]
+    plain = solve_pose(pixels, RING, CAMERA, initial=(R, p))
+    robust = solve_pose(pixels, RING, CAMERA, initial=(R, p), options=PoseOptions(huber_sigma=2.5))
+    assert np.linalg.norm(error(robust, R, p)[3:]) < 0.3 * np.linalg.norm(error(plain, R, p)[3:])
+    assert np.argmax(robust.led_chi2) == 5 and robust.led_chi2[5] > 5000.0 > plain.led_chi2.max() * 0.9
+    assert robust.cost < robust.chi2
+
+
+METHODS = ("lm", "glsdc", "levenberg", "gradient")
+COORDINATES = st.one_of(st.floats(-1e6, 1e6), st.sampled_from([np.nan, np.inf, -np.inf, 1e300, 0.0, 1023.5]))
+
+
+@settings(max_examples=300, deadline=None)
 @given(
-    st.lists(st.tuples(st.one_of(st.floats(-1e6, 1e6), st.just(np.nan)), st.floats(-1e6, 1e6)), min_size=8, max_size=8),
-    st.booleans(),
-    st.sampled_from(["lm", "glsdc"]),
+    st.lists(st.tuples(COORDINATES, COORDINATES), max_size=10),
+    st.sampled_from(METHODS),
+    st.sampled_from([CAMERA, LENS]),
+    st.sampled_from(["none", "ahead", "behind", "at the camera", "attitude", "direction", "pose"]),
+    st.sampled_from([PoseOptions(), PoseOptions(residuals="pixels"), PoseOptions(huber_sigma=1.0, weight="isotropic")]),
+    st.lists(st.integers(0, 9), min_size=10, max_size=10),
 )
-def test_any_pixels_give_a_status_and_nan_covariance_unless_converged(pixels, with_start, method):
-    start = (np.eye(3), np.array([8.0, 0.0, 0.0])) if with_start else None
-    estimate = solve_pose(np.array(pixels), RING, CAMERA, method=method, initial=start)
+def test_any_pixels_give_a_status_and_nan_covariance_unless_converged(pixels, method, camera, start, options, leds):
+    """LEDs come twice, lie on a line, are too few; pixels are far out of the frame or none; starts are anywhere."""
+    points = np.vstack([RING, [[0.0, 0.0, 0.0], [0.1, 0.2, 0.3]]])[leds[: len(pixels)]]
+    x = np.array([1.0, 0.0, 0.0])
+    initial = {"ahead": (np.eye(3), 8.0 * x), "behind": (np.eye(3), -8.0 * x), "at the camera": (np.eye(3), 0.0 * x)}
+    prior = {
+        "attitude": AttitudePrior.from_sigmas(np.eye(3), np.array([np.inf, 0.01, 0.01])),
+        "direction": DirectionPrior(axis_C=x, axis_D=x, sigma_rad=0.01),
+        "pose": PosePrior(R_CD=np.eye(3), p_CD=8.0 * x, covariance=0.01 * np.eye(6)),
+    }
+    estimate = solve_pose(
+        np.array(pixels).reshape(-1, 2),
+        points.reshape(-1, 3),
+        camera,
+        method="lm" if start in prior else method,
+        initial=initial.get(start),
+        prior=prior.get(start),
+        options=options,
+    )
     converged = estimate.status is PoseStatus.CONVERGED
     assert np.isfinite(estimate.covariance).all() == converged
+    assert np.isfinite(estimate.condition) == converged
     if converged:
-        assert ((RING @ estimate.R_CD.T + estimate.p_CD) @ np.array([1.0, 0.0, 0.0]) > 0.0).any()
+        assert np.isfinite(estimate.p_CD).all() and np.isfinite(estimate.R_CD).all()
+        seen = np.isfinite(estimate.led_chi2)
+        assert ((points @ estimate.R_CD.T + estimate.p_CD)[seen, 0] > 0.0).all()  # every LED used is ahead
         assert (np.linalg.eigvalsh(estimate.covariance) > 0.0).all()
 
 
@@ -274,10 +405,34 @@ def test_any_pixels_give_a_status_and_nan_covariance_unless_converged(pixels, wi
         ({"sigma_px": np.full(7, 0.1)}, "sigma_px"),
         ({"sigma_px": np.array([0.1] * 7 + [np.nan])}, "sigma_px"),
         ({"method": "epnp"}, "method"),
+        ({"method": "glsdc", "prior": AttitudePrior(R_CD=np.eye(3), information=np.eye(3))}, "method"),
+        ({"pixels": [[1.0, 2.0], [3.0]]}, "pixels, points_D"),
+        ({"pixels": [["a", "b"]] * 8}, "pixels, points_D"),
+        ({"points_D": np.zeros((8, 2))}, "points_D"),
+        ({"sigma_px": "much"}, "sigma_px"),
+        ({"initial": (np.eye(2), np.zeros(3))}, "initial"),
+        ({"initial": (np.eye(3), np.zeros(2))}, "initial"),
+        ({"initial": (np.full((3, 3), np.nan), np.array([8.0, 0.0, 0.0]))}, "initial"),
+        ({"initial": (np.eye(3), np.array([np.nan, 0.0, 0.0]))}, "initial"),
     ],
 )
 def test_wrong_arguments_are_refused_by_name(change, where):
     arguments = {"pixels": np.zeros((8, 2)), "points_D": RING, "camera": CAMERA, **change}
     with pytest.raises(DockairError) as caught:
         solve_pose(**arguments)
+    assert caught.value.where == where
+
+
+@pytest.mark.parametrize(
+    ("option", "where"),
+    [
+        ({"residuals": "mm"}, "options.residuals"),
+        ({"weight": "none"}, "options.weight"),
+        ({"huber_sigma": 0.0}, "options.huber_sigma"),
+        ({"huber_sigma": np.nan}, "options.huber_sigma"),
+    ],
+)
+def test_options_that_do_not_exist_are_refused_by_name(option, where):
+    with pytest.raises(DockairError) as caught:
+        PoseOptions(**option)
     assert caught.value.where == where

@@ -6,8 +6,11 @@ import numpy as np
 import pytest
 
 from dockair.calibration import Camera
+from dockair.nav.identify import hypotheses
+from dockair.nav.identify.brightness import brightness_model
 from dockair.nav.identify.hypotheses import (
     METHODS,
+    Candidates,
     IdentifySettings,
     _contained,
     _keys,
@@ -16,6 +19,7 @@ from dockair.nav.identify.hypotheses import (
     ring_fits,
     without_impostors,
 )
+from dockair.nav.identify.perspective import fit_ring
 from dockair.nav.identify.prior import make_prior
 
 SETTINGS = IdentifySettings()
@@ -23,8 +27,13 @@ OPEN = make_prior(SETTINGS.radius_range_px, 1.0, 0.25, None, None, None, None, N
 both_methods = pytest.mark.parametrize("method", METHODS)
 
 
-def fits_of(points, method="three_point"):
-    return ring_fits(points, method, OPEN, Camera(), 0.1, SETTINGS, 1e-3)
+def candidates_at(points, flux=None):
+    brightness = None if flux is None else brightness_model(flux, SETTINGS.brightness)
+    return Candidates(points=points, sigma_px=0.1, brightness=brightness)
+
+
+def fits_of(points, method="three_point", flux=None):
+    return ring_fits(candidates_at(points, flux), method, OPEN, Camera(), SETTINGS, 1e-3)
 
 
 @both_methods
@@ -52,7 +61,7 @@ def test_the_expected_number_of_accidental_rings_is_the_formulas(ring_scene):
     scene = ring_scene(np.random.default_rng(43), visible=6, clutter=12, range_m=(5.0, 8.0))
     best = fits_of(scene.points)[0]
     assert best.fit.count == 6
-    tested = _octagons(scene.points, "three_point", OPEN, Camera(), 0.1, SETTINGS).tested_right_angles
+    tested = _octagons(candidates_at(scene.points), "three_point", OPEN, Camera(), SETTINGS).tested_right_angles
     distance = np.hypot(*(scene.points - best.fit.centre_px).T)
     near = np.count_nonzero(distance[scene.numbers < 0] < 1.6 * best.fit.radius_px)
     crowd = near / (np.pi * (1.6 * best.fit.radius_px) ** 2)
@@ -81,6 +90,39 @@ def test_hypotheses_have_one_key_exactly_when_they_are_the_same_up_to_the_symmet
     )
     for turn in range(8):
         np.testing.assert_array_equal(_keys(np.roll(rows, turn, axis=1)), keys)
+
+
+def test_equal_brightness_lowers_accidents_and_odds_by_their_likelihood_ratios(ring_scene):
+    scene = ring_scene(np.random.default_rng(47), visible=6, clutter=12, clutter_box_radii=1.5, range_m=(5.0, 8.0))
+    flux = np.where(scene.numbers >= 0, 100.0, np.geomspace(1.0, 1e4, len(scene.numbers)))
+    by_place, by_both = fits_of(scene.points)[0], fits_of(scene.points, flux=flux)[0]
+    np.testing.assert_array_equal(by_place.fit.candidate, by_both.fit.candidate)
+    L, L_i = brightness_model(flux, SETTINGS.brightness).likelihood_ratios(by_both.fit.candidate[None])
+    assert L[0] > 10.0
+    assert by_place.log10_false_rings - by_both.log10_false_rings == pytest.approx(np.log10(L[0]))
+    np.testing.assert_allclose(by_place.odds / L_i[0], by_both.odds)
+
+
+def test_unequal_brightness_makes_no_ring_an_accident(ring_scene):
+    """Markov's bound says nothing of an L below 1."""
+    scene = ring_scene(np.random.default_rng(48), clutter=5, range_m=(5.0, 8.0))
+    flux = np.geomspace(1.0, 1e4, len(scene.numbers))
+    assert fits_of(scene.points)[0].log10_false_rings == fits_of(scene.points, flux=flux)[0].log10_false_rings
+
+
+@both_methods
+def test_no_more_is_fitted_than_the_settings_allow_and_nothing_after_two_whole_rings(method, ring_scene, monkeypatch):
+    """Five blobs about each LED of one ring are 8^5 rings; two apart from one another settle it."""
+    fits = []
+    monkeypatch.setattr(hypotheses, "fit_ring", lambda *a, **k: fits.append(fit_ring(*a, **k)) or fits[-1])
+    scene = ring_scene(np.random.default_rng(49), range_m=(8.0, 9.0))
+    crowd = np.vstack([scene.led_px] * 5) + 1.5 * np.random.default_rng(50).standard_normal((40, 2))
+    fits_of(crowd, method)
+    assert 3 < len(fits) <= SETTINGS.max_fits
+    fits.clear()
+    pair = np.vstack([scene.led_px, scene.led_px + 3.0 * scene.radius_px * np.array([1.0, 0.0])])
+    fits_of(pair, method)
+    assert len(fits) == 2
 
 
 def test_a_doubtful_member_is_left_out_and_two_are_too_many(ring_scene):

@@ -7,11 +7,12 @@ from hypothesis import strategies as st
 from scipy import ndimage
 from scipy.special import erf
 
-from dockair.nav.image.spot_kernels import ARC, CUT_PX, REACHES_PX, SPARE, WIDE_PX, ring_steps
+from dockair.nav.image.spot_kernels import ARC, CUT_PX, REACHES_PX, SPARE, ring_steps
 from dockair.nav.image.spots import SpotLimits, Spots, find_spots
 
 LIMITS = SpotLimits(
-    min_contrast_dn=4.0, wide_contrast_dn=48.0, noise_factor=5.0, min_share=0.1, texture=0.04,
+    small_contrast_dn=2.0, middle_contrast_dn=4.0, wide_contrast_dn=48.0, isolation=3.0, texture=0.2, detection=6.0,
+    beside=1.5, pixel=2.5, share=0.1,
     gain_dn_per_electron=0.0187, noise_dn=0.4,
 )  # fmt: skip
 
@@ -52,6 +53,20 @@ def textured(seed: int, shape: tuple[int, int]) -> np.ndarray:
     return digital(blurred(shape, spots, image) + rng.normal(size=shape))
 
 
+def noise_of(level: float) -> float:
+    return float(np.sqrt(LIMITS.gain_dn_per_electron * level + LIMITS.noise_dn**2))
+
+
+def is_a_point(levels: np.ndarray, peak: tuple[int, int], b: float) -> bool:
+    """Eq. (2), with NumPy."""
+    i, j = peak
+    w = np.outer([1, 2, 1], [1, 2, 1]) * (levels[i - 1 : i + 2, j - 1 : j + 2] - b)
+    beside = np.delete(w.ravel(), 4)
+    seven = beside.sum() - max(beside.max(), 0.0)
+    least = max(LIMITS.beside * noise_of(b), LIMITS.share * (levels[i, j] - b))
+    return w.sum() / 6.0 >= LIMITS.detection * noise_of(b) and seven / 4.0 >= least
+
+
 def satisfies_the_definition(image: np.ndarray, threshold: int, background: float, pixels: list) -> bool:
     """Whether some reach and centre make Eqs. (1) and (2) true of these pixels, by trying all."""
     levels = image.astype(int)
@@ -64,13 +79,16 @@ def satisfies_the_definition(image: np.ndarray, threshold: int, background: floa
                 continue
             ring = np.array([levels[i + a, j + b] for a, b in ring_steps(reach)])
             if reach == CUT_PX:
-                rest = min((np.roll(ring, -k)[ARC:] for k in range(len(ring))), key=np.max)
+                most = min(np.roll(ring, -k)[ARC:].max() for k in range(len(ring)))
+                rest = ring[ring <= most]
             else:
-                rest = np.sort(ring)[: len(ring) - len(ring) // SPARE]
+                rest = ring[ring <= np.sort(ring)[len(ring) - len(ring) // SPARE - 1]]
             m, b = rest.max(), rest.mean()
-            least = LIMITS.wide_contrast_dn if reach >= WIDE_PX else LIMITS.min_contrast_dn
-            noise = np.sqrt(LIMITS.gain_dn_per_electron * m + LIMITS.noise_dn**2 + (LIMITS.texture * m) ** 2)
-            if peak - m < max(least, LIMITS.noise_factor * noise, m - b) or abs(b - background) > 1e-9:
+            least = {2: LIMITS.small_contrast_dn, 4: LIMITS.middle_contrast_dn}.get(reach, LIMITS.wide_contrast_dn)
+            isolation = np.hypot(LIMITS.isolation * noise_of(m), LIMITS.texture * m)
+            if peak - m < max(least, isolation, m - b) or abs(b - background) > 1e-9:
+                continue
+            if not any(is_a_point(levels, p, b) for p in pixels if levels[p] == peak):
                 continue
             near = np.hypot(*(np.indices(image.shape) - np.array([i, j])[:, None, None])) ** 2 < (reach - 0.5) ** 2
             above = (levels > threshold) & (near if reach == CUT_PX else True)
@@ -191,13 +209,12 @@ def test_the_sun_s_veil_hides_no_led_that_stands_a_half_above_it():
     assert all(any((v, u) in pixels for pixels in found) for u, v in true)
 
 
-def test_noise_alone_makes_no_spot_of_three_pixels():
-    """2.2 million pixels at each of three levels; a spot needs three pixels, each five standard deviations up."""
+def test_noise_alone_makes_no_spot():
+    """2.2 million pixels at each of three levels; normal noise is six standard deviations up in one of 1e9."""
     rng = np.random.default_rng(6)
     for level_e in (100.0, 2000.0, 8000.0):
         electrons = rng.normal(level_e, np.sqrt(level_e + 13.0**2), (1088, 2048))
-        spots = find_spots(digital(0.0187 * electrons), LIMITS)
-        assert (spots.runs.area_px < 3).all()
+        assert find_spots(digital(0.0187 * electrons), LIMITS).runs.count == 0
 
 
 @pytest.mark.parametrize("seed", range(8))

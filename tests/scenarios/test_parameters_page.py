@@ -9,7 +9,7 @@ from dockair.parameters import load_parameters, read_sheet, sheet_names
 from dockair.scenarios import build
 from dockair.scenarios.parameters_page import parameters_page
 from dockair.scenarios.schema import load_scenario
-from dockair.sim.camera import camera
+from dockair.sim.camera import sheets
 
 PAGE = Path(__file__).parents[2] / "docs" / "parameters.md"
 
@@ -45,7 +45,7 @@ def test_every_sheet_fills_the_class_that_a_flight_is_built_with(monkeypatch: py
         return load_parameters(sheet, cls, overrides)
 
     monkeypatch.setattr(build, "load_parameters", recording)
-    monkeypatch.setattr(camera, "load_parameters", recording)
+    monkeypatch.setattr(sheets, "load_parameters", recording)
     monkeypatch.setattr(build, "SETTLE_S", 0.0)
     for filter_name, imu in (("long_pass", "mti"), ("band_pass", "tactical"), ("long_pass", "consumer")):
         build.build(load_scenario("default", {"camera.filter": filter_name, "hardware.imu": imu}), 0)

@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 from PIL import Image
 
 from dockair.messages import Window
+from dockair.scenarios import picture
 from dockair.scenarios.flight_log import FlightLog
 from dockair.scenarios.message_log import MessageLog, NavigatorRecipe, read_messages
 from dockair.scenarios.picture import picture_of_flight
@@ -114,8 +116,6 @@ def test_overlays_are_drawn_at_the_ticks_with_a_new_frame(flown, hand_made):
 def test_the_believed_ring_passes_through_the_leds_when_the_belief_is_true(make_hand_made):
     flight = make_hand_made(error_B=np.zeros(3))
     truth, _, _, solution = flight.tick(10)
-    from dataclasses import replace
-
     solution = replace(solution, R_BD=truth.R_WB.T @ truth.R_WD)
     ring = believed_ring_px(solution, flight.sheets, count=48)
     np.testing.assert_allclose(ring[:-1:6], flight.leds_px(truth), atol=1e-9)
@@ -147,6 +147,21 @@ def test_the_picture_of_a_flight_is_small_and_not_blank(flown):
     pixels = np.asarray(Image.open(path).convert("L"))
     assert pixels.shape[1] > 800
     assert pixels.std() > 10.0
+
+
+def test_a_picture_shows_the_only_frame_of_a_camera_that_drops_out_after_it(hand_made, tmp_path, monkeypatch):
+    """The frame of tick 2 stays the last one used; the frame drawn is that one."""
+    log = FlightLog()
+    with MessageLog(tmp_path, NavigatorRecipe(class_name="a:B", sheets=hand_made.sheets)) as messages:
+        for k, (truth, imu, frame, solution) in enumerate(hand_made.ticks(20), start=1):
+            solution = replace(solution, frame_time_stamp_s=0.019 if k >= 2 else np.nan)
+            log.append(truth, imu, frame if k == 2 else None, solution)
+            messages.append(imu, frame if k == 2 else None, solution)
+    log.write_parquet(tmp_path)
+    drawn = []
+    monkeypatch.setattr(picture, "_draw_frame", lambda axes, pixels, *rest: drawn.append(pixels))
+    picture_of_flight(tmp_path)
+    np.testing.assert_array_equal(drawn[0], hand_made.tick(2)[2].pixels)
 
 
 def test_a_picture_needs_no_frames(flown):

@@ -1,0 +1,89 @@
+"""Whether the last frame's pose is good enough to push the probe into the drogue: a claim with its reasons.
+
+The levels are those of one frame; a belief that many frames made lies off it by some centimetres, and what is known of
+it is `ProtectionLevels.about` that offset. Errors common to all frames (mounting, focal length) are not in the levels:
+the limits leave room for them.
+"""
+
+from dataclasses import dataclass, fields
+from enum import Enum
+
+from dockair.errors import DockairError
+from dockair.nav.integrity.levels import ProtectionLevels
+from dockair.nav.integrity.monitor import Integrity, IntegrityStatus
+
+
+class Doubt(Enum):
+    """Why the claim is not made."""
+
+    NO_POSE = "no pose"
+    NOT_TESTED = "too few LEDs to test"
+    INCONSISTENT = "LEDs contradict one another"
+    RANGE = "protection level of range above its limit"
+    LATERAL = "protection level across above its limit"
+    AGE = "frame too old"
+
+
+_DOUBT_OF = {
+    IntegrityStatus.NO_POSE: Doubt.NO_POSE,
+    IntegrityStatus.NOT_ENOUGH: Doubt.NOT_TESTED,
+    IntegrityStatus.INCONSISTENT: Doubt.INCONSISTENT,
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ContactLimits:
+    """Alert limits.
+
+    Raises:
+        DockairError: a limit that is not positive.
+    """
+
+    lateral_m: float = 0.10  # the basket takes the tip within 0.15 m; 0.05 m is left for steering and calibration
+    #: The tip latches 0.30 m ahead of the ring's plane and is taken to be there 0.05 m before. An error of 0.25 m would
+    #: have it pushed on outside the basket; 0.10 m of that is left for a drogue that gives way, and for calibration.
+    range_m: float = 0.15
+    age_s: float = 0.2  # a drogue of 0.7 m/s^2 in light gusts is 0.014 m off by then; ten frames at 50 Hz
+
+    def __post_init__(self) -> None:
+        for name in (f.name for f in fields(self)):
+            if not getattr(self, name) > 0.0:
+                raise DockairError(f"contact.{name}", expected="a number above 0", got=getattr(self, name))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ContactClaim:
+    """The answer."""
+
+    doubts: tuple[Doubt, ...]  #: every reason against; none when usable
+    levels: ProtectionLevels  #: that were held against the limits
+
+    @property
+    def usable(self) -> bool:
+        """Whether contact may be flown on it."""
+        return not self.doubts
+
+
+def usable_for_contact(
+    integrity: Integrity, age_s: float, limits: ContactLimits | None = None, *, levels: ProtectionLevels | None = None
+) -> ContactClaim:
+    """Return whether the fault test passed, both protection levels are below their limits, and the frame is recent.
+
+    Args:
+        integrity: of the last frame that gave a pose.
+        age_s: how long ago that was; NaN when there was none yet.
+        limits: alert limits.
+        levels: those of another estimate, `integrity.levels.about(its offset)`; the frame's own if not given.
+    """
+    limits, levels = limits or ContactLimits(), levels or integrity.levels
+    doubts = []
+    if integrity.status in _DOUBT_OF:
+        doubts.append(_DOUBT_OF[integrity.status])
+    else:
+        if not levels.range_m <= limits.range_m:
+            doubts.append(Doubt.RANGE)
+        if not levels.lateral_m <= limits.lateral_m:
+            doubts.append(Doubt.LATERAL)
+    if not 0.0 <= age_s <= limits.age_s:
+        doubts.append(Doubt.AGE)
+    return ContactClaim(doubts=tuple(doubts), levels=levels)
