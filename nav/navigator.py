@@ -1,7 +1,7 @@
 """The stages in order: gyro and frame in, belief and command out.
 
-    frame ► detect ► identify ► track ► pose ► fusion ► guidance ► command
-    gyro  ────────────────────────────────────┘
+    frame ► detect ► identify ► track ► pose ► integrity ► fusion ► guidance ► command
+    gyro  ────────────────────────────────────────────────┘
 
 Only this file knows the order. Everything it knows of its hardware arrives as `NavigationSheets`.
 
@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dockair.calibration import NavigationSheets, StartGeometry
+from dockair.calibration import LedRing, NavigationSheets, StartGeometry
 from dockair.errors import DockairError
 from dockair.messages import CameraFrame, ImuSample, NavSolution, Window
 from dockair.nav.fusion import FusionSettings, RelativeFilter
@@ -37,6 +37,9 @@ from dockair.nav.identify.perspective import SLOTS
 from dockair.nav.identify.prior import ring_from_leds
 from dockair.nav.identify.ring import Identification, IdentificationStatus, identify
 from dockair.nav.image.detect import Blobs, DetectSettings, detect
+from dockair.nav.integrity.contact import ContactClaim, ContactLimits, usable_for_contact
+from dockair.nav.integrity.fault_test import IntegritySettings
+from dockair.nav.integrity.monitor import Integrity, IntegrityStatus, check_integrity
 from dockair.nav.pose.estimate import PoseStatus, solve_pose
 from dockair.nav.track import RingTracker, TrackSettings
 from dockair.rotations import Array, exp
@@ -50,6 +53,8 @@ class NavigatorSettings:
 
     detect: DetectSettings = field(default_factory=DetectSettings)
     track: TrackSettings = field(default_factory=TrackSettings)
+    integrity: IntegritySettings = field(default_factory=IntegritySettings)
+    contact: ContactLimits = field(default_factory=ContactLimits)
     fusion: FusionSettings = field(default_factory=FusionSettings)
     guidance: GuidanceSettings = field(default_factory=GuidanceSettings)
     led_position_sigma_m: float = 3e-4  # as-built tolerance of an LED's place on the ring; 0.3 px at 3 m
@@ -62,18 +67,11 @@ class Navigator:
     """The navigation that Dockair flies; see `messages.Navigates` for what any other must offer.
 
     Raises:
-        DockairError: a ring of other than eight LEDs, or with fewer than five in their even places.
+        DockairError: a ring that cannot be identified, or numbered by the code it has.
     """
 
     def __init__(self, sheets: NavigationSheets, settings: NavigatorSettings | None = None) -> None:
-        if sheets.ring.count != SLOTS:
-            raise DockairError(
-                "ring.count", expected=f"{SLOTS} LEDs, the ring that can be identified", got=sheets.ring.count
-            )
-        code = code_of(sheets.ring, CodeSettings())
-        if SLOTS - len(code.displaced) < _EVEN_LEDS:
-            expected = f"at least {_EVEN_LEDS} LEDs in their even places, by which the ring is found"
-            raise DockairError("ring.angles_deg", expected=expected, got=sheets.ring.angles_deg)
+        _check_ring(sheets.ring)
         self._sheets, self._settings = sheets, settings or NavigatorSettings()
         self._filter = RelativeFilter(sheets, self._settings.fusion)
         self._tracker = RingTracker(
@@ -85,6 +83,7 @@ class Navigator:
         self._recent_imu: deque[ImuSample] = deque(maxlen=round(sheets.gyro.rate_hz * self._settings.fusion.buffer_s))
         self._time_s = 0.0
         self._frame_time_s = self._used_time_s = float("nan")
+        self._integrity: Integrity | None = None
         self._status = "no frame yet"
         self._candidates_px: Array = np.empty((0, 2))
         self._led_pixels_px: Array = np.full((len(self._points_D), 2), np.nan)
@@ -131,10 +130,27 @@ class Navigator:
         )
         if pose.status is not PoseStatus.CONVERGED:
             return f"pose {pose.status.value}"
-        if not self._filter.update(pose, time_s):
+        checked = check_integrity(pose, settings=self._settings.integrity)
+        if checked.status is IntegrityStatus.INCONSISTENT:
+            return f"pose {checked.status.value}"
+        if checked.led is not None:
+            self._led_pixels_px[found.led_numbers[checked.led]] = np.nan
+        if not self._filter.update(checked.pose, time_s):
             return "pose refused by the gate"
-        self._used_time_s = time_s
+        self._used_time_s, self._integrity = time_s, checked
         return "pose used"
+
+    def contact_claim(self) -> ContactClaim | None:
+        """Whether contact may be flown on the present belief, and why not; None before the first pose that was used."""
+        if self._integrity is None:
+            return None
+        offset_m = self._integrity.pose.p_CD - self._filter.predicted_pose(self._used_time_s)[1]
+        return usable_for_contact(
+            self._integrity,
+            self._time_s - self._used_time_s,
+            self._settings.contact,
+            levels=self._integrity.levels.about(offset_m),
+        )
 
     def _find(self, blobs: Blobs, time_s: float) -> tuple[Identification, Array]:
         """The ring, where the belief has its LEDs or else somewhere about there; and (8, 2) the belief's LEDs."""
@@ -238,6 +254,18 @@ class Navigator:
             candidates_px=self._candidates_px,
             led_pixels_px=self._led_pixels_px,
         )
+
+
+def _check_ring(ring: LedRing) -> None:
+    if ring.count != SLOTS:
+        raise DockairError("ring.count", expected=f"{SLOTS} LEDs, the ring that can be identified", got=ring.count)
+    code = code_of(ring, CodeSettings())
+    if SLOTS - len(code.displaced) < _EVEN_LEDS:
+        expected = f"at least {_EVEN_LEDS} LEDs in their even places, by which the ring is found"
+        raise DockairError("ring.angles_deg", expected=expected, got=ring.angles_deg)
+    if code.says_something and code.is_the_same_turned:
+        got = {"angles_deg": ring.angles_deg, "brightness": ring.brightness}
+        raise DockairError("ring", expected="a code that is another when the ring is turned, or none", got=got)
 
 
 def _largest(sigma_px: Array) -> float | None:

@@ -8,7 +8,9 @@ import pytest
 from dockair.calibration import Camera, GyroSheet, LedRing, Mounting, NavigationSheets, StartGeometry
 from dockair.errors import DockairError
 from dockair.messages import CameraFrame, ImuSample, Window
-from dockair.nav.navigator import Navigator
+from dockair.nav.integrity.contact import Doubt
+from dockair.nav.integrity.fault_test import IntegritySettings
+from dockair.nav.navigator import Navigator, NavigatorSettings
 from dockair.rotations import exp, log, matrix_from_yaw_pitch_roll
 
 EXPOSURE_S, LED_E = 20e-6, 3e4
@@ -52,6 +54,7 @@ class Sky:
         self.navigator, self.rng = Navigator(self.sheets), np.random.default_rng(seed)
         self.R_BD = matrix_from_yaw_pitch_roll(0.03, -0.08, np.radians(roll_deg))
         self.window, self.tick, self.waiting = self.sheets.camera.full_window, 0, []
+        self.bent_px = np.zeros((self.sheets.ring.count, 2))  # what reflections add to each LED's place
 
     def led_pixels(self, time_s):
         m = self.sheets.mounting
@@ -59,7 +62,7 @@ class Sky:
         return self.sheets.camera.pixels_from_points((p_BL - m.p_BC) @ m.R_BC)
 
     def frame(self, time_s, window):
-        pixels = self.led_pixels(time_s)
+        pixels = self.led_pixels(time_s) + self.bent_px
         spots = [
             (u - window.column_start, v - window.row_start, LED_E * self.sheets.ring.relative_brightness[k])
             for k, (u, v) in enumerate(pixels)
@@ -97,6 +100,43 @@ def test_finds_the_drogue_and_knows_it_to_centimetres_along_and_millimetres_acro
     error = solution.p_PD_B - still(0.0)
     assert abs(error[0]) < 0.02 and np.abs(error[1:]).max() < 0.003
     assert np.abs(solution.v_PD_B).max() < 0.05
+
+
+def test_one_led_that_is_bent_away_is_left_out_of_the_pose(render):
+    sky = Sky(render, still)
+    sky.run(0.3)
+    sky.bent_px[5] = 2.5, 1.0
+    solution = sky.run(0.2)
+    assert solution.status == "pose used"
+    assert np.flatnonzero(~np.isfinite(solution.led_pixels_px).all(axis=1)).tolist() == [5]
+    assert np.abs(solution.p_PD_B - still(0.0))[1:].max() < 0.003
+
+
+def test_leds_that_contradict_one_another_correct_nothing(render):
+    sky = Sky(render, still)
+    strict = IntegritySettings(false_alarm=1.0 - 1e-9)  # by so strict a test all frames do
+    sky.navigator = Navigator(sky.sheets, NavigatorSettings(integrity=strict))
+    solution = sky.run(0.2)
+    assert solution.status == "pose inconsistent"
+    assert np.isnan(solution.frame_time_stamp_s) and sky.navigator.contact_claim() is None
+
+
+def test_contact_may_be_claimed_near_and_recent_and_not_before_a_pose(render):
+    sky = Sky(render, still)
+    assert sky.navigator.contact_claim() is None
+    sky.run(0.3)
+    claim = sky.navigator.contact_claim()
+    assert claim.usable and claim.levels.lateral_m < 0.01 and claim.levels.range_m < 0.08
+    sky.run(0.3, camera=False)
+    assert sky.navigator.contact_claim().doubts == (Doubt.AGE,)
+
+
+def test_contact_may_not_be_claimed_where_the_range_is_not_known_well_enough(render):
+    sky = Sky(render, lambda _t: np.array([27.0, 0.2, -0.15]))
+    sky.sheets = replace(sky.sheets, start=replace(sky.sheets.start, p_PD_B=np.array([27.0, 0.0, 0.0])))
+    sky.navigator = Navigator(sky.sheets)
+    sky.run(0.3)
+    assert Doubt.RANGE in sky.navigator.contact_claim().doubts
 
 
 def test_follows_a_drogue_that_comes_nearer_and_swings(render):
@@ -294,3 +334,12 @@ def test_a_ring_with_too_few_leds_in_their_places_is_refused_before_the_first_fr
     Navigator(sheets(LedRing(angles_deg=off)))
     with pytest.raises(DockairError, match="ring.angles_deg: expected at least 5 LEDs in their even places"):
         Navigator(sheets(LedRing(angles_deg=(0.0, 45.0, 90.0, 135.0, 190.0, *off[5:]))))
+
+
+def test_a_code_that_is_the_same_turned_is_refused_before_the_first_frame():
+    """Two bright LEDs opposite each other tell half of the numberings from the other half, no more."""
+    opposite = (4.0, 1.0, 1.0, 1.0) * 2
+    with pytest.raises(DockairError, match="ring: expected a code that is another when the ring is turned"):
+        Navigator(sheets(LedRing(brightness=opposite)))
+    Navigator(sheets(LedRing(brightness=opposite, angles_deg=UNEVEN.angles_deg)))
+    Navigator(sheets(LedRing(brightness=(2.0,) * 8)))  # no code
