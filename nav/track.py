@@ -17,7 +17,7 @@ Every LED is carried by itself, seen or hidden, at its place q_k on the ring of 
     (u, v)_k = (u, v) + r R(phi) q_k                                                       (2)
 
 so that LEDs which hide and come back keep their numbers; those of a lost ring do while three sigma of its roll are less
-than half a place (22.5 degrees), which is for 0.8 to 1 s.
+than half a place (22.5 degrees), which is for half a second.
 
 A measurement counts when its innovation passes a chi-square gate of three degrees of freedom (centre and radius);
 otherwise the frame is a miss, like one without a ring. The window is the predicted ring with three sigma and a margin,
@@ -63,7 +63,7 @@ class TrackSettings:
     acceleration_radii_s2: float = 8.0  # a of Eq. (1): gusts of 2 m/s^2 on a 0.25 m ring
     start_velocity_radii_s: float = 4.0  # 1 sigma at the first frame: 1 m/s
     roll_sigma_px: float = 0.5  # of a measured roll, at the ring's rim: a fit's, tilt and hidden LEDs included
-    roll_acceleration_rad_s2: float = 1.5  # alpha: a drogue that turns to and fro at 30 deg/s in 2 s
+    roll_acceleration_rad_s2: float = 4.0  # alpha: white for 1.3 rad/s^2 over 0.8 s, from 30 deg/s one way to the other
     start_roll_rate_rad_s: float = 0.5  # 1 sigma at the first frame: 30 deg/s
     gate_probability: float = 0.9999  # of a true measurement to pass
     window_sigmas: float = 3.0

@@ -157,6 +157,8 @@ class BenchSubject(Enum):
 
     FLIGHT = "flight"
     SENSORS = "sensors"
+    IMAGE = "image"
+    POSE = "pose"
 
 
 @app.command()
@@ -164,28 +166,27 @@ def bench(
     scenario: ScenarioName = "default",
     settings: Settings = None,
     seconds: Annotated[float, typer.Option(min=1.0, max=600.0, help="Simulated time at most.")] = 20.0,
-    subject: Annotated[BenchSubject, typer.Option("--of", help="The closed loop, or the sensors' stages.")] = (
+    subject: Annotated[BenchSubject, typer.Option("--of", help="The closed loop, or the stages of one part.")] = (
         BenchSubject.FLIGHT
     ),
     as_json: Json = False,
 ) -> None:
-    """Say how fast the closed loop runs here and where its time goes; or how fast the sensors' stages are."""
-    from dockair.scenarios.output import show_bench
+    """Say how fast the closed loop runs here and where its time goes; or how fast the stages of one part are.
+
+    The parts are the sensors, the image stages and the pose solvers, these two beside OpenCV's; only flight and sensors
+    depend on the scenario.
+    """
+    from dockair.scenarios.output import show_bench, show_stages_bench, show_working
     from dockair.scenarios.schema import load_scenario
 
     chosen = load_scenario(scenario, _overrides(settings))
-    if subject is BenchSubject.SENSORS:
-        from dockair.sim.opengl import kind_of_context
-
-        os.environ.setdefault("MUJOCO_GL", kind_of_context())  # mujoco.Renderer asks for it at its first import
-        from dockair.scenarios.bench_sensors import bench_sensors
-        from dockair.scenarios.output import show_sensor_bench
-
-        figures = bench_sensors(chosen)
+    if subject is not BenchSubject.FLIGHT:
+        with show_working(f"measuring: {subject.value}"):
+            figures = _stages_bench(subject, chosen)
         if as_json:
             _print_json(figures)
         else:
-            show_sensor_bench(figures)
+            show_stages_bench(figures)
         return
     _require_background(chosen)
     from dockair.scenarios.bench import bench as bench_scenario
@@ -195,6 +196,23 @@ def bench(
         _print_json(report.to_json())
     else:
         show_bench(report)
+
+
+def _stages_bench(subject: BenchSubject, scenario: "Scenario") -> dict[str, Any]:
+    if subject is BenchSubject.POSE:
+        from dockair.scenarios.bench_pose import bench_pose
+
+        return bench_pose()
+    from dockair.sim.opengl import kind_of_context
+
+    os.environ.setdefault("MUJOCO_GL", kind_of_context())  # mujoco.Renderer asks for it at its first import
+    if subject is BenchSubject.IMAGE:
+        from dockair.scenarios.bench_image import bench_image
+
+        return bench_image()
+    from dockair.scenarios.bench_sensors import bench_sensors
+
+    return bench_sensors(scenario)
 
 
 @app.command("design-ring")

@@ -200,17 +200,38 @@ def _figure(value: Any) -> str:
     return str(value)
 
 
-def show_sensor_bench(figures: Mapping[str, Any]) -> None:
-    """Print milliseconds of the sensors' stages and their ratios."""
+def show_stages_bench(figures: Mapping[str, Any]) -> None:
+    """Print the times of the stages, their ratios, and what each of them found."""
     console = Console(highlight=False)
-    table = Table(box=None, padding=(0, 1))
-    for heading in ("what", "ms"):
-        table.add_column(heading, justify="left" if heading == "what" else "right")
-    for what, milliseconds in figures["milliseconds"].items():
-        table.add_row(what, f"{milliseconds:.3f}")
-    console.print(table)
+    for unit, short in (("milliseconds", "ms"), ("microseconds", "µs")):
+        if unit in figures:
+            console.print(_bench_table({what: {short: f"{t:.3f}"} for what, t in figures[unit].items()}))
     for what, ratio in figures["ratios"].items():
         console.print(f"{what}: {ratio:.2f}")
+    if "recall" in figures:
+        found = figures["recall"]
+        console.print(_bench_table({what: {key: str(n) for key, n in row.items()} for what, row in found.items()}))
+    if "found_by_frame" in figures:
+        by_frame = figures["found_by_frame"]
+        names = {name: f"({k})" for k, name in enumerate(figures["recall"], 1)}
+        console.print("LEDs found by " + ", ".join(f"{number} {name}" for name, number in names.items()))
+        console.print(
+            _bench_table(
+                {frame: {names.get(key, key): str(n) for key, n in row.items()} for frame, row in by_frame.items()}
+            )
+        )
+    for what, choice in figures.get("chosen", {}).items():
+        console.print(f"{what}: best of its parameters: {choice}")
+
+
+def _bench_table(rows: Mapping[str, Mapping[str, str]]) -> Table:
+    table = Table(box=None, padding=(0, 1))
+    table.add_column("what")
+    for heading in next(iter(rows.values())):
+        table.add_column(heading, justify="right")
+    for what, row in rows.items():
+        table.add_row(what, *row.values())
+    return table
 
 
 def _at(table: Mapping[str, Any], key: str) -> Any:

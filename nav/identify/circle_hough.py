@@ -164,6 +164,16 @@ def _insert(table, filled, u, v, r, votes, worth, spacing):  # type: ignore[no-u
 
 
 @njit(cache=True)
+def _is_top(votes, i, j):  # type: ignore[no-untyped-def]
+    """Whether no neighbouring cell has more votes."""
+    for a in range(max(i - 1, 0), min(i + 2, votes.shape[0])):
+        for b in range(max(j - 1, 0), min(j + 2, votes.shape[1])):
+            if votes[a, b] > votes[i, j]:
+                return False
+    return True
+
+
+@njit(cache=True)
 def _groups(points, reach):  # type: ignore[no-untyped-def]
     """(n,) number of each point's group: all whom steps within reach join."""
     group = np.full(len(points), -1)
@@ -227,7 +237,7 @@ def _peaks(  # type: ignore[no-untyped-def]
             for i in range(rows):
                 for j in range(columns):
                     m = votes[i, j]
-                    if m >= min_votes and worth[m] > least:
+                    if m >= min_votes and worth[m] > least and _is_top(votes, i, j):
                         u, v = u0 + j * width, v0 + i * width
                         filled = _insert(table, filled, u, v, r, m, worth[m], 3.0 * cell)
                         least = table[:, 4].min() if filled == capacity else -np.inf

@@ -54,6 +54,12 @@ class Code:
         """Whether there is a code at all."""
         return len(self.displaced) > 0 or self.log_brightness is not None
 
+    @property
+    def is_the_same_turned(self) -> bool:
+        """Whether some other numbering has the same code, so that it cannot settle the numbers."""
+        marks = [self.offset_rad] if self.log_brightness is None else [self.offset_rad, self.log_brightness]
+        return any(all(np.array_equal(np.roll(m, turn), m) for m in marks) for turn in range(1, SLOTS))
+
 
 def code_of(ring: LedRing, settings: CodeSettings) -> Code:
     """The code of a sheet of eight LEDs."""
@@ -108,7 +114,7 @@ def _by_place(points: Array, fit: RingFit, code: Code, density: float) -> NDArra
     chance = density * np.pi * (code.settings.reach * fit.tolerance_px) ** 2 * SLOTS * len(displaced)
     if not len(hits) or hits.max() == 0 or chance > code.settings.max_chance_hits:
         return np.array(free, np.int64)
-    return np.array(free, np.int64)[hits == hits.max()]
+    return np.asarray(np.array(free, np.int64)[hits == hits.max()])
 
 
 def _by_brightness(flux: Array, fit: RingFit, log_brightness: Array, code: Code) -> NDArray[np.int64]:
@@ -122,4 +128,4 @@ def _by_brightness(flux: Array, fit: RingFit, log_brightness: Array, code: Code)
     residual = measured - log_brightness[(slots - every[:, None]) % SLOTS]  # a row for each slot of LED 0
     residual -= residual.mean(axis=1, keepdims=True)
     chi2 = (residual**2).sum(axis=1) / code.settings.brightness_sigma**2
-    return every[chi2 <= chi2.min() + code.settings.brightness_margin]
+    return np.asarray(every[chi2 <= chi2.min() + code.settings.brightness_margin])

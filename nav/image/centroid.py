@@ -53,8 +53,6 @@ from dockair.nav.image.centroid_kernels import measure
 from dockair.nav.image.labelling import Runs
 from dockair.rotations import Array
 
-_PHASES_PX = 4  # clipped pixels from which on the error no longer grows
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NoiseModel:
@@ -105,16 +103,14 @@ def measure_blobs(
     thresholds[:], backgrounds[:] = threshold, background_dn
     table = measure(
         np.ascontiguousarray(image), runs.row, runs.start, runs.stop, runs.offset, thresholds,
-        (noise.gain_dn_per_electron, noise.noise_dn, noise.response_spread), backgrounds, local_background,
-        windowed, noise.saturation_dn,
+        (noise.gain_dn_per_electron, noise.noise_dn, noise.response_spread),
+        (noise.floor_px, noise.clipped_floor_px), backgrounds, local_background, windowed, noise.saturation_dn,
     )  # fmt: skip
-    clipped = table[:, 6] > 0
-    floor = np.where(clipped, noise.clipped_floor_px * np.sqrt(np.minimum(table[:, 6], _PHASES_PX)), noise.floor_px)
     return BlobMeasurements(
         centroids_px=table[:, :2].copy(),
-        sigma_px=np.hypot(table[:, 2], floor),
+        sigma_px=table[:, 2].copy(),
         flux=table[:, 3].copy(),
         peak=table[:, 4].astype(np.int64),
-        clipped=clipped,
+        clipped=table[:, 6] > 0.0,
         elongation=table[:, 5].copy(),
     )

@@ -11,6 +11,7 @@ _CORRELATION = 2.0  # neighbouring pixels of structure go together: their varian
 _RINGS_SHARE = 0.01  # of the peak: rms of the lens's rings two and three pixels outside a blob
 _ROUND = 0.07  # of both second moments: what they differ by in a single point
 _SIGNIFICANT = 1.5  # s_a
+_PHASES_PX = 4  # clipped pixels from which on the error no longer grows
 _STEPS = 12  # Newton's; four are the rule
 _CONVERGED_PX = 1e-5
 
@@ -214,8 +215,11 @@ def _centre(image, patch, top, left, threshold, model, levels, windowed, saturat
 
 
 @njit(cache=True)
-def measure(image, row, start, stop, offset, threshold, model, given_background, local, windowed, saturation):  # type: ignore[no-untyped-def]
-    """(n, 7) u, v, sigma, flux, peak, elongation and clipped pixels of every component; model is g, s_n, p."""
+def measure(image, row, start, stop, offset, threshold, model, floors, given_background, local, windowed, saturation):  # type: ignore[no-untyped-def]
+    """(n, 7) u, v, sigma, flux, peak, elongation and clipped pixels of every component.
+
+    `model` is g, s_n, p; `floors` are that of a blob that is not clipped and that of one clipped pixel.
+    """
     table = np.empty((len(offset) - 1, 7))
     margin = 3
     for c in range(len(table)):
@@ -232,6 +236,8 @@ def measure(image, row, start, stop, offset, threshold, model, given_background,
         u, v, sigma, flux, peak, clipped = _centre(
             image, patch, top, left, threshold[c], model, levels, windowed, saturation
         )
+        floor = floors[1] * np.sqrt(min(clipped, _PHASES_PX)) if clipped else floors[0]
+        sigma = np.sqrt(sigma * sigma + floor * floor)
         table[c, 0], table[c, 1], table[c, 2], table[c, 3], table[c, 4] = u + left, v + top, sigma, flux, peak
         table[c, 5], table[c, 6] = _elongation(patch), clipped
     return table

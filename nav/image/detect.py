@@ -13,7 +13,9 @@ falls to the area filter before it is opened or measured. Gaps in cloud are as s
 their flux is that of ten and more pixels as bright as their peak (the *equivalent area*), and that is what tells them.
 """
 
+import math
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
@@ -79,6 +81,9 @@ class DetectSettings:
             )
 
 
+_DEFAULTS = DetectSettings()
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Blobs:
     """Candidates for LEDs, in raster order of their first pixel."""
@@ -114,7 +119,7 @@ def detect(
     Raises:
         DockairError: not a grey frame, or not of the window's shape.
     """
-    settings = settings or DetectSettings()
+    settings = settings or _DEFAULTS
     check_image(image)
     if window is not None and window.shape != image.shape:
         raise DockairError("image", expected=f"the window's shape {window.shape}", got=image.shape)
@@ -169,8 +174,21 @@ class _Components:
 
 
 def _spots(image: Image, settings: DetectSettings, gain: float) -> _Components:
-    noise_dn = float(np.sqrt(settings.noise_dn**2 + _QUANTISATION_VARIANCE))
-    limits = SpotLimits(
+    limits = _spot_limits(settings, gain)
+    spots = find_spots(image, limits)
+    return _Components(
+        runs=spots.runs,
+        area_px=spots.runs.area_px,
+        thresholds_dn=spots.threshold_dn,
+        backgrounds_dn=spots.background_dn,
+        noise_dn=limits.noise_dn,
+        threshold_dn=None,
+    )
+
+
+@lru_cache(maxsize=16)
+def _spot_limits(settings: DetectSettings, gain: float) -> SpotLimits:
+    return SpotLimits(
         small_contrast_dn=settings.spot_contrast_dn,
         middle_contrast_dn=settings.middle_spot_contrast_dn,
         wide_contrast_dn=settings.wide_spot_contrast_dn,
@@ -181,16 +199,7 @@ def _spots(image: Image, settings: DetectSettings, gain: float) -> _Components:
         pixel=settings.spot_pixel,
         share=settings.spot_share,
         gain_dn_per_electron=gain,
-        noise_dn=noise_dn,
-    )
-    spots = find_spots(image, limits)
-    return _Components(
-        runs=spots.runs,
-        area_px=spots.runs.area_px,
-        thresholds_dn=spots.threshold_dn,
-        backgrounds_dn=spots.background_dn,
-        noise_dn=noise_dn,
-        threshold_dn=None,
+        noise_dn=math.sqrt(settings.noise_dn**2 + _QUANTISATION_VARIANCE),
     )
 
 
@@ -209,7 +218,7 @@ def _above_one_threshold(image: Image, settings: DetectSettings) -> _Components:
 
 def _levels(image: Image, settings: DetectSettings) -> tuple[int, float, float]:
     """Threshold, background and noise of the whole frame [DN]."""
-    sensor_noise = float(np.sqrt(settings.noise_dn**2 + _QUANTISATION_VARIANCE))
+    sensor_noise = math.sqrt(settings.noise_dn**2 + _QUANTISATION_VARIANCE)
     if image.size == 0:
         return settings.threshold_dn or 0, 0.0, sensor_noise
     statistics = frame_statistics(image)

@@ -136,12 +136,13 @@ def _beside_an_arc(image, i, j, ring, limit, levels):  # type: ignore[no-untyped
 def _flood(image, peak, centre, level, reach, patch, stack):  # type: ignore[no-untyped-def]
     """Mark in the patch around the centre what is connected to the peak above the level; whether that is a spot.
 
-    It is none if it meets the ring, or a pixel brighter than the peak: that one has a spot of its own.
+    It is none if it meets the ring, or a pixel brighter than the peak: that one has a spot of its own. A peak alone is
+    none either.
     """
     top, left, limit = centre[0] - reach, centre[1] - reach, (reach - 0.5) ** 2
     patch[: 2 * reach + 1, : 2 * reach + 1] = 0
     patch[peak[0] - top, peak[1] - left] = 1
-    stack[0, 0], stack[0, 1], depth = peak[0], peak[1], 1
+    stack[0, 0], stack[0, 1], depth, count = peak[0], peak[1], 1, 1
     while depth > 0:
         depth -= 1
         i, j = stack[depth, 0], stack[depth, 1]
@@ -158,7 +159,8 @@ def _flood(image, peak, centre, level, reach, patch, stack):  # type: ignore[no-
                 patch[a - top, b - left] = 1
                 stack[depth, 0], stack[depth, 1] = a, b
                 depth += 1
-    return True
+                count += 1
+    return count > 1
 
 
 @njit(cache=True)

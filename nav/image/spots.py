@@ -18,9 +18,9 @@ and pairs of them. The spot's pixels are those connected to the peak (8 neighbou
 
     t = t_0 + h (P - t_0),    t_0 = b + max(p s(b), f (P - b))                            (3)
 
-with the first h of 0, 1/8, 1/4, 1/2 that keeps them off the ring; if none does, it is no spot. The ring of reach 2 is
-the border of a square of 5 x 5 pixels. One side of it may be brighter, for a bright surface beside the spot, but not
-two, for those are a rib; and the spot's pixels are cut at it.
+with the first h of 0, 1/8, 1/4, 1/2 that keeps them off the ring; if none does, or leaves the peak alone, it is no
+spot. The ring of reach 2 is the border of a square of 5 x 5 pixels. One side of it may be brighter, for a bright
+surface beside the spot, but not two, for those are a rib; and the spot's pixels are cut at it.
 
 Reaches are 4 first, for the best background; 2, for far and faint LEDs, between bright surfaces; 8 and 14 for near or
 clipped LEDs, which are bright. Each has its own c. A peak inside an earlier spot is passed over. Most of a frame never
@@ -34,6 +34,7 @@ Sources: the ring is that of the FAST corner detector (Rosten & Drummond 2006), 
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,15 +74,22 @@ class Spots:
 
 def find_spots(image: Image, limits: SpotLimits) -> Spots:
     """All spots of an image (rows, columns) of uint8 or uint16, by Eqs. (1) to (3)."""
-    largest = (1 << 8 * image.dtype.itemsize) - 1
-    contrasts = [limits.middle_contrast_dn, limits.small_contrast_dn, limits.wide_contrast_dn, limits.wide_contrast_dn]
-    contrasts = tuple([min(max(math.ceil(c), 1), largest) for c in contrasts])
-    model = (
-        limits.isolation, limits.texture, limits.detection, limits.beside, limits.pixel, limits.share,
-        limits.gain_dn_per_electron, limits.noise_dn,
-    )  # fmt: skip
+    contrasts, model = _numbers(limits, (1 << 8 * image.dtype.itemsize) - 1)
     image = np.ascontiguousarray(image)
     hits = find_hits(image, image.dtype.type(0), REACHES_PX, ROW_STEPS, contrasts, WIDE_PX)
     row, start, stop, offset, threshold, background = grow(image, hits, contrasts, model)
     runs = Runs(row=row, start=start, stop=stop, offset=offset)
     return Spots(runs=runs, threshold_dn=threshold, background_dn=background)
+
+
+@lru_cache(maxsize=16)
+def _numbers(limits: SpotLimits, largest: int) -> tuple[tuple[int, ...], tuple[float, ...]]:
+    """Contrasts of all reaches and the model, as the kernels take them."""
+    wide = limits.wide_contrast_dn
+    of_reaches = (limits.middle_contrast_dn, limits.small_contrast_dn, wide, wide)
+    contrasts = tuple(min(max(math.ceil(c), 1), largest) for c in of_reaches)
+    model = (
+        limits.isolation, limits.texture, limits.detection, limits.beside, limits.pixel, limits.share,
+        limits.gain_dn_per_electron, limits.noise_dn,
+    )  # fmt: skip
+    return contrasts, model

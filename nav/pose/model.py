@@ -118,14 +118,13 @@ def _ray(u: float, v: float, lens: Array, b: Array, z: Array, G: Array) -> None:
     b[0], b[1], b[2] = 1.0, -(u - lens[1]) / lens[0], -(v - lens[2]) / lens[0]
     for _ in range(_LENS_STEPS):
         _pixel(b, lens, z, G)
-        du, dv = u - z[0], v - z[1]
+        du, dv, det = u - z[0], v - z[1], G[0, 1] * G[1, 2] - G[0, 2] * G[1, 1]
+        if not det > 0.0:  # beyond the edge of what the lens shows
+            break
         if abs(du) + abs(dv) <= _LENS_ROUNDING_PX + 1e-15 * (abs(u) + abs(v)):
             length = np.sqrt(1.0 + b[1] ** 2 + b[2] ** 2)
             b[0], b[1], b[2] = 1.0 / length, b[1] / length, b[2] / length
             return
-        det = G[0, 1] * G[1, 2] - G[0, 2] * G[1, 1]
-        if not det > 0.0:
-            break
         b[1] += (G[1, 2] * du - G[0, 2] * dv) / det
         b[2] += (G[0, 1] * dv - G[1, 1] * du) / det
     b[:] = np.nan

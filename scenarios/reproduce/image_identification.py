@@ -36,7 +36,7 @@ class Setting:
     """What is known, and where clutter is."""
 
     method: str = METHODS[0]
-    cases: int = 100  #: of each cell
+    cases: int  #: of each cell
     near_radii: float | None = None  #: None: clutter over the frame
     predicted: bool = False
     brightness: bool = False
@@ -54,9 +54,9 @@ class Setting:
 TABLES = {
     "three points": Setting(cases=670),  # 20 100 in all
     "Hough": Setting(method="circle_hough", cases=200),
-    "predicted": Setting(predicted=True),
-    "crowded": Setting(near_radii=1.5),
-    "crowded, with brightness": Setting(near_radii=1.5, brightness=True),
+    "predicted": Setting(predicted=True, cases=200),
+    "crowded": Setting(near_radii=1.5, cases=200),
+    "crowded, with brightness": Setting(near_radii=1.5, brightness=True, cases=200),
 }
 Cells = dict[tuple[int, int], dict[str, float]]
 
@@ -186,15 +186,15 @@ def _draw(tables: dict[str, Cells], speeds: dict[str, dict[str, float]], path: P
 
 def _draw_speeds(axes: Any, speeds: dict[str, dict[str, float]]) -> None:
     place = np.arange(len(speeds))
-    for k, method in enumerate(METHODS):
+    for k, (method, name) in enumerate(zip(METHODS, TABLES, strict=False)):
+        y = place + 0.2 * (2 * k - 1)
         median, worst = (
             np.array([ours[f"{method}_{what}_ms"] for ours in speeds.values()]) for what in ("median", "worst")
         )
-        y = place + 0.2 * (2 * k - 1)
-        axes.barh(y, median, height=0.35, color=f"C{k}", label=f"{method}: median")
-        axes.plot(worst, y, "|", color=f"C{k}", markersize=10, label="worst")
+        axes.barh(y, median, height=0.35, color=f"C{k}", label=f"{name}, median")
+        axes.plot(worst, y, "|", color=f"C{k}", markersize=10, label=f"{name}, worst")
     axes.set_yticks(place, list(speeds))
     axes.invert_yaxis()
     axes.set(xlabel="ms", title="time of forty candidates, nothing known")
     axes.grid(axis="x", alpha=0.3)
-    axes.legend(fontsize=8)
+    axes.legend(fontsize=8, loc="lower right")

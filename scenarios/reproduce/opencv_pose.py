@@ -10,6 +10,7 @@ covariance, takes a sigma for each LED, or says when there may be another pose (
 """
 
 from collections.abc import Callable
+from typing import Any
 
 import cv2
 import numpy as np
@@ -20,6 +21,8 @@ from dockair.rotations import Array
 _TO_OPENCV = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
 _FLAT = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
 _TO_THE_END = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_COUNT, 100, 1e-12)
+
+_solve_pnp: Any = cv2.solvePnP  # its types know neither starts that are None nor float arrays
 
 Pose = tuple[Array, Array]
 Solver = Callable[[Array], Pose | None]
@@ -36,11 +39,17 @@ class OpenCvSolvers:
 
     def iterative(self, pixels: Array, start: Pose | None = None) -> Pose | None:
         """SOLVEPNP_ITERATIVE: a homography, or a start, refined by OpenCV's own Levenberg-Marquardt."""
-        rotation, translation = (None, None) if start is None else self.to_opencv(start)
-        found, rotation, translation = cv2.solvePnP(
-            self._points, pixels, self._matrix, self._distortion, rotation, translation, start is not None,
+        guess: list[Any] = [None, None] if start is None else list(self.to_opencv(start))
+        found, rotation, translation = _solve_pnp(
+            self._points,
+            pixels,
+            self._matrix,
+            self._distortion,
+            guess[0],
+            guess[1],
+            start is not None,
             cv2.SOLVEPNP_ITERATIVE,
-        )  # fmt: skip
+        )
         return self._pose(rotation, translation) if found else None
 
     def ippe_refined(self, pixels: Array) -> Pose | None:
@@ -50,7 +59,9 @@ class OpenCvSolvers:
         )
         if not count:
             return None
-        ends = [self._refined(pixels, r, t) for r, t in zip(rotations, translations, strict=True)]
+        ends = [
+            self._refined(pixels, np.asarray(r), np.asarray(t)) for r, t in zip(rotations, translations, strict=True)
+        ]
         return self._pose(*min(ends, key=lambda end: self._squares(pixels, *end)))
 
     def sqpnp(self, pixels: Array) -> Pose | None:
@@ -78,21 +89,21 @@ class OpenCvSolvers:
         return lambda: cv2.solvePnP(points, pixels, matrix, distortion, rotation.copy(), translation.copy(), True, flag)
 
     def _solved(self, pixels: Array, flag: int, *, refine: bool) -> Pose | None:
-        found, rotation, translation = cv2.solvePnP(self._points, pixels, self._matrix, self._distortion, flags=flag)
+        found, rotation, translation = _solve_pnp(self._points, pixels, self._matrix, self._distortion, flags=flag)
         if not found:
             return None
         return self._pose(*(self._refined(pixels, rotation, translation) if refine else (rotation, translation)))
 
-    def _refined(self, pixels: Array, rotation: Array, translation: Array) -> tuple[Array, Array]:
-        end: tuple[Array, Array] = cv2.solvePnPRefineLM(
+    def _refined(self, pixels: Array, rotation: Any, translation: Any) -> tuple[Array, Array]:
+        end = cv2.solvePnPRefineLM(
             self._points, pixels, self._matrix, self._distortion, rotation.copy(), translation.copy(), _TO_THE_END
         )
-        return end
+        return np.asarray(end[0]), np.asarray(end[1])
 
-    def _squares(self, pixels: Array, rotation: Array, translation: Array) -> float:
+    def _squares(self, pixels: Array, rotation: Any, translation: Any) -> float:
         seen = cv2.projectPoints(self._points, rotation, translation, self._matrix, self._distortion)[0]
         return float(np.sum((seen[:, 0] - pixels) ** 2))
 
     @staticmethod
-    def _pose(rotation: Array, translation: Array) -> Pose:
+    def _pose(rotation: Any, translation: Any) -> Pose:
         return _TO_OPENCV.T @ cv2.Rodrigues(rotation)[0] @ _FLAT, _TO_OPENCV.T @ translation.ravel()

@@ -8,7 +8,8 @@ solving for the position alone with the attitude's error in its covariance (`pos
 Ring on the camera's axis, 0.1 px. In the first rows the ring is *believed* frontal: the truth is scattered about it by
 the belief's sigma about both cross axes, which is what a covariance says. In the rows called "truly frontal" the truth
 is fixed and the belief scattered. Then a belief is in the mean tilted, and whoever trusts it places the ring nearer: by
-the square again, 27 mm at 20 m for 3 degrees. No use of a prior escapes that; it takes a better prior, or many frames.
+the square again, 20 mm at 20 m for 3 degrees, and twice as much with the position alone, whose correction for the mean
+tilt of the truth is then one too many. No use of a prior escapes that; it takes a better one, or many frames.
 """
 
 from collections.abc import Callable

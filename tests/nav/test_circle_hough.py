@@ -1,9 +1,17 @@
+from itertools import combinations
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dockair.nav.identify.circle_hough import accumulate, find_circles, radius_row
+from dockair.nav.identify.circle_hough import (
+    Peaks,
+    accumulate,
+    find_circles,
+    radius_row,
+    triples_near,
+)
 
 ANYWHERE = (0.0, 0.0, 1e6)
 
@@ -67,3 +75,54 @@ def test_the_gate_keeps_circles_elsewhere_out():
     points = [300, 300] + 60 * np.column_stack([np.cos(angle), np.sin(angle)])
     assert len(find_circles(points, radius_row(50.0, 70.0), centre_gate=(900.0, 300.0, 100.0)).votes) == 0
     assert len(find_circles(np.zeros((0, 2)), radius_row(50.0, 70.0), centre_gate=ANYWHERE).votes) == 0
+
+
+def test_among_clutter_the_peak_least_likely_an_accident_is_the_ring():
+    """Five LEDs of a small ring among thirty others: by votes large circles come first, by Eq. (2) the ring."""
+    rng = np.random.default_rng(74)
+    first = {None: 0, "chance": 0}
+    for _ in range(40):
+        radius, angle = rng.uniform(25.0, 60.0), rng.uniform(0, 1) + rng.permutation(8)[:5] * np.pi / 4
+        centre = rng.uniform([200, 200], [1800, 900])
+        ring = centre + radius * np.column_stack([np.cos(angle), np.sin(angle)])
+        points = np.vstack([ring, rng.uniform([0, 0], [2047, 1087], (30, 2))])
+        for how in first:
+            density = None if how is None else len(points) / (2047.0 * 1087.0)
+            peaks = find_circles(points, radius_row(12.0, 560.0), centre_gate=ANYWHERE, peaks=3, clutter_px2=density)
+            near = np.hypot(*(peaks.centre_px - centre).T) < 0.4 * radius
+            first[how] += bool((near & (np.abs(peaks.radius_px - radius) < 0.3 * radius)).any())
+    assert first["chance"] >= 38
+    assert first[None] <= 10
+
+
+def test_peaks_worth_falls_in_the_order_of_the_formula():
+    """Eq. (2) by hand for the cells that are returned."""
+    rng = np.random.default_rng(75)
+    points = rng.uniform([0, 0], [900, 900], (40, 2))
+    n_A = 40 / 900.0**2
+    peaks = find_circles(points, radius_row(12.0, 400.0), centre_gate=ANYWHERE, peaks=20, clutter_px2=n_A)
+    m, r = peaks.votes, peaks.radius_px
+    mu = 4.0 * np.pi * 0.15 * r**2 * n_A
+    worth = np.where(m > mu, m * np.log(m / mu) - m + mu, 0.0) - np.log(900.0**2 / (0.15 * r) ** 2)
+    assert len(m) == 20 and (np.diff(worth) <= 1e-9).all()
+
+
+@given(seed=st.integers(0, 10**6), peaks=st.integers(0, 40))
+@settings(max_examples=60, deadline=None)
+def test_triples_are_those_with_three_in_one_band(seed, peaks):
+    rng = np.random.default_rng(seed)
+    points, centre = rng.uniform(0, 100, (9, 2)), rng.uniform(0, 100, (peaks, 2))
+    circles = Peaks(centre_px=centre, radius_px=rng.uniform(5, 60, peaks), votes=np.zeros(peaks, np.int64))
+    member = np.abs(np.linalg.norm(points[:, None] - centre, axis=2) - circles.radius_px) <= 0.25 * circles.radius_px
+    expected = [t for t in combinations(range(9), 3) if member[list(t)].all(axis=0).any()]
+    assert [tuple(t) for t in triples_near(points, circles, 0.25).tolist()] == expected
+
+
+def test_a_wide_frame_costs_no_more_cells_than_its_groups():
+    """Two rings in corners of a frame of 100 000 px: a grid over both would have 10^9 cells."""
+    angle = np.arange(8) * np.pi / 4
+    circle = 15.0 * np.column_stack([np.cos(angle), np.sin(angle)])
+    points = np.vstack([circle, [1e5, 1e5] + circle])
+    peaks = find_circles(points, radius_row(12.0, 20.0), centre_gate=ANYWHERE)
+    for centre in ([0.0, 0.0], [1e5, 1e5]):
+        assert peaks.votes[np.hypot(*(peaks.centre_px - centre).T) < 4.0].max() == 8

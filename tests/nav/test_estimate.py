@@ -258,8 +258,8 @@ def test_an_led_that_comes_twice_counts_once(leds):
     assert with_start.status is (PoseStatus.CONVERGED if three else PoseStatus.TOO_FEW_LEDS)
 
 
-def test_second_minimum_is_found_when_both_guesses_lead_to_the_first():
-    """Frontal at 25 m, 100 noisy frames: orthography guesses nearly the same pose twice; mirror images still come."""
+def test_frontal_ring_gives_the_same_minima_without_a_start_as_from_its_own_mirror_image():
+    """25 m, 100 noisy frames: orthography guesses nearly the same pose twice; no second minimum is overlooked."""
     rng, (R, p), pairs = np.random.default_rng(48), tilted(0.0, 25.0), 0
     for _ in range(100):
         pixels = pixels_of(R, p) + 0.1 * rng.normal(size=(8, 2))
@@ -331,7 +331,11 @@ def test_residuals_in_pixels_give_the_same_pose(camera):
 
 def test_isotropic_weight_is_near_the_efficient_one_on_the_axis_and_worse_off_it():
     """At 20 degrees off the axis a pixel is worth cos^2 = 0.88 of one direction and cos of the other."""
-    (R, p), isotropic = tilted(10.0, 5.0), PoseOptions(weight="isotropic")
+    (R, p), isotropic, sigma = tilted(10.0, 5.0), PoseOptions(weight="isotropic"), np.linspace(0.1, 0.3, 8)
+    sight = solve_pose(pixels_of(R, p), RING, CAMERA, sigma_px=sigma, options=isotropic).measurement
+    assert sight is not None
+    expected = np.eye(3) * (CAMERA.focal_length_px / sigma[:, None, None]) ** 2
+    np.testing.assert_allclose(sight.weights, expected, rtol=1e-12)
     on_axis = [solve_pose(pixels_of(R, p), RING, CAMERA, options=o).covariance for o in (PoseOptions(), isotropic)]
     np.testing.assert_allclose(on_axis[1], on_axis[0], rtol=0.02, atol=0.02 * on_axis[0].max())
     p = 5.0 * np.array([1.0, 0.33, 0.0])

@@ -9,7 +9,8 @@ from dockair.calibration import Camera, LedRing
 from dockair.nav.pose.difference import pose_difference
 from dockair.nav.pose.estimate import solve_pose
 from dockair.nav.pose.expectation import expectation
-from dockair.rotations import matrix_from_yaw_pitch_roll
+from dockair.nav.pose.position import solve_position
+from dockair.rotations import exp, matrix_from_yaw_pitch_roll
 
 RING, CAMERA = LedRing().positions_D, Camera()
 
@@ -46,6 +47,35 @@ def test_two_equal_minima_give_the_middle_and_their_distance_as_its_uncertainty(
     assert mean.R_CD[0, 0] > np.cos(np.deg2rad(0.2))
     tilt_deg = np.rad2deg(np.sqrt(mean.covariance[1, 1]))
     assert tilt_deg == pytest.approx(10.0, abs=0.3)
+
+
+def test_frontal_mean_and_covariance_are_those_of_three_gaussians():
+    """25 m, frontal, frames in which the pass has over a fifth of the weight: Eqs (1) and (2) by hand."""
+    rng, found = np.random.default_rng(64), 0
+    for _ in range(40):
+        _, _, pose = frame(25.0, 0.0, rng)
+        other = pose.alternative
+        if other is None:
+            continue
+        d = pose_difference(other.R_CD, other.p_CD, pose.R_CD, pose.p_CD)
+        assert pose.measurement is not None
+        middle = solve_position(
+            CAMERA.pixels_from_points(pose.measurement.rays), RING, CAMERA, exp(0.5 * d[:3]) @ pose.R_CD,
+            attitude_covariance=np.zeros((3, 3)),
+        )  # fmt: skip
+        costs, covariances = [pose.cost, other.cost, middle.chi2], [pose.covariance, other.covariance]
+        covariances.append(0.5 * (covariances[0] + covariances[1]))
+        w = np.exp(-0.5 * np.array(costs)) / np.exp(-0.5 * np.array(costs)).sum()
+        if w[2] < 0.2:
+            continue
+        found += 1
+        ds = [np.zeros(6), d, pose_difference(middle.R_CD, middle.p_CD, pose.R_CD, pose.p_CD)]
+        mean = sum(wk * dk for wk, dk in zip(w, ds, strict=True))
+        P = sum(wk * (Pk + np.outer(dk - mean, dk - mean)) for wk, Pk, dk in zip(w, covariances, ds, strict=True))
+        ours = expectation(pose)
+        np.testing.assert_allclose(pose_difference(ours.R_CD, ours.p_CD, pose.R_CD, pose.p_CD), mean, atol=1e-6)
+        np.testing.assert_allclose(ours.covariance, P, rtol=1e-4, atol=1e-9)
+    assert found > 5
 
 
 @pytest.mark.parametrize(("range_m", "tilt_deg"), [(20.0, 5.0), (20.0, 10.0), (30.0, 20.0)])

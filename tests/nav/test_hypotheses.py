@@ -120,8 +120,8 @@ def test_no_more_is_fitted_than_the_settings_allow_and_nothing_after_two_whole_r
     fits_of(crowd, method)
     assert 3 < len(fits) <= SETTINGS.max_fits
     fits.clear()
-    pair = np.vstack([scene.led_px, scene.led_px + 3.0 * scene.radius_px * np.array([1.0, 0.0])])
-    fits_of(pair, method)
+    three = np.vstack([scene.led_px + 3.0 * scene.radius_px * np.array([k, 0.0]) for k in range(3)])
+    fits_of(three, method)
     assert len(fits) == 2
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dockair.calibration import Camera
-from dockair.nav.identify.octagon import RIGHT_ANGLES, find_octagons
+from dockair.nav.identify.octagon import RIGHT_ANGLES, SLOTS, _looked_up, find_octagons
 
 ANGLE = np.arange(8) * np.pi / 4
 CENTRE, RADIUS = np.array([900.0, 500.0]), 100.0
@@ -131,3 +131,30 @@ def test_the_number_of_hypotheses_is_counted_apart_for_right_angles():
     every, right = find_octagons(points, triples, **OPEN), find_octagons(points, triples, RIGHT_ANGLES, **OPEN)
     assert every.tested_right_angles == right.tested_right_angles == right.tested
     assert every.tested > 3 * right.tested
+
+
+@pytest.mark.parametrize("tolerance", [0.02, 0.06, 0.3])
+def test_the_grid_finds_what_a_search_through_all_candidates_finds(tolerance):
+    """Random rings over a crowd, look-ups a quarter, one and four cells wide."""
+    rng = np.random.default_rng(6)
+    points = rng.uniform(-1.0, 1.0, (30, 2))
+    count = 2000
+    rings = np.empty((count, 3, 3))
+    rings[:, 0] = np.column_stack([np.ones(count), rng.uniform(-1.0, 1.0, (count, 2))])
+    rings[:, 1:] = rng.uniform(-0.4, 0.4, (count, 2, 3))
+    size = np.column_stack([np.ones(count), np.full(count, tolerance)])
+    plausible, patterns = np.array([[0, 1, 2, 0]], np.int16), np.array([[2, 4]])
+    row, found, candidate = _looked_up(points, plausible, patterns, np.zeros(count, np.int32), rings, size)
+    expected = {}
+    for k, ring in enumerate(rings):
+        X = ring[0] + np.column_stack([np.cos(ANGLE), np.sin(ANGLE)]) @ ring[1:]
+        distance = np.linalg.norm(X[:, None, 1:] / X[:, None, :1] - points, axis=2)
+        slots = np.where(distance.min(axis=1) < tolerance, distance.argmin(axis=1), -1)
+        slots[[0, 2, 4]] = 0, 1, 2
+        if (slots >= 0).sum() >= 4:
+            expected[k] = slots
+    assert 20 < len(expected) < count
+    assert row.tolist() == list(expected)
+    np.testing.assert_array_equal(candidate, np.array(list(expected.values())))
+    np.testing.assert_array_equal(found, (candidate >= 0).sum(axis=1))
+    assert candidate.shape[1] == SLOTS

@@ -82,3 +82,17 @@ def test_shape_error_forgives_shift_turn_and_scale_and_nothing_else():
     seen[1] += [6.0, 0.0]
     assert 2.0 < tracked.shape_error_px(seen, numbers) <= 6.0
     assert prior(centre_px=np.zeros(2)).shape_error_px(seen, numbers) == 0.0
+
+
+def test_a_ring_is_allowed_where_and_as_large_as_the_gates_have_it():
+    prior = make_prior((10.0, 500.0), 1.0, 0.25, np.array([600.0, 400.0]), 100.0, None, None, 10.0)
+    # five sigma, and two per cent of the largest radius
+    assert prior.allows(np.array([652.0, 400.0]), 100.0) and not prior.allows(np.array([653.0, 400.0]), 100.0)
+    centre = np.array([600.0, 400.0])
+    assert prior.allows(centre, 76.0) and prior.allows(centre, 124.0)
+    assert not prior.allows(centre, 74.0) and not prior.allows(centre, 126.0)
+
+
+@pytest.mark.parametrize(("radius", "roll", "prefers"), [(None, None, False), (90.0, None, True), (None, 0.1, True)])
+def test_one_of_several_rings_is_preferred_for_its_size_or_its_roll(radius, roll, prefers):
+    assert make_prior((10.0, 500.0), 1.0, 0.25, np.zeros(2), radius, roll, None, None).prefers is prefers

@@ -29,3 +29,37 @@ def test_the_stopwatches_are_gone_afterwards():
 
     bench(load_scenario("still_air"), seconds=0.05)
     assert navigator.detect is detect
+
+
+def test_the_image_bench_counts_the_leds_of_its_frames_and_times_every_detector(monkeypatch):
+    from dockair.scenarios import bench_image as image
+
+    monkeypatch.setattr(image, "TITLES", ("30 m", "6 m, Sun behind", "night"))
+    for name in ("_REPETITIONS", "_TRIAL_REPETITIONS", "_WINDOW_REPETITIONS", "_CASES", "_CASE_REPETITIONS"):
+        monkeypatch.setattr(image, name, 1)
+    figures = image.bench_image()
+    recall, by_frame = figures["recall"], figures["found_by_frame"]
+    assert all(ms > 0.0 for ms in figures["milliseconds"].values())
+    assert {row["visible"] for row in recall.values()} == {sum(row["visible"] for row in by_frame.values())}
+    for name, row in recall.items():
+        assert row["found"] == sum(figures[name] for figures in by_frame.values())
+        assert f"{name}: mean frame" in figures["milliseconds"]
+    assert set(figures["chosen"]) == set(recall) - {"detect", 'detect, method "frame"'}
+    assert by_frame["night"]["detect"] == by_frame["night"]["visible"] == 8
+    # nobody finds more than ours does, and all others report more blobs that are no LEDs
+    assert all(row["found"] <= recall["detect"]["found"] for row in recall.values())
+    assert all(row["others"] > recall["detect"]["others"] for name, row in recall.items() if name != "detect")
+
+
+def test_identification_is_timed_on_forty_candidates_of_which_eight_are_a_ring():
+    import numpy as np
+
+    from dockair.calibration import Camera
+    from dockair.nav.identify.ring import identify
+    from dockair.scenarios.bench_image import _ring_among_clutter
+
+    points = _ring_among_clutter(np.random.default_rng(1), Camera())
+    assert points.shape == (40, 2)
+    found = identify(points, camera=Camera())
+    assert found.status.name == "FOUND"
+    assert len(found.members) == 8
