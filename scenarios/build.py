@@ -250,8 +250,7 @@ def _imu(scenario: Scenario, seed: int, mounting: Mounting) -> Imu:
 def _as_built(scenario: Scenario, seed: int, sheets: NavigationSheets) -> AsBuilt:
     """Draw the hardware as it was built."""
     leds, parameters = _sheet(scenario, "leds", LedParameters), _sheet(scenario, "as_built", AsBuiltParameters)
-    rng = random_stream(seed, "as_built")
-    return draw_as_built(sheets.camera, sheets.ring, sheets.mounting, parameters, leds, rng)
+    return draw_as_built(sheets.camera, sheets.ring, sheets.mounting, parameters, leds, random_stream(seed, "as_built"))
 
 
 def _camera(scenario: Scenario, seed: int, as_built: AsBuilt, faults: Faults, world: World) -> NearInfraredCamera:

@@ -63,7 +63,8 @@ def identify(
     """Find the ring among candidates and number its LEDs.
 
     Args:
-        centroids_px: (n, 2) candidates (u, v), full-frame pixels; rows that are not finite are passed over.
+        centroids_px: (n, 2) candidates (u, v), full-frame pixels; rows that are not finite, or beyond any frame,
+            are passed over.
         method: "three_point" or "circle_hough".
         settings: None for the defaults.
         camera: for its focal length, principal point and distortion; None for the default one.
@@ -82,20 +83,11 @@ def identify(
     """
     settings = settings or IdentifySettings()
     camera, ring = camera or Camera(), ring or LedRing()
-    if ring.count != SLOTS:
-        raise DockairError("identify.ring", expected=f"a ring of {SLOTS} LEDs", got=ring.count)
-    if method not in METHODS:
-        raise DockairError("identify.method", expected="a method", got=method, exists=METHODS)
-    points = np.asarray(centroids_px, dtype=float)
-    if points.ndim != 2 or points.shape[1] != 2:
-        raise DockairError("identify.centroids_px", expected="an array of shape (n, 2)", got=points.shape)
+    points, flux = _checked(centroids_px, brightness, method, ring)
     prior = make_prior(
         settings.radius_range_px, settings.centre_tolerance_radii, settings.radius_tolerance,
         expected_centre_px, expected_radius_px, expected_roll_rad, expected_led_px, expected_sigma_px, ring.angles_rad,
     )  # fmt: skip
-    flux = np.full(len(points), np.nan) if brightness is None else np.asarray(brightness, dtype=float)
-    if flux.shape != (len(points),):
-        raise DockairError("identify.brightness", expected=f"an array of shape ({len(points)},)", got=flux.shape)
     index = _candidates(points, prior, flux, settings.max_candidates)
     if len(index) < MIN_LEDS:
         return nothing(IdentificationStatus.NOT_FOUND)
@@ -108,8 +100,23 @@ def identify(
     status, fit = _found(candidates, method, prior, camera, settings)
     if fit is None:
         return nothing(status)
-    flux_or_none = None if brightness is None else flux[index]
-    return numbered(candidates.points, index, flux_or_none, fit, prior, camera, code, settings.roll_tolerance_rad)
+    known_flux = None if brightness is None else flux[index]
+    return numbered(candidates.points, index, known_flux, fit, prior, camera, code, settings.roll_tolerance_rad)
+
+
+def _checked(centroids_px: Array, brightness: Array | None, method: str, ring: LedRing) -> tuple[Array, Array]:
+    """Candidates (n, 2) and their fluxes (n,), NaN where there are none; refuses what is no such thing."""
+    if ring.count != SLOTS:
+        raise DockairError("identify.ring", expected=f"a ring of {SLOTS} LEDs", got=ring.count)
+    if method not in METHODS:
+        raise DockairError("identify.method", expected="a method", got=method, exists=METHODS)
+    points = np.asarray(centroids_px, dtype=float)
+    if points.ndim != 2 or points.shape[1] != 2:
+        raise DockairError("identify.centroids_px", expected="an array of shape (n, 2)", got=points.shape)
+    flux = np.full(len(points), np.nan) if brightness is None else np.asarray(brightness, dtype=float)
+    if flux.shape != (len(points),):
+        raise DockairError("identify.brightness", expected=f"an array of shape ({len(points)},)", got=flux.shape)
+    return points, flux
 
 
 def _found(

@@ -5,8 +5,8 @@ derivatives of the image of X_s = p + x_s by a shift of p and a small turn of a 
 
     dw_u = g_u . dp + (x_s x g_u) . dphi,   g_u = -(w_u, 1, 0)/X_x,   g_v = -(w_v, 0, 1)/X_x           (1)
 
-Cost: `fit_members` takes at most 17 fits of two starts of `_ITERATIONS` steps (five LEDs dropped three times, two looks
-about), and seldom more than three.
+Cost: `fit_members` solves for the pose at most 16 times, each from two starts by `_ITERATIONS` steps at most (four of
+eight LEDs dropped, a look about, twice, then five dropped), and seldom more than three times.
 """
 
 import numpy as np

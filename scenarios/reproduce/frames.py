@@ -15,12 +15,16 @@ from numpy.typing import NDArray
 
 from dockair.messages import CameraFrame, Window
 from dockair.rotations import Array, quaternion_from_matrix
-from dockair.scenarios.build import Parts, build
+from dockair.scenarios.build import Parts, build, camera_sheets
 from dockair.scenarios.schema import load_scenario
 from dockair.sim.camera.camera import NearInfraredCamera
+from dockair.sim.camera.electronics import output_gain
+from dockair.sim.camera.sheets import SensorParameters
 
 SETTLING_FRAMES = 8  # the exposure control has settled after them
 _FRAME_S = 0.02
+_LEDS = 8
+_ROUNDING_DN2 = 1.0 / 12.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -37,8 +41,8 @@ class TrueFrame:
 class Studio:
     """The camera of one scenario and where it stands. Make it with `studio`, which closes it too."""
 
-    def __init__(self, parts: Parts, camera: NearInfraredCamera) -> None:
-        self.parts, self.camera = parts, camera
+    def __init__(self, parts: Parts, camera: NearInfraredCamera, sensor: SensorParameters) -> None:
+        self.parts, self.camera, self.sensor = parts, camera, sensor
         self._frame_number = 0
 
     def ahead(self, range_m: float) -> mujoco.MjData:
@@ -108,12 +112,43 @@ def studio(settings: Mapping[str, Any] | None = None, seed: int = 3) -> Iterator
         settings: dotted key -> value instead of the scenario's.
         seed: of hardware, clouds and noise.
     """
-    parts = build(load_scenario("still_air", {"seed": seed, **(settings or {})}), seed)
+    scenario = load_scenario("still_air", {"seed": seed, **(settings or {})})
+    parts = build(scenario, seed)
     assert parts.camera is not None, "a scenario that is navigated by the truth has no camera"
     try:
-        yield Studio(parts, parts.camera)
+        yield Studio(parts, parts.camera, camera_sheets(scenario).sensor)
     finally:
         parts.camera.close()
+
+
+@contextmanager
+def studio_without_leds(settings: Mapping[str, Any] | None = None, seed: int = 3) -> Iterator[Studio]:
+    """As `studio`, with all LEDs off: the same light, clouds and hardware."""
+    settings = settings or {}
+    off = {"kind": "led_off", "leds": list(range(_LEDS))}
+    with studio({**settings, "faults": [*settings.get("faults", []), off]}, seed) as dark:
+        yield dark
+
+
+def signal_to_noise(lit: Studio, dark: Studio, data: mujoco.MjData, taken: TrueFrame) -> Array:
+    """(8,) what a filter matched to each LED's image would have, sqrt(sum s^2/v); NaN for LEDs that are not visible.
+
+    s are the electrons of 5 x 5 pixels with the LEDs less those without, v the variance of a pixel without: shot noise,
+    read noise, fixed pattern and the rounding of eight bits. Whatever is detected below 5 is luck.
+    """
+    sensor = lit.sensor
+    gain, exposure_s, ratios = output_gain(sensor), taken.frame.exposure_s, np.full(len(taken.leds_px), np.nan)
+    quiet_e2 = sensor.read_noise_e**2 + sensor.dark_signal_nonuniformity_e**2 + sensor.column_pattern_e**2
+    quiet_e2 += _ROUNDING_DN2 / gain**2
+    rows, columns = taken.frame.window.row_stop, taken.frame.window.column_stop
+    for k in np.flatnonzero(taken.visible):
+        column, row = (round(float(c)) for c in taken.leds_px[k])
+        window = Window(max(row - 2, 0), min(row + 3, rows), max(column - 2, 0), min(column + 3, columns))
+        bright = lit.camera.expected_electrons(data, window, exposure_s=exposure_s).astype(float)
+        without = dark.camera.expected_electrons(data, window, exposure_s=exposure_s).astype(float)
+        variance = without + quiet_e2 + (sensor.photo_response_nonuniformity * without) ** 2
+        ratios[k] = np.sqrt(((bright - without) ** 2 / variance).sum())
+    return ratios
 
 
 def matches(found_px: Array, leds_px: Array, within_px: float) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:

@@ -56,32 +56,27 @@ class Blobs:
             dirt: dims the light; None for none.
             are_seen: tells of some of the sources (k,) which are not hidden, (k,).
         """
-        bright = np.flatnonzero((sources.p_C[:, 0] > 0.0) & (sources.electrons > _FAINTEST_E))
-        if len(bright) == 0:
-            return
-        p_C, size, electrons = sources.p_C[bright], sources.size_m[bright], sources.electrons[bright]
-        pixels, smear = np.empty((2, len(bright), 2))
-        _image(p_C, sources.way_C_m[bright], self._lens, pixels, smear)
-        width_px = size * self._camera.focal_length_px / p_C[:, 0]
-        sizes = size.tolist()
-        halves_px = {size_m: float(self._spread.half_width_px(size_m)) for size_m in set(sizes)}
-        half_px = np.array([halves_px[size_m] for size_m in sizes])
-        near = reach_window(image.shape, start, pixels, smear, electrons, width_px, half_px, self._spread.wing)
-        near = near[are_seen(bright[near])]
+        count = len(sources.electrons)
+        pixels, smear, width_px = np.empty((count, 2)), np.empty((count, 2)), np.empty(count)
+        _image(sources.p_C, sources.way_C_m, sources.size_m, self._lens, pixels, smear, width_px)
+        size, electrons = sources.size_m, np.where(sources.electrons > _FAINTEST_E, sources.electrons, 0.0)
+        widest_px, wing = self._spread.widest_px, self._spread.wing
+        near = reach_window(image.shape, start, pixels, smear, electrons, width_px, widest_px, wing)
+        near = near[are_seen(near)]
         if dirt is not None:
-            electrons = electrons * dirt.at(pixels)
+            electrons[near] *= dirt.at(pixels[near])
         is_wide = width_px[near] >= WIDE_PX
         wide, narrow = near[is_wide], near[~is_wide]
         if len(wide):
             add_patches(image, start, pixels[wide], electrons[wide], width_px[wide] / _SQUARE_SIGMAS)
         for size_m in sorted(set(size[narrow].tolist())):
             of = narrow[size[narrow] == size_m]
-            self._spread.splat(image, start, pixels[of], electrons[of], p_C[of, 0], size_m, smear[of])
+            self._spread.splat(image, start, pixels[of], electrons[of], sources.p_C[of, 0], size_m, smear[of])
 
 
 @njit(cache=True)
-def _image(p_C: Array, way_C: Array, lens: Lens, pixels: Array, smear: Array) -> None:
-    """Fill (n, 2) pixels of points in front of the lens, and their motion: `Camera.pixels_from_points`, compiled."""
+def _image(p_C: Array, way_C: Array, size_m: Array, lens: Lens, pixels: Array, smear: Array, width_px: Array) -> None:
+    """Fill (n, 2) pixels of points, their motion, and (n,) widths: `Camera.pixels_from_points`, compiled."""
     for i in range(len(p_C)):
         x, y, z = p_C[i]
         dx, dy, dz = 0.5 * way_C[i, 0], 0.5 * way_C[i, 1], 0.5 * way_C[i, 2]
@@ -89,6 +84,7 @@ def _image(p_C: Array, way_C: Array, lens: Lens, pixels: Array, smear: Array) ->
         u1, v1 = _pixel(x + dx, y + dy, z + dz, lens)
         u0, v0 = _pixel(x - dx, y - dy, z - dz, lens)
         smear[i, 0], smear[i, 1] = u1 - u0, v1 - v0
+        width_px[i] = size_m[i] * lens[0] / x if x > 0.0 else 0.0
 
 
 @njit(cache=True)

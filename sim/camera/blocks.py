@@ -278,5 +278,5 @@ def _spread(line: NDArray[np.float32], columns: Line, first: int, spacing: int, 
             pixels[2 * k], pixels[2 * k + 1] = a + near * step, a + far * step
     for start, stop in ((0, begin), (end, n)):
         for c in range(start, stop):
-            k = np.uint32(before[c] - first)  # unsigned: spares the test for indices that count from the end
-            out[c] = line[k] + part[c] * (line[k + np.uint32(1)] - line[k])
+            at = np.uint32(before[c] - first)  # unsigned: spares the test for indices that count from the end
+            out[c] = line[at] + part[c] * (line[at + np.uint32(1)] - line[at])

@@ -57,6 +57,8 @@ class Defects:
 
     def whiten(self, pixels: NDArray[np.unsignedinteger], window: Window, count: int) -> None:
         """Make hot pixels white in the output (rows, columns) of a window, in place."""
+        if count == 0:
+            return
         if count != len(self._places):
             self._places = hot_pixel_places(self._key, count, self._camera.height_px, self._camera.width_px)
         places = self._places - (window.row_start, window.column_start)

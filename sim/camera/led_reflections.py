@@ -91,44 +91,47 @@ def led_reflection_rows(
 
     Arguments as of `find_led_reflections`.
     """
-    p_WC, leds_W = np.asarray(p_WC, dtype=float), np.asarray(leds_W, dtype=float)
-    limit = surfaces.faintest_reflection * float(np.max(intensity_w_sr, initial=0.0))
-    wanted = _bound(data, mirrors, p_WC, leds_W, axis_W, surfaces) * np.asarray(intensity_w_sr)[:, None] >= limit
+    p_WC, leds_W, axis = np.asarray(p_WC, dtype=float), np.asarray(leds_W, dtype=float), vector(axis_W)
+    intensity_w_sr = np.asarray(intensity_w_sr, dtype=float)
+    limit = surfaces.faintest_reflection * float(intensity_w_sr.max(initial=0.0))
+    wanted = _bound(data, mirrors, p_WC, leds_W, axis_W, surfaces) * intensity_w_sr[:, None] >= limit
     rows = _rows(data, mirrors, p_WC, leds_W, wanted, surfaces)
     intensity = np.empty(len(rows))
-    _reflect(rows, leds_W, vector(axis_W), intensity_w_sr, (pattern_exponent, surfaces.led_side_light), intensity)
-    bright = np.flatnonzero((intensity > 0.0) & (intensity >= limit))
-    return rows[bright], intensity[bright]
+    count = _reflect(rows, leds_W, axis, intensity_w_sr, (pattern_exponent, surfaces.led_side_light), limit, intensity)
+    return rows[:count], intensity[:count]
 
 
 @njit(cache=True)
 def _reflect(
-    rows: Array, leds_W: Array, axis: Vector, intensity_w_sr: Array, pattern: tuple[float, float], out: Array
-) -> None:
-    """Fill (n,) I_ref of Eq. (1); `pattern` is m and the side light."""
+    rows: Array,
+    leds_W: Array,
+    axis: Vector,
+    intensity_w_sr: Array,
+    pattern: tuple[float, float],
+    limit: float,
+    out: Array,
+) -> int:
+    """Keep the rows whose I_ref, Eq. (1), is above the limit, and fill it in; `pattern` is m and the side light."""
+    count = 0
     for i in range(len(rows)):
         j = int(rows[i, 9])
         ray = (rows[i, 0] - leds_W[j, 0], rows[i, 1] - leds_W[j, 1], rows[i, 2] - leds_W[j, 2])
         d2 = _dot(ray, ray)
         cos_psi = max(_dot(ray, axis) / math.sqrt(d2), 0.0)
-        out[i] = intensity_w_sr[j] * max(cos_psi ** pattern[0], pattern[1]) * rows[i, 6] / d2
+        reflected = intensity_w_sr[j] * max(cos_psi ** pattern[0], pattern[1]) * rows[i, 6] / d2
+        if reflected > 0.0 and reflected >= limit:
+            rows[count], out[count] = rows[i], reflected
+            count += 1
+    return count
 
 
 def _bound(
     data: mujoco.MjData, mirrors: Mirrors, p_WC: Array, leds_W: Array, axis_W: Array, surfaces: SurfaceParameters
 ) -> Array:
     """(m, balls + tubes) what A I(psi)/(I_0 d1^2) cannot exceed, Eqs. (1) and (2)."""
-    balls, tubes, share, side = (
-        mirrors.near_balls,
-        mirrors.near_tubes,
-        finishes(surfaces)[:, 2],
-        surfaces.led_side_light,
-    )
-    bound, poses, axis = (
-        np.empty((len(leds_W), len(balls.geom) + len(tubes.geom))),
-        (data.geom_xpos, data.geom_xmat),
-        vector(axis_W),
-    )
+    balls, tubes, axis = mirrors.near_balls, mirrors.near_tubes, vector(axis_W)
+    share, side, poses = finishes(surfaces)[:, 2], surfaces.led_side_light, (data.geom_xpos, data.geom_xmat)
+    bound = np.empty((len(leds_W), len(balls.geom) + len(tubes.geom)))
     _bound_of_balls(balls, poses, leds_W, axis, share, side, bound)
     _bound_of_tubes(tubes, poses, leds_W, axis, vector(p_WC), share, side, bound[:, len(balls.geom) :])
     return bound

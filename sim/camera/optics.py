@@ -45,6 +45,7 @@ class PointSpread:
         self._sharp = Spread(airy=airy_px(lens, camera, wavelength_m), diffusion=sensor.diffusion_px, blur=0.0, die=0.0)
         self._edge_sigma_px = self._edge_sigma()
         self._cores: dict[float, _Cores] = {}
+        self._widest_px = self._cores_of(_LARGEST_M).widest_px
 
     def splat(
         self,
@@ -84,9 +85,10 @@ class PointSpread:
         """A and w of the wings, [splat, eq 1]."""
         return self._sharp.wing
 
-    def half_width_px(self, size_m: float) -> int:
-        """Half of the widest core of sources of one size."""
-        return self._cores_of(_divided(size_m)[1]).widest_px
+    @property
+    def widest_px(self) -> int:
+        """Half-width of the widest core that any source can have."""
+        return self._widest_px
 
     def edge_sigma_px(self) -> float:
         """Gaussian equivalent [px] of the blur of the Sun's edge: the same slope in the middle of a straight edge."""

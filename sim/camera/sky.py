@@ -205,18 +205,18 @@ class Sky:
 
     def _haze(self, cosine: Array) -> Array:
         """J_h of Eq. (7): the beam that gets through the haze makes J, the rest of the light is the same all round."""
-        sun_mass = float(_air_mass(self._sun[2:])[0])
-        beam = math.exp(-self._haze_depth * sun_mass)
-        through = float(self._droplets.transmittance(np.asarray(self._haze_depth)))
-        rest = self._mu_sun * max(through - beam, 0.0) * self._light_below
+        beam, rest = self._haze_light
         return self._source(cosine, self._light_below, self._direct_below) * beam + rest
 
     def _shade(self) -> None:
-        """Mean light under the layer above, and how much of it still is a beam."""
+        """Mean light under the layer above, and how much of it still is a beam; of that in haze, beam and rest."""
         cover, depth = self._weather.cloud_cover, self._weather.cloud_optical_depth
         self._light_below = 1.0 - cover + cover * float(self._droplets.transmittance(np.asarray(depth)))
         self._direct_below = (1.0 - cover + cover * math.exp(-0.5 * depth / self._mu_sun)) / self._light_below
         self._has_deck = self._p.deck_cover > 0.0 and self._altitude_m > self._p.deck_top_m
+        beam = math.exp(-self._haze_depth * float(_air_mass(self._sun[2:])[0]))
+        through = float(self._droplets.transmittance(np.asarray(self._haze_depth)))
+        self._haze_light = beam, self._mu_sun * max(through - beam, 0.0) * self._light_below
 
     def _clear_mass(self, sine: Array) -> Array:
         """(n,) air mass of clear air, Eq. (2); a ray that would go through the ground counts as one that skims it."""

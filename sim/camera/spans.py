@@ -19,9 +19,8 @@ from dockair.sim.camera.solids import CAPSULE
 _MOST_POINTS = 20  # a box's corners and its edges' cuts
 _ROUNDING = 1.0 + 1e-9  # on the bounding sphere
 
-Poses = tuple[
-    NDArray[np.int32], Array, Array
-]  # of the solids in the model, places and (ngeom, 9) attitudes of its geoms
+#: Of the solids in the model, with places (ngeom, 3) and attitudes (ngeom, 9) of its geoms.
+Poses = tuple[NDArray[np.intp], Array, Array]
 Frame = tuple[Array, Array]  # R_WC and p_WC of the camera
 Even = tuple[float, float, int]  # evenly spaced tangents: the first, how many there are in 1, their number
 
@@ -142,39 +141,44 @@ def _outline(
 
     Of a box that reaches behind the near plane all points of the part before it are joined, pair by pair.
     """
+    count = _points(points, corners, behind, near)
+    low, high = math.inf, -math.inf
+    for k in range(count):
+        low, high = min(low, points[k, 1]), max(high, points[k, 1])
+    row, stop = _between(low, high, rows)
+    sides[0, row:stop], sides[1, row:stop] = math.inf, -math.inf
+    if behind > 0:
+        for a in range(count):
+            for b in range(a):
+                _mark(sides, points[a], points[b], y, rows)
+        return row, stop
+    for a in range(8):
+        for bit in (1, 2, 4):
+            if (a & bit) == 0:
+                _mark(sides, points[a], points[a | bit], y, rows)
+    return row, stop
+
+
+@njit(cache=True)
+def _points(points: Array, corners: Array, behind: int, near: float) -> int:
+    """Fill (m, 2) tangents of a box's corners before the near plane, and of its edges' cuts with it; return m."""
     count = 0
     for k in range(8):
         if corners[k, 0] >= near:
             points[count, 0], points[count, 1] = -corners[k, 1] / corners[k, 0], -corners[k, 2] / corners[k, 0]
             count += 1
-    if behind > 0:
-        for a in range(8):
-            for bit in (1, 2, 4):
-                b = a | bit
-                if (corners[a, 0] < near) != (corners[b, 0] < near):
-                    part = (near - corners[a, 0]) / (corners[b, 0] - corners[a, 0])
-                    for axis in range(2):
-                        cut = corners[a, axis + 1] + part * (corners[b, axis + 1] - corners[a, axis + 1])
-                        points[count, axis] = -cut / near
-                    count += 1
-    low, high = math.inf, -math.inf
-    for k in range(count):
-        low, high = min(low, points[k, 1]), max(high, points[k, 1])
-    row, stop = _between(low, high, rows)
-    for i in range(row, stop):
-        sides[0, i], sides[1, i] = math.inf, -math.inf
-    if row == stop:
-        return 0, 0
     if behind == 0:
-        for a in range(8):
-            for bit in (1, 2, 4):
-                if (a & bit) == 0:
-                    _mark(sides, points[a], points[a | bit], y, rows)
-    else:
-        for a in range(count):
-            for b in range(a):
-                _mark(sides, points[a], points[b], y, rows)
-    return row, stop
+        return count
+    for a in range(8):
+        for bit in (1, 2, 4):
+            b = a | bit
+            if (corners[a, 0] < near) != (corners[b, 0] < near):
+                part = (near - corners[a, 0]) / (corners[b, 0] - corners[a, 0])
+                for axis in range(2):
+                    cut = corners[a, axis + 1] + part * (corners[b, axis + 1] - corners[a, axis + 1])
+                    points[count, axis] = -cut / near
+                count += 1
+    return count
 
 
 @njit(cache=True)

@@ -52,7 +52,7 @@ def reach_window(
     smear: Array,
     electrons: Array,
     width_px: Array,
-    half_px: Array,
+    widest_px: int,
     wing: tuple[float, float],
 ) -> NDArray[np.int64]:
     """Return which blobs may add to a pixel of a window; those left out surely do not.
@@ -64,15 +64,20 @@ def reach_window(
         smear: (n, 2).
         electrons: (n,).
         width_px: (n,) sides of the sources.
-        half_px: (n,) largest half-widths of their cores.
+        widest_px: half-width of the widest core there is.
         wing: A and w.
     """
-    near = np.zeros(pixels.shape[0], np.bool_)
+    near, count = np.empty(pixels.shape[0], np.int64), 0
     for i in range(pixels.shape[0]):
+        (u, v), E = pixels[i], electrons[i]
+        if not (E > 0.0 and math.isfinite(u) and math.isfinite(v)):
+            continue
         length = math.hypot(smear[i, 0], smear[i, 1])
-        reach = _reach(electrons[i], half_px[i], wing) + length + _REACH_WIDTHS * width_px[i] + _SPARE_PX
-        near[i] = not _is_outside(shape, start, pixels[i, 0], pixels[i, 1], reach)
-    return np.flatnonzero(near)
+        reach = _reach(E, widest_px, wing) + length + _REACH_WIDTHS * width_px[i] + _SPARE_PX
+        if not _is_outside(shape, start, u, v, reach):
+            near[count] = i
+            count += 1
+    return near[:count]
 
 
 @njit(cache=True, error_model="numpy")

@@ -7,17 +7,15 @@ and in units of its size, o being the lens and w = o x d, a ray enters
     tube      the same across its axis                                                                           (2)
     box       |o + t d|_k <= 1, k = x, y, z    where the last of three slabs is entered                          (3)
 
-s and the place n of the entry are no small differences of large numbers, so that single precision is enough: w is linear
-in x, and its coefficients are worked out in double precision. A capsule is a tube up to its two balls, a cylinder a
-tube cut by one slab. The nearest solid wins, block by block. Only entries count: a solid that the lens stands in is not
-seen, as with OpenGL's culled back faces. What a block shows depends on its own ray alone; which are looked at for a
-solid, `spans` says.
+s and the place n of the entry are no small differences of large numbers, so that single precision is enough: w is
+linear in x, and its coefficients are worked out in double precision. A capsule is a tube up to its two balls, a
+cylinder a tube cut by one slab. The nearest solid wins, block by block. Only entries count: a solid that the lens
+stands in is not seen, as with OpenGL's culled back faces. What a block shows depends on its own ray alone; which are
+looked at for a solid, `spans` says.
 
 Not modelled: more than one ray a block (edges are steps of a block).
 Source: Glassner (ed.), An Introduction to Ray Tracing, ch. 2.
 """
-
-import math
 
 import mujoco
 import numpy as np
@@ -42,6 +40,8 @@ Triple = tuple[float, float, float]
 Single = tuple[np.float32, np.float32, np.float32]
 #: Of one row, in a solid's axes and units: o; d = a + x b; w = p + x q.
 Rays = tuple[Single, Single, Single, Single, Single]
+#: Reflectance, ambient and direct light, extinction, airlight, 1 + y^2, depth of the near plane.
+Shade = tuple[np.float32, np.float32, np.float32, np.float32, np.float32, np.float32, np.float32]
 
 
 class TracedSolids:
@@ -107,12 +107,12 @@ def _trace(
     x: Array,
     y: Array,
     sun_C: Array,
-    shade: tuple[float, float, float, float],
+    light: tuple[float, float, float, float],
     near: float,
 ) -> None:
     """Draw the first `count` placed solids; `nearest` (rows, columns) holds depths so far."""
     kinds, half_sizes, reflectances = solids
-    ambient, direct, extinction, air = _F(shade[0]), _F(shade[1]), _F(shade[2]), _F(shade[3])
+    ambient, direct, extinction, air = _F(light[0]), _F(light[1]), _F(light[2]), _F(light[3])
     tangents = x.astype(np.float32)
     for k in range(count):
         g = placed.solid[k]
@@ -133,16 +133,15 @@ def _trace(
             a = (ahead[0] + y[i] * down[0], ahead[1] + y[i] * down[1], ahead[2] + y[i] * down[2])
             rays = _single(o), _single(a), _single(across), _single(_cross(o, a)), _single(q)
             part, picture, depths = tangents[left:right], out[i, left:right], nearest[i, left:right]
-            light = _F(reflectances[g]), ambient, direct
-            haze = extinction, air, _F(1.0 + y[i] * y[i])
+            shade = _F(reflectances[g]), ambient, direct, extinction, air, _F(1.0 + y[i] * y[i]), _F(near)
             if kind == BALL:
-                _draw_ball(rays, inverse, sun, part, light, haze, _F(near), picture, depths)
+                _draw_ball(rays, inverse, sun, shade, part, picture, depths)
             elif kind == BOX:
-                _draw_box(rays, sun, part, light, haze, _F(near), picture, depths)
+                _draw_box(rays, sun, shade, part, picture, depths)
             elif kind == CAPSULE:
-                _draw_capsule(rays, half, sun, part, light, haze, _F(near), picture, depths)
+                _draw_capsule(rays, half, sun, shade, part, picture, depths)
             else:
-                _draw_cylinder(rays, half, sun, part, light, haze, _F(near), picture, depths)
+                _draw_cylinder(rays, half, sun, shade, part, picture, depths)
 
 
 @njit(cache=True)
@@ -165,69 +164,37 @@ def _single(a: Triple) -> Single:
     return _F(a[0]), _F(a[1]), _F(a[2])
 
 
-# The next four draw a row of a kind of solid. What they call has no branches, so that the compiler takes several rays at
-# once; it returns the depth at which a ray enters a solid, NaN or before the lens for a miss, and the cosine of the
+# The next four draw a row of a kind of solid. What they call has no branches, so that the compiler takes several rays
+# at once; it returns the depth at which a ray enters a solid, NaN or before the lens for a miss, and the cosine of the
 # Sun's incidence there.
 
 
 @njit(cache=True, error_model="numpy")
-def _draw_ball(
-    rays: Rays,
-    inverse: Single,
-    sun: Single,
-    x: Row,
-    light: Single,
-    haze: Single,
-    near: np.float32,
-    out: Row,
-    nearest: Row,
-) -> None:
+def _draw_ball(rays: Rays, inverse: Single, sun: Single, shade: Shade, x: Row, out: Row, nearest: Row) -> None:
     for j in range(x.shape[0]):
         t, cos = _enter_ball(rays, inverse, sun, x[j])
-        out[j], nearest[j] = _lay_over(t, cos, x[j], light, haze, near, out[j], nearest[j])
+        out[j], nearest[j] = _lay_over(t, cos, x[j], shade, out[j], nearest[j])
 
 
 @njit(cache=True, error_model="numpy")
-def _draw_capsule(
-    rays: Rays,
-    half: np.float32,
-    sun: Single,
-    x: Row,
-    light: Single,
-    haze: Single,
-    near: np.float32,
-    out: Row,
-    nearest: Row,
-) -> None:
+def _draw_capsule(rays: Rays, half: np.float32, sun: Single, shade: Shade, x: Row, out: Row, nearest: Row) -> None:
     for j in range(x.shape[0]):
         t, cos = _enter_capsule(rays, half, sun, x[j])
-        out[j], nearest[j] = _lay_over(t, cos, x[j], light, haze, near, out[j], nearest[j])
+        out[j], nearest[j] = _lay_over(t, cos, x[j], shade, out[j], nearest[j])
 
 
 @njit(cache=True, error_model="numpy")
-def _draw_cylinder(
-    rays: Rays,
-    half: np.float32,
-    sun: Single,
-    x: Row,
-    light: Single,
-    haze: Single,
-    near: np.float32,
-    out: Row,
-    nearest: Row,
-) -> None:
+def _draw_cylinder(rays: Rays, half: np.float32, sun: Single, shade: Shade, x: Row, out: Row, nearest: Row) -> None:
     for j in range(x.shape[0]):
         t, cos = _enter_cylinder(rays, half, sun, x[j])
-        out[j], nearest[j] = _lay_over(t, cos, x[j], light, haze, near, out[j], nearest[j])
+        out[j], nearest[j] = _lay_over(t, cos, x[j], shade, out[j], nearest[j])
 
 
 @njit(cache=True, error_model="numpy")
-def _draw_box(
-    rays: Rays, sun: Single, x: Row, light: Single, haze: Single, near: np.float32, out: Row, nearest: Row
-) -> None:
+def _draw_box(rays: Rays, sun: Single, shade: Shade, x: Row, out: Row, nearest: Row) -> None:
     for j in range(x.shape[0]):
         t, cos = _enter_box(rays, sun, x[j])
-        out[j], nearest[j] = _lay_over(t, cos, x[j], light, haze, near, out[j], nearest[j])
+        out[j], nearest[j] = _lay_over(t, cos, x[j], shade, out[j], nearest[j])
 
 
 @njit(cache=True, error_model="numpy", inline="always")
@@ -301,23 +268,14 @@ def _enter_box(rays: Rays, sun: Single, x: np.float32) -> tuple[np.float32, np.f
 
 @njit(cache=True, inline="always")
 def _lay_over(
-    t: np.float32,
-    cos: np.float32,
-    x: np.float32,
-    light: Single,
-    haze: Single,
-    near: np.float32,
-    behind: np.float32,
-    nearest: np.float32,
+    t: np.float32, cos: np.float32, x: np.float32, shade: Shade, behind: np.float32, nearest: np.float32
 ) -> tuple[np.float32, np.float32]:
-    """Radiance, [solids, eq 1], and depth of a solid where it is nearest so far, else of what is behind it.
-
-    `light` is reflectance, ambient and direct light; `haze` extinction, airlight and 1 + y^2.
-    """
+    """Radiance, [solids, eq 1], and depth of a solid where it is nearest so far, else of what is behind it."""
+    reflectance, ambient, direct, extinction, air, beyond, near = shade
     seen = (t >= near) & (t < nearest)  # NaN is a miss
-    radiance = light[0] * (light[1] + light[2] * (cos if cos > _ZERO else _ZERO))
-    clear = _fading(haze[0] * t * np.sqrt(haze[2] + x * x))
-    radiance = radiance * clear + haze[1] * (_ONE - clear)
+    radiance = reflectance * (ambient + direct * (cos if cos > _ZERO else _ZERO))
+    clear = _fading(extinction * t * np.sqrt(beyond + x * x))
+    radiance = radiance * clear + air * (_ONE - clear)
     return radiance if seen else behind, t if seen else nearest
 
 

@@ -77,7 +77,7 @@ def small_world() -> SmallWorld:
 
 @pytest.fixture(params=[pytest.param("mujoco", marks=pytest.mark.gl), "analytic"])
 def make_camera(request: pytest.FixtureRequest) -> Iterator[Callable[..., tuple[SmallWorld, NearInfraredCamera]]]:
-    """make_camera(sun_W, seed, faults, overrides, hub, **more of NearInfraredCamera) -> world, camera.
+    """make_camera(sun_W, seed, faults, overrides, hub, unseen, **more of NearInfraredCamera) -> world, camera.
 
     Once with each background. The drogue is 8 m ahead of the lens; the exposure is fixed.
     """
@@ -89,11 +89,14 @@ def make_camera(request: pytest.FixtureRequest) -> Iterator[Callable[..., tuple[
         faults: tuple[Fault, ...] = (),
         overrides: dict[str, dict[str, Any]] | None = None,
         hub: bool = True,
+        unseen: tuple[str, ...] = (),  # geoms of a group that is not drawn
         **more: Any,
     ) -> tuple[SmallWorld, NearInfraredCamera]:
         world = SmallWorld()
         if not hub:  # LEDs alone
             world.model.geom("basket_hub").rgba[3] = 0.0
+        for name in unseen:
+            world.model.geom(name).group = 3
         options = {"automatic_exposure": False, "background": request.param, "altitude_m": 6000.0} | more
         camera = NearInfraredCamera(
             CameraSheets.load(overrides=overrides),

@@ -186,11 +186,12 @@ def test_what_lies_behind_an_led_or_within_its_seat_does_not_hide_it(make_camera
 
 
 def test_invisible_geoms_hide_nothing(make_camera: Callable[..., Made]) -> None:
-    world, camera = make_camera()
-    R_WC, p_WC = camera.pose(world.data)
-    world.put("box", p_WC + R_WC @ (0.6 * (np.array([8.0, 0.2, -0.1]) + world.as_built.ring_positions_D[2])), R_WC)
-    world.model.geom("box").group = 3
-    assert camera.visible_leds(world.data).all()
+    for unseen, all_visible in (((), False), (("box",), True)):
+        world, camera = make_camera(unseen=unseen)
+        R_WC, p_WC = camera.pose(world.data)
+        before_led = 0.6 * (np.array([8.0, 0.2, -0.1]) + world.as_built.ring_positions_D[2])
+        world.put("box", p_WC + R_WC @ before_led, R_WC)
+        assert camera.visible_leds(world.data).all() == all_visible
 
 
 def test_an_led_behind_the_camera_or_turned_away_leaves_the_picture_alone(make_camera: Callable[..., Made]) -> None:

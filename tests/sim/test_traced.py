@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from dockair.rotations import exp
-from dockair.sim.camera.solids import VISIBLE_GROUPS
-from dockair.sim.camera.solids import Haze, Lighting
+from dockair.sim.camera.solids import VISIBLE_GROUPS, Haze, Lighting
 from dockair.sim.camera.traced import TracedSolids
 
 AT_ORIGIN = (np.eye(3), np.zeros(3))
