@@ -91,6 +91,20 @@ def _merged(image, u, v, R):
     return max(0.0, longer - shorter - 1.5 * noise - 0.07 * (longer + shorter))
 
 
+def test_structure_around_a_merged_spot_does_not_take_its_doubt_away():
+    """Beside canopy the background varies; that is no noise of the moments, and Eq. (6) has to see past it."""
+    rows, columns = np.indices((21, 21))
+    points = sum(np.exp(-((columns - u) ** 2 + (rows - 10.0) ** 2) / 0.98) for u in (9.4, 10.6))
+    even = np.rint(20.0 + 60.0 * points).astype(np.uint8)
+    uneven = np.where(even == 20, 20 + 19 * ((rows + columns) % 2), even).astype(np.uint8)
+    sigmas = [
+        measure_blobs(image, foreground_runs(image, 40), 40, NOISE, background_dn=20.0, windowed=True).sigma_px[0]
+        for image in (even, uneven)
+    ]
+    assert sigmas[0] > 0.25
+    assert sigmas[1] > 0.8 * sigmas[0]  # 0.5 with the structure as noise
+
+
 @pytest.mark.parametrize("share", [0.35, 0.5, 0.65])
 def test_an_led_merged_with_a_reflection_has_its_error_in_its_sigma(share):
     """The LED has a share of the light of two points 1.4 to 2 px apart, and neither has a peak of its own."""
@@ -119,21 +133,24 @@ def test_an_led_merged_with_a_reflection_has_its_error_in_its_sigma(share):
 
 
 def test_a_spot_cut_off_from_a_bright_surface_does_not_drift_onto_it():
-    """A canopy's edge two pixels from a faint LED: what touches the spot and is brighter than it is not its own."""
+    """A canopy's edge two pixels from a faint LED: what touches the spot and is brighter than it is not its own.
+
+    With the canopy's pixels in the sums the error is 0.55 px.
+    """
     rng = np.random.default_rng(23)
     rows, columns = np.indices((41, 41))
     offsets = []
-    for _ in range(100):
+    for _ in range(200):
         u, v = rng.uniform(19.6, 20.4, 2)
         led = 9.0 * np.exp(-((columns - u) ** 2 + (rows - v) ** 2) / 0.98)
-        canopy = 9.0 / (1.0 + np.exp(-(columns - 22.7) / 0.4))
+        canopy = 13.0 / (1.0 + np.exp(-(columns - 22.0) / 0.25))
         image = np.rint(3.0 + np.maximum(led, canopy) + rng.normal(0.0, 0.35, led.shape)).clip(0, 255).astype(np.uint8)
         blobs = detect(image)
         distance = np.linalg.norm(blobs.centroids_px - [u, v], axis=1) if len(blobs) else np.array([9.0])
         if distance.min() < 2.0:
             offsets.append(blobs.centroids_px[distance.argmin()] - [u, v])
-    assert len(offsets) > 80
-    assert _rms(np.array(offsets)) < 0.3
+    assert len(offsets) > 120
+    assert _rms(np.array(offsets)) < 0.15
 
 
 @pytest.mark.parametrize("windowed", [True, False])

@@ -64,6 +64,17 @@ def test_larger_random_images_of_every_density_and_grain_are_labelled_alike(conn
         check_against_scipy_and_opencv(np.kron(coarse, np.ones(grain, bool))[: shape[0], : shape[1]] > 0, connectivity)
 
 
+@pytest.mark.parametrize("connectivity", [4, 8])
+def test_components_at_the_ends_of_what_is_passed_over_at_once_are_labelled_alike(connectivity):
+    """Sparse images wider than three times 64 pixels, with foreground on either side of every multiple of it."""
+    rng = np.random.default_rng(10 + connectivity)
+    for _ in range(100):
+        mask = rng.random((12, int(rng.integers(190, 330)))) < 0.002
+        for column in range(62, mask.shape[1] - 4, 64):
+            mask[rng.integers(0, 12), column : column + 4] |= rng.random(4) < 0.5
+        check_against_scipy_and_opencv(mask, connectivity)
+
+
 def _spiral(size: int) -> np.ndarray:
     mask = np.zeros((size, size), bool)
     top, left, bottom, right = 0, 0, size - 1, size - 1

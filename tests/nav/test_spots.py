@@ -209,6 +209,16 @@ def test_the_sun_s_veil_hides_no_led_that_stands_a_half_above_it():
     assert all(any((v, u) in pixels for pixels in found) for u, v in true)
 
 
+def test_a_peak_alone_is_no_spot():
+    """Its neighbours are brighter than noise but under a tenth of it: above t there is one pixel."""
+    image = np.full((40, 40), 3, np.uint8)
+    image[18:21, 18:21] = 6
+    image[19, 19] = 34
+    assert find_spots(image, LIMITS).runs.count == 0
+    image[19, 20] = 12
+    assert find_spots(image, LIMITS).runs.area_px.tolist() == [2]
+
+
 def test_noise_alone_makes_no_spot():
     """2.2 million pixels at each of three levels; normal noise is six standard deviations up in one of 1e9."""
     rng = np.random.default_rng(6)
