@@ -1,9 +1,11 @@
 """How fast the sensors' stages are on this machine, beside what a user would take instead.
 
-Every figure is the least of several repetitions in one process, after a first one that compiles. Speeds are
-benchmarks, never tests: they belong to the machine that printed them.
+Every figure is the least of many repetitions in one process, after some that compile. What is compared is timed by
+turns, a few repetitions each, so that what else the machine does meets all alike. Speeds are benchmarks, never tests:
+they belong to the machine that printed them.
 """
 
+import math
 import time
 from collections.abc import Callable
 from functools import partial
@@ -11,19 +13,23 @@ from typing import Any
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from dockair.messages import Window
-from dockair.scenarios.build import build, camera_sheets
+from dockair.scenarios.build import Parts, build, camera_sheets
 from dockair.scenarios.schema import Scenario
 from dockair.sim.camera.camera import NearInfraredCamera
 from dockair.sim.camera.electronics import digitise
 from dockair.sim.camera.fixed_pattern import FixedPattern
 from dockair.sim.world import World
 
-_REPETITIONS = 25
+_TURNS, _EACH = 25, 4
 _ROWS = Window(344, 744, 0, 2048)
 _SMALL = Window(394, 694, 874, 1174)
-_WARM_UP = 5
+_FULL = Window(0, 1088, 0, 2048)
+_WARM_UP = 3
+
+Stages = dict[str, Callable[[], Any]]
 
 
 def bench_sensors(scenario: Scenario) -> dict[str, Any]:
@@ -32,50 +38,58 @@ def bench_sensors(scenario: Scenario) -> dict[str, Any]:
     Args:
         scenario: whose start is looked at, with its own seed.
     """
-    other = {"mujoco": "analytic", "analytic": "mujoco"}
-    parts = build(scenario, scenario.seed)
-    camera, world = parts.camera, parts.world
-    assert camera is not None
-    milliseconds: dict[str, float] = {}
+    names = ("mujoco", "analytic")
+    parts = [_with_background(scenario, name) for name in names]
+    world, imu = parts[0].world, parts[0].imu
+    stages: Stages = {}
     try:
-        first = camera.background
-        milliseconds |= _camera_figures(camera, world, first)
+        for name, each in zip(names, parts, strict=True):
+            assert each.camera is not None
+            stages |= _camera_stages(each.camera, each.world, name)
+        milliseconds = _least(stages | _electronics(scenario))
     finally:
-        camera.close()
-    options = scenario.camera.model_copy(update={"background": other[first]})
-    twin = build(scenario.model_copy(update={"camera": options}), scenario.seed)
-    assert twin.camera is not None
-    try:
-        milliseconds |= _camera_figures(twin.camera, twin.world, other[first])
-    finally:
-        twin.camera.close()
-    milliseconds |= _electronics_figures(scenario)
+        for each in parts:
+            if each.camera is not None:
+                each.camera.close()
+    milliseconds |= _least(_random_numbers(), turns=1)
     milliseconds["bare mujoco.Renderer, RGB, full size"] = _bare_renderer(world)
-    milliseconds["IMU sample"] = _least(lambda: parts.imu.step(0.0, np.zeros(3), np.zeros(3), np.zeros(3)))
+    milliseconds |= _least({"IMU sample": lambda: imu.step(0.0, np.zeros(3), np.zeros(3), np.zeros(3))})
     return {"milliseconds": milliseconds, "ratios": _ratios(milliseconds)}
 
 
-def _camera_figures(camera: NearInfraredCamera, world: World, name: str) -> dict[str, float]:
-    full = Window(0, 1088, 0, 2048)
-    figures = {}
-    for what, window in (("full frame", full), ("400 rows", _ROWS), ("300 x 300", _SMALL)):
-        figures[f"{name}: expose, {what}"] = _least(partial(camera.expose, world.data, 0.0, 0, window))
-        figures[f"{name}: without electronics, {what}"] = _least(partial(camera.expected_electrons, world.data, window))
-        figures[f"{name}: background, {what}"] = _least(partial(camera.background_electrons, world.data, window))
-    return figures
+def _with_background(scenario: Scenario, name: str) -> Parts:
+    options = scenario.camera.model_copy(update={"background": name})
+    return build(scenario.model_copy(update={"camera": options}), scenario.seed)
 
 
-def _electronics_figures(scenario: Scenario) -> dict[str, float]:
-    """Electronics of a full frame against NumPy's own random numbers."""
-    sensor = camera_sheets(scenario).sensor
-    pattern = FixedPattern(sensor, 1, 1088, 2048)
-    rng = np.random.default_rng(0)
-    expected = rng.uniform(20.0, 3000.0, (1088, 2048)).astype(np.float32)
+def _camera_stages(camera: NearInfraredCamera, world: World, name: str) -> Stages:
+    stages: Stages = {}
+    for what, window in (("full frame", _FULL), ("400 rows", _ROWS), ("300 x 300", _SMALL)):
+        stages[f"{name}: expose, {what}"] = partial(camera.expose, world.data, 0.0, 0, window)
+        stages[f"{name}: without electronics, {what}"] = partial(camera.expected_electrons, world.data, window)
+        stages[f"{name}: background, {what}"] = partial(camera.background_electrons, world.data, window)
+    return stages
+
+
+def _electronics(scenario: Scenario) -> Stages:
+    """Of a full frame."""
+    sensor, expected = camera_sheets(scenario).sensor, _levels()
+    pattern = FixedPattern(sensor, 1, *expected.shape)
+    return {"electronics, full frame": lambda: digitise(expected, sensor, pattern, 1, 0, (0, 0), 2e-5)}
+
+
+def _random_numbers() -> Stages:
+    """NumPy's own, for the electronics of a full frame."""
+    rng, expected = np.random.default_rng(0), _levels()
     return {
-        "electronics, full frame": _least(lambda: digitise(expected, sensor, pattern, 1, 0, (0, 0), 2e-5)),
-        "NumPy: normals alone, full frame": _least(lambda: rng.standard_normal(expected.shape, dtype=np.float32), 5),
-        "NumPy: Poisson alone, full frame": _least(lambda: rng.poisson(expected), 3),
+        "NumPy: normals alone, full frame": lambda: rng.standard_normal(expected.shape, dtype=np.float32),
+        "NumPy: Poisson alone, full frame": lambda: rng.poisson(expected),
     }
+
+
+def _levels() -> NDArray[np.float32]:
+    """Expected electrons of a full frame, of all levels."""
+    return np.random.default_rng(0).uniform(20.0, 3000.0, _FULL.shape).astype(np.float32)
 
 
 def _bare_renderer(world: World) -> float:
@@ -90,7 +104,7 @@ def _bare_renderer(world: World) -> float:
             renderer.update_scene(world.data, view)
             return renderer.render()
 
-        return _least(draw)
+        return _least({"": draw}, turns=_TURNS // 4)[""]
     finally:
         renderer.close()
 
@@ -111,13 +125,16 @@ def _ratios(ms: dict[str, float]) -> dict[str, float]:
     return ratios
 
 
-def _least(function: Callable[[], Any], repetitions: int = _REPETITIONS) -> float:
-    """Shortest time of a call [ms], after some that compile and fill caches."""
-    for _ in range(min(_WARM_UP, repetitions)):
-        function()
-    times = []
-    for _ in range(repetitions):
-        begun = time.perf_counter()
-        function()
-        times.append(time.perf_counter() - begun)
-    return 1e3 * min(times)
+def _least(stages: Stages, turns: int = _TURNS) -> dict[str, float]:
+    """Shortest time of each [ms], after some that compile and fill caches."""
+    least = dict.fromkeys(stages, math.inf)
+    for function in stages.values():
+        for _ in range(_WARM_UP):
+            function()
+    for _ in range(turns):
+        for name, function in stages.items():
+            for _ in range(_EACH):
+                begun = time.perf_counter()
+                function()
+                least[name] = min(least[name], 1e3 * (time.perf_counter() - begun))
+    return least

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from dockair.rotations import Array
 from dockair.sim.camera.curved_mirrors import ellipsoid_spots, rim_spots
+from dockair.sim.camera.facets import facets_that_may_shine
 from dockair.sim.camera.lobes import ROW, SPOT, facet_rows, spot_rows
 from dockair.sim.camera.mirrors import METAL, Mirrors, Vector, finishes, vector
 from dockair.sim.camera.occlusion import Obstacles, first_hits, is_clear
@@ -136,6 +137,8 @@ def glint_rows(
         n += rim_spots(mirrors.rim.torus_W(data), float(METAL), mirrors.rim.skin_m, sun, 0.0, eye, spots[n:])
     rows = np.empty((_MOST, ROW))
     count = spot_rows(spots[:n], sun, 0.0, variance, eye, finish, limits, rows, 0)
-    count = facet_rows(mirrors.facets, (xpos, xmat), (vector(s_W), 0.0, variance), eye, finish, limits, rows, count)
+    poses, facets, s = (xpos, xmat), mirrors.facets, vector(s_W)
+    which = facets_that_may_shine(facets, poses, (s, variance), eye, finish, surfaces.faintest_radiance)
+    count = facet_rows(facets, which, poses, (s, 0.0, variance), eye, finish, limits, rows, count)
     rows = rows[:count]
     return rows if ahead_W is None else rows[(rows[:, :3] - p_WC) @ ahead_W > 0.0]

@@ -41,8 +41,6 @@ _STEEPEST = 0.5  # h.n below which no facet of a rough surface stands that way
 _MOST_PIECES = 8  # of a streak
 _EVERYWHERE = 1e9  # [m], bounds of surfaces without edges
 _FAINTEST_SHARE = 1e-9  # of a lobe
-_MOST_GAIN = 4.0  # by which reflectance and tilt may differ over a facet, where it is asked whether it may shine
-_LEAST_COS = 1e-3  # of the angle under which it is then seen
 _ALL_SIGMAS = 9.0  # what lies beyond is lost in rounding
 _DARK = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
@@ -114,54 +112,31 @@ def _pieces(spot: Spot, box: Box, lamp: Lamp, limits: Limits, lobe: Lobe, row: A
 
 @njit(cache=True)
 def facet_rows(
-    facets: Facets, poses: Poses, light: Light, eye: Vector, finishes: Array, limits: Limits, rows: Array, count: int
+    facets: Facets,
+    which: NDArray[np.int64],
+    poses: Poses,
+    light: Light,
+    eye: Vector,
+    finishes: Array,
+    limits: Limits,
+    rows: Array,
+    count: int,
 ) -> int:
-    """Append what facets send of the Sun to the lens; arguments as of `spot_rows`."""
+    """Append what facets, `which` of all, send of the Sun to the lens; other arguments as of `spot_rows`."""
     xpos, xmat = poses
-    facing = np.empty(len(facets.geom) + 1, dtype=np.int64)
-    for g, start, stop in facets.runs:
-        # toward the light and to the lens, in the geom's axes
-        s, e = _turned_back(xmat[g], light[0]), _turned_back(xmat[g], _add(eye, -1.0, _vector(xpos[g], 0)))
-        for i in facing[: _face(facets.planes, start, stop, s, e, facing)]:
-            frame, half, finish = facets.frame[i], facets.half[i], finishes[facets.material[i]]
-            v, d = _unit(_add(e, -1.0, _vector(frame[0], 0)))
-            h, twice = _unit(_add(v, 1.0, s))
-            sun, local = math.sqrt(light[2]) / max(twice, 1e-9), _vector(frame[1], 0)
-            hn, vn, rough = _dot(local, h), _dot(local, v), finish[3]
-            if hn < _STEEPEST:
-                continue
-            bend = facets.bend[i] + 2.0 * (half[0] + half[1]) / max(d * twice, 1e-9)
-            tilt = max(math.sqrt(max(1.0 / hn**2 - 1.0, 0.0)) - bend, 0.0)  # what the facet at its best lacks
-            if tilt > 6.0 * (rough + sun):
-                continue
-            most = (
-                _MOST_GAIN * _reflectance(0.5 * twice, finish) / (8.0 * hn**4 * max(vn - bend, _LEAST_COS) * rough**2)
-            )
-            if most * math.exp(-0.5 * tilt**2 / (rough**2 + sun**2)) < limits[2]:
-                continue  # surely too dim
-            p, n = _add(_vector(xpos[g], 0), 1.0, _turned(xmat[g], frame[0])), _turned(xmat[g], frame[1])
-            spot = (p, n, _turned(xmat[g], frame[2]), _turned(xmat[g], frame[3]), _vector(facets.curvature[i], 0))
-            box = (-half[0], half[0], -half[1], half[1])
-            lobe = _lobe(spot, box, light, eye, finish, limits[0])
-            if lobe[0] == 0.0:
-                continue
-            spot, box = _nearer(spot, box, light, eye)  # where it is bright, Eq. (2)'s linear map is better
-            lobe = _lobe(spot, box, light, eye, finish, limits[0])
-            if lobe[0] > 0.0 and lobe[0] >= limits[1] and lobe[1] >= limits[2] and count < len(rows):
-                _write(rows[count], spot, lobe, _SKIN_M, 0.0)
-                count += 1
-    return count
-
-
-@njit(cache=True)
-def _face(planes: Array, start: int, stop: int, s: Vector, e: Vector, facing: NDArray[np.int64]) -> int:
-    """List which facets of a run face both a direction s and a point e; return how many."""
-    count = 0
-    for i in range(start, stop):
-        x, y, z = planes[0, i], planes[1, i], planes[2, i]
-        facing[count] = i
-        toward, ahead = x * s[0] + y * s[1] + z * s[2], x * e[0] + y * e[1] + z * e[2]
-        count += (toward > 0.0) & (ahead > planes[3, i])
+    for i in which:
+        g, frame, half, finish = facets.geom[i], facets.frame[i], facets.half[i], finishes[facets.material[i]]
+        p, n = _add(_vector(xpos[g], 0), 1.0, _turned(xmat[g], frame[0])), _turned(xmat[g], frame[1])
+        spot = (p, n, _turned(xmat[g], frame[2]), _turned(xmat[g], frame[3]), _vector(facets.curvature[i], 0))
+        box = (-half[0], half[0], -half[1], half[1])
+        lobe = _lobe(spot, box, light, eye, finish, limits[0])
+        if lobe[0] == 0.0:
+            continue
+        spot, box = _nearer(spot, box, light, eye)  # where it is bright, Eq. (2)'s linear map is better
+        lobe = _lobe(spot, box, light, eye, finish, limits[0])
+        if lobe[0] > 0.0 and lobe[0] >= limits[1] and lobe[1] >= limits[2] and count < len(rows):
+            _write(rows[count], spot, lobe, _SKIN_M, 0.0)
+            count += 1
     return count
 
 
@@ -236,16 +211,6 @@ def _turned(M: Array, a: Array) -> Vector:
         M[0] * a[0] + M[1] * a[1] + M[2] * a[2],
         M[3] * a[0] + M[4] * a[1] + M[5] * a[2],
         M[6] * a[0] + M[7] * a[1] + M[8] * a[2],
-    )
-
-
-@njit(cache=True)
-def _turned_back(M: Array, a: Vector) -> Vector:
-    """M' a, with M (9,) by rows."""
-    return (
-        M[0] * a[0] + M[3] * a[1] + M[6] * a[2],
-        M[1] * a[0] + M[4] * a[1] + M[7] * a[2],
-        M[2] * a[0] + M[5] * a[1] + M[8] * a[2],
     )
 
 

@@ -1,0 +1,105 @@
+"""Which of the scene's facets may mirror the Sun into the lens; most do not, and working out a lobe takes its time.
+
+A facet that is turned away from Sun or lens does not. Of the others the facet that [lobes, eq 1] asks for stands
+steeper by |m|, m of [lobes, eq 2] in the middle, and by no less than |m| - b elsewhere, b being the most by which slope
+and half vector turn over the facet. With V the variance of slopes, the Sun's disc included, its radiance is at most
+
+    4 R(i)/(8 (h.n)^4 (v.n - b) sigma^2) exp(-(|m| - b)^2/(2 V))                                                  (1)
+
+where the 4 stands for what R and h.n gain over it. Nor is one looked at whose lobe ends before, at six sigmas.
+Sources: as of `lobes`.
+"""
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from dockair.rotations import Array
+from dockair.sim.camera.mirrors import Facets, Vector
+
+_GAIN = 4.0
+_LEAST_COS = 1e-3  # of v.n - b
+_MOST_SIGMAS = 6.0
+_STEEPEST = 0.5  # h.n of `lobes`
+
+
+@njit(cache=True)
+def facets_that_may_shine(
+    facets: Facets, poses: tuple[Array, Array], sun: tuple[Vector, float], eye: Vector, finishes: Array, faintest: float
+) -> NDArray[np.int64]:
+    """Return their numbers, in order.
+
+    Args:
+        facets: of `Mirrors`.
+        poses: (ngeom, 3) places and (ngeom, 9) attitudes of the geoms.
+        sun: unit vector toward it, a^2/4 of [lobes, eq 3].
+        eye: the lens [m].
+        finishes: of `mirrors.finishes`.
+        faintest: radiance below which none counts.
+    """
+    xpos, xmat = poses
+    out, count = np.empty(len(facets.geom) + 1, dtype=np.int64), 0
+    for g, start, stop in facets.runs:
+        s = _into(xmat[g], sun[0])
+        e = _into(xmat[g], (eye[0] - xpos[g, 0], eye[1] - xpos[g, 1], eye[2] - xpos[g, 2]))
+        facing, first = _facing(facets.planes, start, stop, s, e, out[count:]), count
+        for i in out[first : first + facing]:
+            frame, half, finish = facets.frame[i], facets.half[i], finishes[facets.material[i]]
+            v, d = _unit((e[0] - frame[0, 0], e[1] - frame[0, 1], e[2] - frame[0, 2]))
+            h, twice = _unit((v[0] + s[0], v[1] + s[1], v[2] + s[2]))
+            hn = frame[1, 0] * h[0] + frame[1, 1] * h[1] + frame[1, 2] * h[2]
+            vn = frame[1, 0] * v[0] + frame[1, 1] * v[1] + frame[1, 2] * v[2]
+            if hn < _STEEPEST:
+                continue
+            bend = facets.bend[i] + 2.0 * (half[0] + half[1]) / max(d * twice, 1e-9)
+            disc, rough = math.sqrt(sun[1]) / max(twice, 1e-9), finish[3]
+            lacking = max(math.sqrt(max(1.0 / hn**2 - 1.0, 0.0)) - bend, 0.0)
+            most = _GAIN * _reflectance(0.5 * twice, finish) / (8.0 * hn**4 * max(vn - bend, _LEAST_COS) * rough**2)
+            dimmed = most * math.exp(-0.5 * lacking**2 / (rough**2 + disc**2))
+            if lacking <= _MOST_SIGMAS * (rough + disc) and dimmed >= faintest:
+                out[count] = i
+                count += 1
+    return out[:count]
+
+
+@njit(cache=True)
+def _facing(planes: Array, start: int, stop: int, s: Vector, e: Vector, out: NDArray[np.int64]) -> int:
+    """List which facets of a run face both a direction s and a point e; return how many."""
+    count = 0
+    for i in range(start, stop):
+        x, y, z = planes[0, i], planes[1, i], planes[2, i]
+        out[count] = i
+        toward, ahead = x * s[0] + y * s[1] + z * s[2], x * e[0] + y * e[1] + z * e[2]
+        count += (toward > 0.0) & (ahead > planes[3, i])
+    return count
+
+
+@njit(cache=True)
+def _into(M: Array, a: Vector) -> Vector:
+    """M' a, with M (9,) by rows."""
+    return (
+        M[0] * a[0] + M[3] * a[1] + M[6] * a[2],
+        M[1] * a[0] + M[4] * a[1] + M[7] * a[2],
+        M[2] * a[0] + M[5] * a[1] + M[8] * a[2],
+    )
+
+
+@njit(cache=True)
+def _unit(a: Vector) -> tuple[Vector, float]:
+    length = math.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
+    k = 1.0 / max(length, 1e-300)
+    return (k * a[0], k * a[1], k * a[2]), length
+
+
+@njit(cache=True)
+def _reflectance(cos_i: float, finish: Array) -> float:
+    """As of `lobes`."""
+    index, metal, share = finish[0], finish[1], finish[2]
+    if index == 0.0:
+        return share * (metal + (1.0 - metal) * (1.0 - cos_i) ** 5)
+    cos_r = math.sqrt(1.0 - (1.0 - cos_i * cos_i) / (index * index))
+    across = (cos_i - index * cos_r) / (cos_i + index * cos_r)
+    along = (cos_r - index * cos_i) / (cos_r + index * cos_i)
+    return 0.5 * share * (across * across + along * along)

@@ -1,0 +1,72 @@
+"""What is spared mirrors nothing: facets and tubes that are left out against all of them."""
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dockair.rotations import exp
+from dockair.sim.camera.facets import facets_that_may_shine
+from dockair.sim.camera.lobes import ROW, facet_rows
+from dockair.sim.camera.mirrors import Mirrors, finishes, vector
+from dockair.sim.camera.round_mirrors import _is_steep
+from dockair.sim.camera.sheets import CameraSheets
+
+SHEETS = CameraSheets.load()
+SURFACES = SHEETS.surfaces
+VARIANCE = 0.25 * SHEETS.light.sun_angular_radius_rad**2
+
+
+def _rows(mirrors: Mirrors, which: np.ndarray, data: Any, sun: np.ndarray, eye: np.ndarray) -> np.ndarray:
+    limits = (
+        math.cos(SURFACES.grazing_rad),
+        SURFACES.faintest_glint_m2_sr,
+        SURFACES.faintest_radiance,
+        SURFACES.patch_step_rad,
+    )
+    rows, light = np.empty((4000, ROW)), (vector(sun), 0.0, VARIANCE)
+    poses = data.geom_xpos, data.geom_xmat
+    return rows[: facet_rows(mirrors.facets, which, poses, light, vector(eye), finishes(SURFACES), limits, rows, 0)]
+
+
+def test_facets_that_are_spared_send_nothing_to_the_lens(make_world: Callable[..., Any]) -> None:
+    """Four hundred Suns and eyes around tanker and drogue: the same rows as from all facets that are not averted."""
+    world, rng = make_world(), np.random.default_rng(1)
+    mirrors, data = Mirrors.of(world.model), world.data
+    facets, poses, found, spared = mirrors.facets, (data.geom_xpos, data.geom_xmat), 0, 0
+    turns = data.geom_xmat.reshape(-1, 3, 3)[facets.geom]
+    n = np.einsum("nij,nj->ni", turns, facets.frame[:, 1])
+    p = data.geom_xpos[facets.geom] + np.einsum("nij,nj->ni", turns, facets.frame[:, 0])
+    for _ in range(400):
+        sun = exp(rng.normal(0.0, 1.0, 3))[:, 0]
+        eye = data.body("drogue").xpos + rng.normal(0.0, 6.0, 3)
+        toward = np.flatnonzero((n @ sun > 0.0) & (((eye - p) * n).sum(axis=1) > 0.0))
+        light, limit = (vector(sun), VARIANCE), SURFACES.faintest_radiance
+        which = facets_that_may_shine(facets, poses, light, vector(eye), finishes(SURFACES), limit)
+        assert np.isin(which, toward).all() and np.all(np.diff(which) > 0)
+        every = _rows(mirrors, toward, data, sun, eye)
+        assert np.array_equal(_rows(mirrors, which, data, sun, eye), every)
+        found, spared = found + len(every), spared + len(toward) - len(which)
+    assert found > 500 and spared > 10000
+
+
+@pytest.mark.parametrize("point", [0.0, 1.0])
+def test_around_a_tube_that_is_spared_no_normal_is_within_60_degrees_of_the_half_vector(point: float) -> None:
+    """A thousand tubes; 400 points on each that is spared. h.n < 1/2 is where `lobes` ends."""
+    rng, spared = np.random.default_rng(3), 0
+    for _ in range(1000):
+        axis, half, radius = exp(rng.normal(0.0, 1.0, 3))[:, 2], rng.uniform(0.01, 0.3), rng.uniform(0.005, 0.05)
+        eye = rng.normal(0.0, 6.0, 3)
+        light = rng.normal(0.0, 3.0, 3) if point else exp(rng.normal(0.0, 1.0, 3))[:, 0]
+        if not _is_steep(vector(light), point, vector(eye), vector(axis), half + radius):
+            continue
+        spared += 1
+        across = np.cross(axis, rng.normal(0.0, 1.0, (400, 3)))
+        n = across / np.linalg.norm(across, axis=1, keepdims=True)
+        p = radius * n + rng.uniform(-half, half, (400, 1)) * axis
+        s, v = light - point * p, eye - p
+        h = s / np.linalg.norm(s, axis=1, keepdims=True) + v / np.linalg.norm(v, axis=1, keepdims=True)
+        assert ((h * n).sum(axis=1) < 0.5 * np.linalg.norm(h, axis=1)).all()
+    assert spared > 30
