@@ -62,7 +62,7 @@ class IdentifySettings:
     max_false_rings_with_prior: float = 1e-2  # one that is also where, and as large as, the ring should be
     max_false_rings_predicted: float = 5e-2  # one that moreover is turned as it should be: few hypotheses are left
     max_impostors: float = 8e-4  # expected among the members of a ring, see `chance` Eq. (2)
-    max_impostors_with_prior: float = 1.5e-3
+    max_impostors_with_prior: float = 2e-3
     brightness: BrightnessSettings = field(default_factory=BrightnessSettings)
     code: CodeSettings = field(default_factory=CodeSettings)
 
