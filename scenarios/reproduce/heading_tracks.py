@@ -1,0 +1,36 @@
+"""Yaw rates of the walks of [Kyung et al. 2015]: 100 m straight in 85 s, and two laps of a 400 m oval in 280 s.
+
+The source does not print the oval's shape; here it is a running track's: two straights of 84.39 m, two half circles of
+36.5 m radius. A drift of 16 degrees in 85 s is taken for a constant bias.
+"""
+
+import numpy as np
+
+from dockair.rotations import Array
+
+RATE_HZ = 100.0
+STRAIGHT_S, STRAIGHT_DRIFT_DEG = 85.0, 16.0
+OVAL_S, LAPS = 280.0, 2
+_SIDE_M, _RADIUS_M = 84.39, 36.5
+BIAS_RAD_S = float(np.radians(STRAIGHT_DRIFT_DEG) / STRAIGHT_S)
+
+
+def straight_rates_rad_s(seed: int, *, noise_deg_s: float, bias_rad_s: float = BIAS_RAD_S) -> Array:
+    """(8500,) what the gyro says on the straight."""
+    noise = np.radians(noise_deg_s) * np.random.default_rng(seed).standard_normal(round(STRAIGHT_S * RATE_HZ))
+    return np.asarray(bias_rad_s + noise)
+
+
+def oval_true_rates_rad_s() -> Array:
+    """(28000,) true yaw rate on two laps to the left, 720 degrees in all."""
+    speed = LAPS * 2.0 * (_SIDE_M + np.pi * _RADIUS_M) / OVAL_S
+    travelled = speed * (np.arange(round(OVAL_S * RATE_HZ)) + 0.5) / RATE_HZ
+    turning = travelled % (_SIDE_M + np.pi * _RADIUS_M) > _SIDE_M
+    return np.where(turning, 2.0 * np.pi * LAPS / (turning.sum() / RATE_HZ), 0.0)
+
+
+def oval_rates_rad_s(seed: int, *, noise_deg_s: float, bias_rad_s: float = BIAS_RAD_S) -> tuple[Array, Array]:
+    """(28000,) what the gyro says on two laps, and the true rate."""
+    true = oval_true_rates_rad_s()
+    noise = np.radians(noise_deg_s) * np.random.default_rng(seed).standard_normal(true.size)
+    return true + bias_rad_s + noise, true
