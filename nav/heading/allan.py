@@ -7,12 +7,12 @@ With the angle x_k = T (y_1 + ... + y_k) of rates y and t = m T, over all overla
     G(r)   = (2/r) (1 - (3 - 4 exp(-r) + exp(-2 r)) / (2 r))                               (3)
 
 Q quantisation [rad], N angle random walk [rad/s/rt(Hz)], B bias instability [rad/s]: the floor of a first-order
-Gauss-Markov bias, which lies at 1.893 T_B; K rate random walk [rad/s/rt(s)]. (2) is linear in the squares, which are fitted by
-non-negative least squares; each t counts by its number of independent intervals, and T_B, where not given, is the one
-that fits best.
+Gauss-Markov bias, which lies at 1.893 T_B; K rate random walk [rad/s/rt(s)]. (2) is linear in the squares, which are
+fitted by non-negative least squares; each t counts by its number of independent intervals, and T_B, where not given,
+is the one that fits best.
 
-Valid for a record that stands still, of at least some ten T_B: below T_B the terms of B and K have the same slope, and a
-record that short cannot tell them apart. Several units' records, side by side, are averaged.
+Valid for a record that stands still, of at least some ten T_B: below T_B the terms of B and K have the same slope, and
+a record that short cannot tell them apart. Several units' records, side by side, are averaged.
 Sources: IEEE Std 952-1997, annex C; Riley, Handbook of Frequency Stability Analysis, NIST SP 1065 (1).
 """
 
