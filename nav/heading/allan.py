@@ -126,8 +126,8 @@ def _counts(taus_s: ArrayLike | None, samples: int, rate_hz: float) -> Array:
         return np.unique(np.round(np.geomspace(1, most, int(_PER_DECADE * np.log10(most)) + 1)).astype(int))
     counts = np.unique(np.round(np.atleast_1d(np.asarray(taus_s, dtype=float)) * rate_hz).astype(int))
     if counts.size == 0 or counts[0] < 1 or 2 * counts[-1] > samples:
-        least, most = 1.0 / rate_hz, samples // 2 / rate_hz
-        raise DockairError("taus_s", expected=f"times from {least:g} to {most:g} s", got=list(np.atleast_1d(taus_s)))
+        expected = f"times from {1.0 / rate_hz:g} to {samples // 2 / rate_hz:g} s"
+        raise DockairError("taus_s", expected=expected, got=list(np.atleast_1d(taus_s)))
     return counts
 
 

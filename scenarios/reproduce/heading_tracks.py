@@ -34,3 +34,21 @@ def oval_rates_rad_s(seed: int, *, noise_deg_s: float, bias_rad_s: float = BIAS_
     true = oval_true_rates_rad_s()
     noise = np.radians(noise_deg_s) * np.random.default_rng(seed).standard_normal(true.size)
     return true + bias_rad_s + noise, true
+
+
+def lap_places(points: int) -> Array:
+    """(points + 1, 3) place x, y [m] and heading [rad] of a lap to the left, evenly spaced, back at its start."""
+    lap = 2.0 * (_SIDE_M + np.pi * _RADIUS_M)
+    return np.array([_place(float(d)) for d in np.linspace(0.0, lap, points + 1)])
+
+
+def _place(travelled_m: float) -> tuple[float, float, float]:
+    half = _SIDE_M + np.pi * _RADIUS_M
+    halves = min(int(travelled_m / half), 1)
+    rest = travelled_m - halves * half
+    angle = max(rest - _SIDE_M, 0.0) / _RADIUS_M
+    x = min(rest, _SIDE_M) + _RADIUS_M * np.sin(angle)
+    y = _RADIUS_M * (1.0 - np.cos(angle))
+    if halves:  # the other half is the first one turned about the oval's middle
+        x, y = _SIDE_M - x, 2.0 * _RADIUS_M - y
+    return float(x), float(y), float(angle + np.pi * halves)
