@@ -48,6 +48,9 @@ __all__ = ["HeadingLine", "Turn", "TurnStatus", "VisualHeading", "VisualSettings
 _MAD = 1.4826  # standard deviation of a normal law over its median absolute deviation
 _SIGMAS = 3.0
 _ROUNDS = 5
+_SAMPLED_PX = 4  # every so many pixels say how bright a picture is
+_DARK_AND_BRIGHT_PERCENT = (1.0, 99.0)
+_LEAST_CONTRAST = 16  # grey levels that are spread over all; less is noise
 _SPREAD_PX = 1000.0  # unit of places in Eq. (13), for the arithmetic's sake
 
 
@@ -244,8 +247,7 @@ def _features(
         raise DockairError("image", expected="(h, w) of uint8 or uint16", got=f"{grey.dtype} {grey.shape}")
     if mask is not None and (mask.shape != grey.shape or mask.dtype != bool):
         raise DockairError("mask", expected=f"{grey.shape} of bool", got=f"{mask.dtype} {mask.shape}")
-    if grey.dtype == np.uint16:
-        grey = (grey >> max(int(grey.max()).bit_length() - 8, 0)).astype(np.uint8)
+    grey = _stretched(grey, mask)
     s = settings.scale
     small = cv2.resize(np.ascontiguousarray(grey), None, fx=s, fy=s, interpolation=cv2.INTER_AREA)
     allowed = None
@@ -257,6 +259,16 @@ def _features(
         return _Features(np.empty((0, 2)), np.empty((0, 128), np.float32), R_HC, middle)
     pixels = (np.array([point.pt for point in points]) + 0.5) / s - 0.5
     return _Features(pixels, np.asarray(descriptors, np.float32), R_HC, middle)
+
+
+def _stretched(grey: NDArray[Any], mask: NDArray[np.bool_] | None) -> NDArray[np.uint8]:
+    """Grey levels from the darkest to the brightest hundredth spread over eight bits, unless they are all alike."""
+    every = slice(None, None, _SAMPLED_PX)
+    sampled = grey[every, every] if mask is None else grey[every, every][mask[every, every]]
+    low, high = np.percentile(sampled, _DARK_AND_BRIGHT_PERCENT) if sampled.size else (0.0, 0.0)
+    gain = 255.0 / max(high - low, _LEAST_CONTRAST)
+    table = np.clip(gain * (np.arange(np.iinfo(grey.dtype).max + 1) - low), 0.0, 255.0).astype(np.uint8)
+    return np.asarray(table[grey])
 
 
 @cache

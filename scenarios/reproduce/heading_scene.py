@@ -73,9 +73,10 @@ class Landscape:
         texture_corners = np.array([[0.0, n], [n, n], [n, 0.0], [0.0, 0.0]], np.float32)
         H = cv2.getPerspectiveTransform(texture_corners, (pixels - [u1, v1]).astype(np.float32))
         size = (u2 - u1 + 1, v2 - v1 + 1)
-        drawn = cv2.warpPerspective(panel.texture, H, size, flags=cv2.INTER_AREA)
-        inside = cv2.warpPerspective(np.full_like(panel.texture, 255), H, size, flags=cv2.INTER_NEAREST) > 0
-        picture[v1 : v2 + 1, u1 : u2 + 1][inside] = drawn[inside]
+        drawn = cv2.warpPerspective(panel.texture, H, size, flags=cv2.INTER_LINEAR)
+        inside = np.zeros(drawn.shape, np.uint8)
+        cv2.fillConvexPoly(inside, np.round(pixels - [u1, v1]).astype(np.int32), 1)
+        cv2.copyTo(drawn, inside, picture[v1 : v2 + 1, u1 : u2 + 1])
 
 
 def random_landscape(

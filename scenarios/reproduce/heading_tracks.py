@@ -6,6 +6,7 @@ The source does not print the oval's shape; here it is a running track's: two st
 
 import numpy as np
 
+from dockair.nav.heading.hdr import HeuristicDriftReduction
 from dockair.rotations import Array
 
 RATE_HZ = 100.0
@@ -52,3 +53,8 @@ def _place(travelled_m: float) -> tuple[float, float, float]:
     if halves:  # the other half is the first one turned about the oval's middle
         x, y = _SIDE_M - x, 2.0 * _RADIUS_M - y
     return float(x), float(y), float(angle + np.pi * halves)
+
+
+def hdr_heading_rad(rates_rad_s: Array) -> Array:
+    """(n,) heading of heuristic drift reduction alone."""
+    return np.asarray(np.cumsum(HeuristicDriftReduction(RATE_HZ).run(rates_rad_s)) / RATE_HZ)

@@ -68,10 +68,10 @@ class SeenLap:
 
 
 @cache
-def seen_lap(points: int = POINTS, *, mirrored: bool = False) -> SeenLap:
-    """Walk one lap to the left, or mirrored to the right, with a picture at each point."""
+def seen_lap(points: int = POINTS, *, mirrored: bool = False, walked: int = POINTS) -> SeenLap:
+    """Walk one lap to the left, or mirrored to the right, or the first points of one, with a picture at each point."""
     scene, visual, refused = lap_landscape(), VisualHeading(calibration().line), 0
-    places, seen = lap_places(points), []
+    places, seen = lap_places(points)[: walked + 1], []
     for x, y, heading in places:
         picture = scene.image(float(x), float(y), float(heading))
         turn = visual.step(np.ascontiguousarray(picture[:, ::-1]) if mirrored else picture)
