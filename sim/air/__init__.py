@@ -1,1 +1,1 @@
-"""The air: density, turbulence."""
+"""The air: density, gusts, the tanker's wake, the receiver's bow wave."""

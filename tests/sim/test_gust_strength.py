@@ -1,0 +1,21 @@
+"""Strength of the gusts: the specification's figure in its own feet, and the rolling gust's short form."""
+
+import pytest
+
+from dockair.sim.air.turbulence import gust_sigma, rolling_sigma
+
+L, SPAN = 533.4, 9.144
+
+
+def test_rolling_gust_of_a_span_and_a_scale_has_the_short_form_of_its_strength() -> None:
+    """0.954 sigma / (L b^2)^(1/3): twice the span is 2^(-2/3) of it, eight times the scale a half."""
+    assert rolling_sigma(2.0, L, SPAN) == pytest.approx(2.0 * 0.95426 / (L * SPAN**2) ** (1.0 / 3.0), rel=1e-4)
+    assert rolling_sigma(1.0, L, 2.0 * SPAN) == pytest.approx(2.0 ** (-2.0 / 3.0) * rolling_sigma(1.0, L, SPAN))
+    assert rolling_sigma(1.0, 8.0 * L, SPAN) == pytest.approx(0.5 * rolling_sigma(1.0, L, SPAN))
+
+
+def test_strengths_at_20000_feet_are_those_of_the_specification() -> None:
+    """Half way between the 15000 and the 25000 ft columns: (4.6 + 2.7) / 2 ft/s = 1.11 m/s, and so on."""
+    ours = [gust_sigma(intensity, 6096.0) for intensity in ("light", "moderate", "severe")]
+    assert ours == pytest.approx([1.11, 2.23, 6.42], abs=0.005)
+    assert gust_sigma("light", 7500.0 * 0.3048) == pytest.approx(6.7 * 0.3048, rel=1e-12)
