@@ -13,6 +13,7 @@
 | gyro_bias_step  | rate_deg_s                                  | the gyros' biases jump by this much                |
 | gyro_saturation | limit_deg_s                                 | the gyros' range shrinks to this                   |
 | gyro_drop_out   |                                             | no IMU sample arrives                              |
+| dead_reel       |                                             | the reel's drum is locked                          |
 
 Without `leds` all LEDs are meant; without `stop_s` a fault lasts to the end.
 """
@@ -27,6 +28,7 @@ from dockair.errors import DockairError
 from dockair.scenarios.refusal import Expected
 from dockair.sim.faults import (
     CameraDropOut,
+    DeadReel,
     DirtyWindow,
     ExposureStuck,
     Fault,
@@ -52,6 +54,7 @@ FaultKind = Literal[
     "gyro_bias_step",
     "gyro_saturation",
     "gyro_drop_out",
+    "dead_reel",
 ]
 _CLASSES: dict[str, type[Fault]] = {
     "led_off": LedOff,
@@ -65,6 +68,7 @@ _CLASSES: dict[str, type[Fault]] = {
     "gyro_bias_step": GyroBiasStep,
     "gyro_saturation": GyroSaturation,
     "gyro_drop_out": GyroDropOut,
+    "dead_reel": DeadReel,
 }
 _COMMON = ("start_s", "stop_s")
 #: A field of a fault whose key here has another unit: field -> key, factor from key to field.

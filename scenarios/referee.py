@@ -2,7 +2,8 @@
 
 contact: the coupling held the probe. miss: the tip passed the ring's plane, was not held and touched nothing.
 rim_strike: the probe touched the drogue and was not held. abort: the navigation broke away before the ring's plane.
-collision: anything of the receiver but its probe touched something. timeout: none of these.
+collision: anything of the receiver but its probe touched something. timeout: none of these. diverged: the simulation
+broke down; the loop says so, not the referee.
 
 Radial offset and closure speed are taken where the tip crosses the ring's plane from behind (the last crossing before
 the coupling holds); the angle between probe and drogue axis when it holds.
@@ -27,6 +28,7 @@ class Outcome(Enum):
     ABORT = "abort"
     COLLISION = "collision"
     TIMEOUT = "timeout"
+    DIVERGED = "diverged"  #: the simulation, not the flight: its parameters are beyond what the physics can bear
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

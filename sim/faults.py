@@ -1,4 +1,4 @@
-"""Faults of LEDs, camera and IMU: what breaks, when, and how badly.
+"""Faults of LEDs, camera, IMU and reel: what breaks, when, and how badly.
 
 A fault acts in start_s <= t < stop_s. Those that overlap compose: LEDs' factors multiply, hot pixels and gyro biases
 add, dirt leaves the product of what each layer leaves, of ranges the smallest holds, and of stuck exposures the one
@@ -117,6 +117,11 @@ class GyroDropOut(Fault):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class DeadReel(Fault):
+    """The reel's drum is locked: it neither takes hose up nor pays it out."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class CameraFault:
     """What is wrong with the camera at one time; as it is by default, nothing."""
 
@@ -204,6 +209,10 @@ class Faults:
             range_rad_s=min(limits, default=None),
             dropped=bool(self._acting(GyroDropOut, time_s)),
         )
+
+    def reel_locked(self, time_s: float) -> bool:
+        """Whether the reel is dead at a time."""
+        return bool(self._acting(DeadReel, time_s))
 
     def _acting(self, kind: type[T], time_s: float) -> list[T]:
         return [f for f in self._faults if isinstance(f, kind) and f.start_s <= time_s < f.stop_s]

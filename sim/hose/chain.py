@@ -51,6 +51,8 @@ class DrogueParameters:
     mass_kg: float
     drag_diameter_m: float
     drag_coefficient: float
+    canopy_area_ratio: float
+    canopy_side_coefficient: float
     drag_centre_x_m: float
     rate_damping_coefficient: float
     centre_of_mass_x_m: float
@@ -78,6 +80,11 @@ class DrogueParameters:
         """Reference area S of the drag coefficient [m^2]."""
         return 0.25 * np.pi * self.drag_diameter_m**2
 
+    @property
+    def canopy_area_m2(self) -> float:
+        """Fabric of the canopy [m^2], reference area of the side force."""
+        return self.canopy_area_ratio * self.drag_area_m2
+
 
 @njit(cache=True)
 def velocities_at(places: Array, spatial: Array, reference: Array) -> Array:
@@ -90,8 +97,10 @@ def velocities_at(places: Array, spatial: Array, reference: Array) -> Array:
     """
     v = np.empty((places.shape[0], 3))
     for i in range(places.shape[0]):
-        r = places[i] - reference
-        v[i] = spatial[i, 3:] + np.cross(spatial[i, :3], r)
+        x, y, z = places[i, 0] - reference[0], places[i, 1] - reference[1], places[i, 2] - reference[2]
+        v[i, 0] = spatial[i, 3] + spatial[i, 1] * z - spatial[i, 2] * y
+        v[i, 1] = spatial[i, 4] + spatial[i, 2] * x - spatial[i, 0] * z
+        v[i, 2] = spatial[i, 5] + spatial[i, 0] * y - spatial[i, 1] * x
     return v
 
 

@@ -11,14 +11,17 @@ number is that of the *normal* velocity: with the total speed, 120 m/s sits on t
 Each link is integrated by two-point Gauss quadrature over the part of it that is outside the pod, so that its own
 rotation is damped and a link half drawn in has the right moment. The air's velocity is taken at the link's middle.
 
-Drogue: drag along the relative air at the canopy's centre, behind the hose's end, which makes it point into the wind,
-and a moment against its rate of turn:
+Drogue: the force at the canopy's centre, behind the hose's end, has its own coefficients along and across the axis
+(u_a, u_c: the relative air along and across; S_c: fabric of the canopy), and a moment acts against its rate of turn:
 
-    D = 1/2 rho S C_D |u| u        M = - 1/2 rho |u| S d^2 C_q w                                         (4)
+    F = 1/2 rho |u| (S C_D u_a + S_c C_S u_c)        M = - 1/2 rho |u| S d^2 C_q w                         (4)
 
-Not modelled: added mass, vortex shedding, lift of the canopy, C_n below Re 180 (forces under 1 mN/m).
+At incidence a the drag coefficient on S is C_D cos^2 a + C_S S_c/S sin^2 a and the lift's (C_S S_c/S - C_D) sin a
+cos a: smooth for every a, also with the air from behind.
+
+Not modelled: added mass, vortex shedding, flapping or folding of the canopy, C_n below Re 180 (forces under 1 mN/m).
 Frame: W throughout. Sources: Hoerner, Fluid-Dynamic Drag, ch. III (cross-flow principle); coefficients as in
-RflySim/RflySimAAR `hose3D_n_air_Fv_correction.m`.
+RflySim/RflySimAAR `hose3D_n_air_Fv_correction.m`; the canopy's in assets/parameters/drogue.toml.
 """
 
 import numpy as np
@@ -29,8 +32,8 @@ from dockair.sim.hose.chain import DrogueParameters, HoseParameters
 
 # Layout of the coefficient vector the kernels take: numba caches no dataclasses.
 _RHO, _NU, _DIAMETER, _CN_LOW, _CN_HIGH, _LOG_RE_LOW, _LOG_RE_HIGH, _CF = range(8)
-_LINK_LENGTH, _DROGUE_SCD, _DROGUE_ARM, _DROGUE_SDDCQ = range(8, 12)
-_SIZE = 12
+_LINK_LENGTH, _DROGUE_AXIAL, _DROGUE_SIDE, _DROGUE_ARM, _DROGUE_SDDCQ = range(8, 13)
+_SIZE = 13
 
 _FRICTION_EXPONENT = -1.0 / 6.0  # Eq. (3), turbulent boundary layer
 _GAUSS = 0.5 / 3.0**0.5  # two-point abscissa on [-1/2, 1/2]
@@ -39,14 +42,15 @@ _GAUSS = 0.5 / 3.0**0.5  # two-point abscissa on [-1/2, 1/2]
 def load_coefficients(
     hose: HoseParameters, drogue: DrogueParameters, density_kg_m3: float, viscosity_m2_s: float
 ) -> Array:
-    """(12,) vector of what the kernels of this module need, SI."""
+    """(13,) vector of what the kernels of this module need, SI."""
     k = np.zeros(_SIZE)
     k[_RHO], k[_NU], k[_DIAMETER] = density_kg_m3, viscosity_m2_s, 2.0 * hose.radius_m
     k[_CN_LOW], k[_CN_HIGH] = hose.normal_drag_coefficient, hose.supercritical_drag_coefficient
     k[_LOG_RE_LOW] = np.log(hose.crisis_reynolds / hose.crisis_width_ratio)
     k[_LOG_RE_HIGH] = np.log(hose.crisis_reynolds * hose.crisis_width_ratio)
     k[_CF], k[_LINK_LENGTH] = hose.friction_coefficient, hose.link_length_m
-    k[_DROGUE_SCD] = drogue.drag_area_m2 * drogue.drag_coefficient
+    k[_DROGUE_AXIAL] = drogue.drag_area_m2 * drogue.drag_coefficient
+    k[_DROGUE_SIDE] = drogue.canopy_area_m2 * drogue.canopy_side_coefficient
     k[_DROGUE_ARM] = drogue.centre_of_mass_x_m - drogue.drag_centre_x_m
     k[_DROGUE_SDDCQ] = drogue.drag_area_m2 * drogue.drag_diameter_m**2 * drogue.rate_damping_coefficient
     k.setflags(write=False)
@@ -54,15 +58,14 @@ def load_coefficients(
 
 
 @njit(cache=True)
-def hose_load_per_length(t: Array, u: Array, k: Array) -> Array:
-    """(3,) load [N/m] on hose along the unit vector t (3,) in relative air u (3,) [m/s], Eqs. (1)-(3)."""
-    along = u[0] * t[0] + u[1] * t[1] + u[2] * t[2]
-    n0, n1, n2 = u[0] - along * t[0], u[1] - along * t[1], u[2] - along * t[2]
+def _hose_load(t0, t1, t2, u0, u1, u2, k):  # type: ignore[no-untyped-def]
+    """Eqs. (1)-(3), by components."""
+    along = u0 * t0 + u1 * t1 + u2 * t2
+    n0, n1, n2 = u0 - along * t0, u1 - along * t1, u2 - along * t2
     across = np.sqrt(n0 * n0 + n1 * n1 + n2 * n2)
-    speed = np.sqrt(along * along + across * across)
-    f = np.zeros(3)
-    if speed == 0.0:
-        return f
+    speed2 = along * along + across * across
+    if speed2 == 0.0:
+        return 0.0, 0.0, 0.0
     normal = 0.0
     if across > 0.0:
         s = (np.log(across * k[_DIAMETER] / k[_NU]) - k[_LOG_RE_LOW]) / (k[_LOG_RE_HIGH] - k[_LOG_RE_LOW])
@@ -70,18 +73,32 @@ def hose_load_per_length(t: Array, u: Array, k: Array) -> Array:
         c_n = k[_CN_LOW] + (k[_CN_HIGH] - k[_CN_LOW]) * s * s * (3.0 - 2.0 * s)
         normal = 0.5 * k[_RHO] * c_n * k[_DIAMETER] * across
     # Eq. (3) with 1 / Re_f of Eq. (2), which is 0 and not infinite for a hose exactly along the stream
-    c_f = k[_CF] * (2.0 * k[_NU] * across / (np.pi * k[_DIAMETER] * speed * speed)) ** (-_FRICTION_EXPONENT)
+    c_f = k[_CF] * (2.0 * k[_NU] * across / (np.pi * k[_DIAMETER] * speed2)) ** (-_FRICTION_EXPONENT)
     tangential = 0.5 * k[_RHO] * c_f * np.pi * k[_DIAMETER] * abs(along) * along
-    f[0] = normal * n0 + tangential * t[0]
-    f[1] = normal * n1 + tangential * t[1]
-    f[2] = normal * n2 + tangential * t[2]
-    return f
+    return normal * n0 + tangential * t0, normal * n1 + tangential * t1, normal * n2 + tangential * t2
 
 
 @njit(cache=True)
-def drogue_drag(u: Array, k: Array) -> Array:
-    """(3,) drag [N] of the drogue in relative air u (3,) [m/s] at its canopy, Eq. (4)."""
-    return 0.5 * k[_RHO] * k[_DROGUE_SCD] * np.sqrt(u[0] * u[0] + u[1] * u[1] + u[2] * u[2]) * u
+def hose_load_per_length(t: Array, u: Array, k: Array) -> Array:
+    """(3,) load [N/m] on hose along the unit vector t (3,) in relative air u (3,) [m/s], Eqs. (1)-(3)."""
+    f0, f1, f2 = _hose_load(t[0], t[1], t[2], u[0], u[1], u[2], k)
+    return np.array([f0, f1, f2])
+
+
+@njit(cache=True)
+def _drogue_force(t0, t1, t2, u0, u1, u2, k):  # type: ignore[no-untyped-def]
+    """Eq. (4)'s force, by components."""
+    along = u0 * t0 + u1 * t1 + u2 * t2
+    pressure = 0.5 * k[_RHO] * np.sqrt(u0 * u0 + u1 * u1 + u2 * u2)
+    side, lengthwise = pressure * k[_DROGUE_SIDE], pressure * (k[_DROGUE_AXIAL] - k[_DROGUE_SIDE]) * along
+    return side * u0 + lengthwise * t0, side * u1 + lengthwise * t1, side * u2 + lengthwise * t2
+
+
+@njit(cache=True)
+def drogue_force(t: Array, u: Array, k: Array) -> Array:
+    """(3,) force [N] on a drogue whose axis is the unit vector t (3,), in relative air u (3,) [m/s], Eq. (4)."""
+    f0, f1, f2 = _drogue_force(t[0], t[1], t[2], u[0], u[1], u[2], k)
+    return np.array([f0, f1, f2])
 
 
 @njit(cache=True)
@@ -108,18 +125,30 @@ def tow_loads(position: Array, R: Array, v: Array, w: Array, air: Array, drawn_i
         outside = length - inside
         if outside <= 0.0:
             continue
-        t = np.ascontiguousarray(R[i, :, 0])
         for sign in (-1.0, 1.0):
             x = -0.5 * inside + sign * _GAUSS * outside  # from the link's middle, positive toward the tanker
-            arm = x * t
-            u = air[i] - v[i] - np.cross(w[i], arm)
-            force = 0.5 * outside * hose_load_per_length(t, u, k)
-            wrench[i, :3] += force
-            wrench[i, 3:] += np.cross(arm, force)
-    arm = -k[_DROGUE_ARM] * np.ascontiguousarray(R[n, :, 0])
-    u = air[n] - v[n] - np.cross(w[n], arm)
-    drag = drogue_drag(u, k)
-    wrench[n, :3] = drag
-    damping = 0.5 * k[_RHO] * k[_DROGUE_SDDCQ] * np.sqrt(u[0] * u[0] + u[1] * u[1] + u[2] * u[2])
-    wrench[n, 3:] = np.cross(arm, drag) - damping * w[n]
+            _add_at(wrench, i, x, 0.5 * outside, False, R, v, w, air, k)
+    _add_at(wrench, n, -k[_DROGUE_ARM], 1.0, True, R, v, w, air, k)
+    u0, u1, u2 = air[n, 0] - v[n, 0], air[n, 1] - v[n, 1], air[n, 2] - v[n, 2]
+    damping = 0.5 * k[_RHO] * k[_DROGUE_SDDCQ] * np.sqrt(u0 * u0 + u1 * u1 + u2 * u2)
+    for axis in range(3):
+        wrench[n, 3 + axis] -= damping * w[n, axis]
     return wrench
+
+
+@njit(cache=True)
+def _add_at(wrench, i, x, weight, is_drogue, R, v, w, air, k):  # type: ignore[no-untyped-def]
+    """Add the load on body i at a place x along its axis from its centre of mass, times a weight."""
+    t0, t1, t2 = R[i, 0, 0], R[i, 1, 0], R[i, 2, 0]
+    r0, r1, r2 = x * t0, x * t1, x * t2
+    u0 = air[i, 0] - v[i, 0] - (w[i, 1] * r2 - w[i, 2] * r1)
+    u1 = air[i, 1] - v[i, 1] - (w[i, 2] * r0 - w[i, 0] * r2)
+    u2 = air[i, 2] - v[i, 2] - (w[i, 0] * r1 - w[i, 1] * r0)
+    f0, f1, f2 = _drogue_force(t0, t1, t2, u0, u1, u2, k) if is_drogue else _hose_load(t0, t1, t2, u0, u1, u2, k)
+    f0, f1, f2 = weight * f0, weight * f1, weight * f2
+    wrench[i, 0] += f0
+    wrench[i, 1] += f1
+    wrench[i, 2] += f2
+    wrench[i, 3] += r1 * f2 - r2 * f1
+    wrench[i, 4] += r2 * f0 - r0 * f2
+    wrench[i, 5] += r0 * f1 - r1 * f0

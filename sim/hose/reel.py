@@ -9,24 +9,32 @@ limit; b rises from 0 to 1 beyond the pay-out limit: a brake. The last term is t
 that the hose rests on it at q = 0, its full trail. With T_s below the static tension the hose does rest there, and
 runs out again by itself after the receiver has left; with T_s equal to it, it would not.
 
+A dead reel is a drum that is locked: where it was, q_l, it holds the tension T_l it had, and gives way only as far as
+the hose stretches between drum and drogue,
+
+    F_hose    = T_l + k_l (q_l - q) - d_l v                                                              (3)
+
 Inside the pod the hose lies straight in a tube. A link that is half drawn in, a length s of its l, must turn the hose
 at the exit and not at its own front joint: with the outer hose at an angle theta to the pod's axis, its own angle has
 to be (1 - s/l) theta. Under a tension T a torsion spring against the axis does precisely that:
 
-    k_t(s) = T l (s/l) / (1 - s/l)                                                                       (3)
+    k_t(s) = T l (s/l) / (1 - s/l)                                                                       (4)
 
 capped where it is as stiff as the tube. So the drogue moves smoothly while joint after joint passes the exit.
 
-Not modelled: the drum's changing diameter, friction of the hose in the tube, slack on the drum. The reel acts along the
-pod's axis, so that it balances T cos(theta) of the hose's tension: 2 per cent at the usual 12 degrees.
-Sources: RflySim/RflySimAAR (gain); limits in assets/parameters/reel.toml; Eq. (3) derived from the link's balance.
+Not modelled: the drum's changing diameter, friction of the hose in the tube, slack on the drum; stretch of the hose
+but for Eq. (3); a brake that slips. The reel acts along the pod's axis, so that it balances T cos(theta) of the hose's
+tension: 2 per cent at the usual 12 degrees.
+Sources: RflySim/RflySimAAR (gain); limits in assets/parameters/reel.toml; Eq. (4) derived from the link's balance.
 """
 
 from dataclasses import dataclass
+from enum import Enum
 
 import numpy as np
 from numba import njit
 
+from dockair.errors import DockairError
 from dockair.rotations import Array
 from dockair.sim.air.atmosphere import STANDARD_GRAVITY_M_S2
 from dockair.sim.hose.chain import HoseParameters
@@ -39,6 +47,8 @@ class ReelParameters:
     set_point_fraction: float
     tension_gain: float
     response_time_s: float
+    refuelling_from_m: float
+    inner_limit_m: float
     range_m: float
     take_up_speed_m_s: float
     pay_out_speed_m_s: float
@@ -49,46 +59,95 @@ class ReelParameters:
     buffer_stiffness_n_m: float
     buffer_damping_n_s_m: float
     buffer_travel_m: float
+    lock_stiffness_n_m: float
+    lock_damping_n_s_m: float
     stop_time_constant_s: float
     guide_stiffness_n_m: float
     guide_damping_ratio: float
 
 
+class ReelLight(Enum):
+    """What the pod shows the receiver behind it."""
+
+    RED = "red"  #: dead hose
+    AMBER = "amber"  #: ready, or not wound in far enough for fuel
+    GREEN = "green"  #: within the refuelling range: fuel flows
+    FLASHING_AMBER = "flashing amber"  #: beyond the inner limit
+
+
+def reel_light(position_m: float, locked: bool, parameters: ReelParameters) -> ReelLight:
+    """Light for a length of hose wound in."""
+    if locked:
+        return ReelLight.RED
+    if position_m < parameters.refuelling_from_m:
+        return ReelLight.AMBER
+    return ReelLight.GREEN if position_m <= parameters.inner_limit_m else ReelLight.FLASHING_AMBER
+
+
 class Reel:
-    """Motor of the reel, Eqs. (1) and (2).
+    """Motor of the reel, Eqs. (1) to (3).
 
     Args:
         parameters: the reel's sheet.
         static_root_tension_n: tension at the exit at rest at full trail.
         step_s: physics step.
+
+    Raises:
+        DockairError: a refuelling range that does not lie within the reel's.
     """
 
     def __init__(self, parameters: ReelParameters, static_root_tension_n: float, step_s: float) -> None:
+        _check_limits(parameters)
         self._parameters = parameters
         self.set_point_n = parameters.set_point_fraction * static_root_tension_n
         self._blend = 1.0 - np.exp(-step_s / parameters.response_time_s)
         self.motor_force_n = self._wanted(static_root_tension_n)
         self._buffer_preload_n = static_root_tension_n - self.motor_force_n
+        self._held: tuple[float, float] | None = None  # position and tension at which the drum locked
 
-    def step(self, tension_n: float, position_m: float, rate_m_s: float) -> float:
+    def step(self, tension_n: float, position_m: float, rate_m_s: float, locked: bool = False) -> float:
         """Advance by one tick; return the force on the hose [N], positive winds in.
 
         Args:
             tension_n: at the exit.
             position_m: wound in, 0 at full trail.
             rate_m_s: of winding, positive in.
+            locked: the reel is dead. When it comes to life again its motor begins with the pull that the lock held.
         """
         p = self._parameters
+        buffer = self._buffer_preload_n - p.buffer_stiffness_n_m * position_m - p.buffer_damping_n_s_m * rate_m_s
+        buffer = max(buffer, 0.0)
+        if locked:
+            force = self._locked(tension_n, position_m, rate_m_s)
+            self.motor_force_n = max(force - buffer, 0.0)
+            return force
+        self._held = None
         self.motor_force_n += self._blend * (self._wanted(tension_n) - self.motor_force_n)  # Eq. (1)
         drive = min(max((p.take_up_speed_m_s - rate_m_s) / p.speed_band_m_s, 0.0), 1.0)
         brake = min(max((-rate_m_s - p.pay_out_speed_m_s) / p.speed_band_m_s, 0.0), 1.0)
-        buffer = self._buffer_preload_n - p.buffer_stiffness_n_m * position_m - p.buffer_damping_n_s_m * rate_m_s
         motor = self.motor_force_n * drive + p.brake_force_n * brake
-        return motor - p.drum_damping_n_s_m * rate_m_s + max(buffer, 0.0)  # Eq. (2)
+        return motor - p.drum_damping_n_s_m * rate_m_s + buffer  # Eq. (2)
+
+    def _locked(self, tension_n: float, position_m: float, rate_m_s: float) -> float:
+        p = self._parameters
+        if self._held is None:
+            self._held = position_m, tension_n
+        held_m, held_n = self._held
+        return held_n + p.lock_stiffness_n_m * (held_m - position_m) - p.lock_damping_n_s_m * rate_m_s  # Eq. (3)
 
     def _wanted(self, tension_n: float) -> float:
         """Motor's pull asked for; it cannot push the hose out."""
         return max(self.set_point_n + self._parameters.tension_gain * (self.set_point_n - tension_n), 0.0)
+
+
+def _check_limits(parameters: ReelParameters) -> None:
+    p = parameters
+    if not p.refuelling_from_m < p.inner_limit_m:
+        where, expected = "parameters.reel.inner_limit_m", f"more than refuelling_from_m = {p.refuelling_from_m}"
+        raise DockairError(where, expected=expected, got=p.inner_limit_m)
+    if not p.inner_limit_m <= p.range_m:
+        where, expected = "parameters.reel.range_m", f"at least inner_limit_m = {p.inner_limit_m}"
+        raise DockairError(where, expected=expected, got=p.range_m)
 
 
 def guide_coefficients(hose: HoseParameters, reel: ReelParameters, static_root_tension_n: float) -> Array:
@@ -104,7 +163,7 @@ def guide_coefficients(hose: HoseParameters, reel: ReelParameters, static_root_t
 
 @njit(cache=True)
 def guide_loads(position: Array, R: Array, v: Array, w: Array, drawn_in: float, k: Array) -> Array:
-    """What the tube in the pod does to the hose's links, Eq. (3).
+    """What the tube in the pod does to the hose's links, Eq. (4).
 
     Args:
         position: (n, 3) the links' middles in W [m].
@@ -129,7 +188,7 @@ def guide_loads(position: Array, R: Array, v: Array, w: Array, drawn_in: float, 
         t = R[i, :, 0]
         torsion = stiffest
         if tension_length * s < stiffest * (1.0 - s):
-            torsion = tension_length * s / (1.0 - s)  # Eq. (3)
+            torsion = tension_length * s / (1.0 - s)  # Eq. (4)
         turning = 2.0 * ratio * np.sqrt(torsion * inertia)
         # t x e_x turns the link onto the tube's axis; twist about x has no joint and no load
         wrench[i, 4] += torsion * t[2] - turning * w[i, 1]

@@ -7,9 +7,9 @@ its air load a(t), both acting at its middle:
 
 with t the unit vector along the link toward the tanker and F' the pull on the next link forward. Eq. (1) is solved
 link by link from the drogue up, by fixed-point iteration (its contraction is |a|/|F|, a few per cent). The drogue
-turns about the hose's end until drag, at its canopy, and weight, at its centre of mass, balance:
+turns about the hose's end until the air's force D, at its canopy, and its weight, at its centre of mass, balance:
 
-    t_D = - (x_m W + x_d D) / | ... |       (x_m, x_d: distances aft of the hose's end)                    (2)
+    t_D = - (x_m W + x_d D(t_D)) / | ... |  (x_m, x_d: distances aft of the hose's end)                    (2)
 
 Not modelled: bending stiffness (the tension straightens the hose within sqrt(EI/T) = 0.1 m of a joint).
 Frame: W, origin at the hose's exit from the pod, x forward, z up. Full trail is along -x.
@@ -22,7 +22,7 @@ import numpy as np
 from dockair.rotations import Array
 from dockair.sim.air.atmosphere import STANDARD_GRAVITY_M_S2
 from dockair.sim.hose.chain import DrogueParameters, HoseParameters
-from dockair.sim.hose.loads import drogue_drag, hose_load_per_length, load_coefficients
+from dockair.sim.hose.loads import drogue_force, hose_load_per_length, load_coefficients
 
 _FIXED_POINT_ITERATIONS = 60
 
@@ -52,12 +52,15 @@ def rest_shape(
     """
     gravity = np.array([0.0, 0.0, -STANDARD_GRAVITY_M_S2])
     coefficients = load_coefficients(hose, drogue, density_kg_m3, viscosity_m2_s)
-    drag, weight = drogue_drag(wind_W, coefficients), drogue.mass_kg * gravity
+    weight = drogue.mass_kg * gravity
     mass_arm = drogue.hose_joint_x_m - drogue.centre_of_mass_x_m
     drag_arm = drogue.hose_joint_x_m - drogue.drag_centre_x_m
-    t_D = _unit(-(mass_arm * weight + drag_arm * drag))  # Eq. (2)
+    t_D = _unit(-wind_W) if wind_W.any() else _unit(-gravity)
+    for _ in range(_FIXED_POINT_ITERATIONS):
+        force = drogue_force(t_D, wind_W, coefficients)
+        t_D = _unit(-(mass_arm * weight + drag_arm * force))  # Eq. (2)
 
-    pull = drag + weight
+    pull = drogue_force(t_D, wind_W, coefficients) + weight
     drogue_tension = float(np.linalg.norm(pull))
     directions = np.empty((hose.links, 3))
     for i in reversed(range(hose.links)):

@@ -4,6 +4,8 @@ Puts together the air loads (`loads`), the guide in the pod and the reel (`reel`
 that the world hands over arrays and gets forces back.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from dockair.rotations import Array
@@ -12,6 +14,16 @@ from dockair.sim.hose.chain import DrogueParameters, HoseParameters, velocities_
 from dockair.sim.hose.loads import load_coefficients, tow_loads
 from dockair.sim.hose.reel import Reel, ReelParameters, guide_coefficients, guide_loads
 from dockair.sim.hose.rest import rest_shape
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PodMotion:
+    """Where the pod's exit is and how it moves."""
+
+    R_WT: Array  #: (3, 3) axes of the tanker
+    p_WO: Array  #: (3,) the exit [m]
+    v_WO: Array  #: (3,) its velocity in W [m/s]
+    w_WT: Array  #: (3,) angular velocity of the tanker, in W [rad/s]
 
 
 class Tow:
@@ -48,7 +60,14 @@ class Tow:
         self._guide = guide_coefficients(hose, reel, self.rest.root_tension_n)
 
     def wrenches(
-        self, position: Array, R: Array, spatial: Array, reference: Array, gusts_W: Array, drawn_in_m: float
+        self,
+        position: Array,
+        R: Array,
+        spatial: Array,
+        reference: Array,
+        gusts_W: Array,
+        drawn_in_m: float,
+        pod: PodMotion | None = None,
     ) -> Array:
         """(links + 1, 6) force [N] and moment about the centre of mass [N m] in W, on the links and the drogue.
 
@@ -57,15 +76,32 @@ class Tow:
             R: (links + 1, 3, 3) axes in W.
             spatial: (links + 1, 6) angular velocity, and velocity of the body's material at `reference`, in W.
             reference: (3,) point of W.
-            gusts_W: (links + 1, 3) gust at each body [m/s].
+            gusts_W: (links + 1, 3) velocity of the air at each body beyond the undisturbed wind [m/s].
             drawn_in_m: length of hose inside the pod.
+            pod: where the pod is; None for an exit at rest in the origin of W, without turn.
         """
         v = velocities_at(position, spatial, reference)
         w = np.ascontiguousarray(spatial[:, :3])
         wrench = tow_loads(position, R, v, w, self._wind_W + gusts_W, drawn_in_m, self._loads)
         if drawn_in_m > 0.0:
-            wrench[:-1] += guide_loads(position[:-1], R[:-1], v[:-1], w[:-1], drawn_in_m, self._guide)
+            wrench[:-1] += self._guided(position[:-1], R[:-1], v[:-1], w[:-1], drawn_in_m, pod)
         return wrench
+
+    def _guided(self, position: Array, R: Array, v: Array, w: Array, drawn_in_m: float, pod: PodMotion | None) -> Array:
+        """(links, 6) what the tube in the pod does to the links, in W; the tube moves with the tanker."""
+        if pod is None:
+            return guide_loads(position, R, v, w, drawn_in_m, self._guide)
+        to_T = pod.R_WT  # row vectors of W times this are rows of T
+        from_exit = position - pod.p_WO
+        wrench_T = guide_loads(
+            from_exit @ to_T,
+            np.ascontiguousarray(to_T.T @ R),
+            (v - pod.v_WO - np.cross(pod.w_WT, from_exit)) @ to_T,
+            (w - pod.w_WT) @ to_T,
+            drawn_in_m,
+            self._guide,
+        )
+        return np.hstack([wrench_T[:, :3] @ to_T.T, wrench_T[:, 3:] @ to_T.T])
 
     def link_at_exit(self, drawn_in_m: float) -> int:
         """Number of the link that passes through the pod's exit."""

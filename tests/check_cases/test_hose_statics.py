@@ -211,7 +211,7 @@ def test_small_swing_of_the_hanging_hose_has_the_period_of_a_heavy_chain_with_a_
     for column, dof in enumerate(dofs):
         for sign in (1.0, -1.0):
             data.qpos[:] = rest
-            data.qpos[dof] += sign * step  # hinges come before the free joint: qpos and dof addresses agree
+            data.qpos[model.jnt_qposadr[model.dof_jntid[dof]]] += sign * step
             mujoco.mj_forward(model, data)
             stiffness[:, column] += sign * data.qfrc_bias[dofs] / (2 * step)
     frequencies = np.sqrt(np.sort(np.linalg.eigvals(np.linalg.solve(mass[np.ix_(dofs, dofs)], stiffness)).real))

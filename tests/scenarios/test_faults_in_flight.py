@@ -43,3 +43,19 @@ def test_messages_stop_stick_and_jump_as_the_scenario_says_and_time_goes_on():
     assert yaw_rate(0.94) < 0.05  # 3 deg/s
     assert yaw_rate(1.05) > 0.45  # 26 deg/s
     assert 0.17 < yaw_rate(1.20) < 0.18  # 10 deg/s and a quantum
+
+
+def test_reel_that_the_scenario_kills_holds_the_hose_from_then_on():
+    """In gusts a working reel's buffer gives by millimetres; struck by a lock it moves on the hose's stretch alone."""
+    settings = {"navigation.navigator": "truth", "faults": [{"kind": "dead_reel", "start_s": 0.2}]}
+    flight = Flight(load_scenario("default", settings), 1)
+    reel = flight.world._tow.reel
+    try:
+        locked = []
+        for _ in range(40):
+            tick = flight.step()
+            locked.append((tick.truth.time_s, reel._held is not None))
+    finally:
+        flight.close()
+    assert {held for time_s, held in locked if time_s <= 0.2} == {False}
+    assert {held for time_s, held in locked if time_s > 0.201} == {True}

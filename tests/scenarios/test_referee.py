@@ -45,18 +45,60 @@ def test_contact_reports_offset_and_speed_at_the_ring_and_the_angle_at_the_latch
     assert referee.contact.time_s == 5.0
 
 
-def test_outcomes():
-    held = Referee()
-    assert held.judge(through(held, 0.05, latch=True), "clear", 60.0) is Outcome.CONTACT
-    missed = Referee()
-    assert missed.judge(through(missed, 0.4), "approach", 60.0) is Outcome.MISS
-    struck = Referee()
-    assert struck.judge(through(struck, 0.25, touches=True), "approach", 60.0) is Outcome.RIM_STRIKE
-    collided = Referee()
-    collided.watch(truth_at(1.0, (-3.0, 0, 0), hit="hose_3"))
-    assert collided.judge(truth_at(1.1, (-3.0, 0, 0)), "approach", 60.0) is Outcome.COLLISION
-    assert Referee().judge(truth_at(20.0, (-3.0, 0, 0)), "clear", 60.0) is Outcome.ABORT
-    assert Referee().judge(truth_at(60.0, (-3.0, 0, 0)), "pre_contact", 60.0) is Outcome.TIMEOUT
+def judged(referee, truth, phase="approach"):
+    return referee.judge(truth, phase, 60.0)
+
+
+def test_probe_that_is_held_has_made_contact_also_when_it_touched_the_basket_on_its_way():
+    for touches in (False, True):
+        referee = Referee()
+        truth = through(referee, 0.15, latch=True, touches=touches)
+        assert judged(referee, truth) is None  # it is held: the flight goes on
+        assert judged(referee, truth, "clear") is Outcome.CONTACT
+
+
+def test_probe_that_was_held_and_let_go_has_made_contact_and_only_its_first_counts():
+    referee = Referee()
+    through(referee, 0.05, latch=True)
+    first = referee.contact
+    referee.watch(truth_at(3.0, (0.3, 0.0, 0.0)))
+    referee.watch(truth_at(4.0, (0.3, 0.0, 0.0), latched=True))
+    assert referee.contact is first
+    assert judged(referee, truth_at(9.0, (-3.0, 0.0, 0.0)), "clear") is Outcome.CONTACT
+
+
+def test_probe_that_passes_beside_the_basket_and_touches_nothing_has_missed():
+    referee = Referee()
+    assert judged(referee, through(referee, 0.4)) is Outcome.MISS
+
+
+def test_probe_that_has_passed_by_less_than_a_metre_may_still_be_held():
+    referee = Referee()
+    referee.watch(truth_at(1.0, (-0.1, 0.4, 0.0)))
+    referee.watch(truth_at(2.0, (0.9, 0.4, 0.0)))
+    assert judged(referee, truth_at(2.0, (0.9, 0.4, 0.0))) is None
+    assert judged(referee, truth_at(2.2, (1.1, 0.4, 0.0))) is Outcome.MISS
+
+
+def test_probe_that_touches_the_drogue_and_is_not_held_has_struck_it_from_ahead_or_behind_the_rings_plane():
+    passed, backed_off = Referee(), Referee()
+    assert judged(passed, through(passed, 0.25, touches=True)) is Outcome.RIM_STRIKE
+    backed_off.watch(truth_at(1.0, (-0.02, 0.27, 0.0), touches=True))
+    assert judged(backed_off, truth_at(9.0, (-3.0, 0.0, 0.0)), "clear") is Outcome.RIM_STRIKE
+
+
+def test_anything_else_of_the_receiver_that_touches_ends_the_flight_whatever_went_before():
+    for held_before in (False, True):
+        referee = Referee()
+        truth = through(referee, 0.05, latch=held_before)
+        referee.watch(truth_at(truth.time_s + 1.0, (-3.0, 0.0, 0.0), hit="hose_3"))
+        assert judged(referee, truth_at(truth.time_s + 1.1, (-3.0, 0.0, 0.0))) is Outcome.COLLISION
+        assert referee.collided_with == "hose_3"
+
+
+def test_receiver_that_breaks_away_behind_the_rings_plane_has_aborted_and_one_that_waits_has_run_out_of_time():
+    assert judged(Referee(), truth_at(20.0, (-3.0, 0.0, 0.0)), "clear") is Outcome.ABORT
+    assert judged(Referee(), truth_at(60.0, (-3.0, 0.0, 0.0)), "pre_contact") is Outcome.TIMEOUT
 
 
 def test_a_flight_goes_on_until_something_ends_it():

@@ -10,6 +10,7 @@ from dockair.errors import DockairError
 from dockair.sim.faults import (
     CameraDropOut,
     CameraFault,
+    DeadReel,
     DirtyWindow,
     ExposureStuck,
     Fault,
@@ -50,6 +51,7 @@ def _faults(*faults: Fault) -> Faults:
         (GyroBiasStep(rate_rad_s=(0.0, 0.1, 0.0), **TIMES), lambda f, t: f.imu(t).bias_rad_s[1], 0.1, 0.0),
         (GyroSaturation(limit_rad_s=0.5, **TIMES), lambda f, t: f.imu(t).range_rad_s, 0.5, None),
         (GyroDropOut(**TIMES), lambda f, t: f.imu(t).dropped, True, False),
+        (DeadReel(**TIMES), lambda f, t: f.reel_locked(t), True, False),
     ],
     ids=lambda value: type(value).__name__ if isinstance(value, Fault) else "",
 )
@@ -79,6 +81,8 @@ def test_a_fault_of_one_device_leaves_the_others_alone() -> None:
     leds, camera, imu = _faults(LedOff()), _faults(CameraDropOut(), HotPixels(count=3)), _faults(GyroDropOut())
     assert leds.camera(0.0) == imu.camera(0.0) == CameraFault()
     assert not leds.imu(0.0).dropped and not camera.imu(0.0).dropped
+    assert not any(faults.reel_locked(0.0) for faults in (leds, camera, imu))
+    assert _faults(DeadReel()).camera(0.0) == CameraFault() and not _faults(DeadReel()).imu(0.0).dropped
     assert (camera.led_factors(0.0) == 1.0).all() and (imu.led_factors(0.0) == 1.0).all()
 
 

@@ -1,12 +1,14 @@
 """Air loads on hose and drogue."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from dockair.parameters import load_parameters
 from dockair.rotations import exp
 from dockair.sim.hose.chain import DrogueParameters, HoseParameters
-from dockair.sim.hose.loads import drogue_drag, hose_load_per_length, load_coefficients, tow_loads
+from dockair.sim.hose.loads import drogue_force, hose_load_per_length, load_coefficients, tow_loads
 
 HOSE = load_parameters("hose", HoseParameters)
 DROGUE = load_parameters("drogue", DrogueParameters)
@@ -113,10 +115,62 @@ def test_link_that_is_half_in_the_pod_bears_half_the_load_a_quarter_of_its_lengt
     np.testing.assert_array_equal(tow_loads(position, R, v, w, air, length, K)[0], 0.0)
 
 
-def test_drogue_drag_is_the_sheet_coefficient_on_its_disc_along_the_wind():
-    u = np.array([-170.0, 20.0, -30.0])
-    expected = 0.5 * DENSITY * 0.8 * np.pi * 0.25 * 0.5**2 * np.linalg.norm(u) * u
-    np.testing.assert_allclose(drogue_drag(u, K), expected, rtol=1e-12)
+def _incidence(angle_rad, speed=170.0):
+    """Axis and relative air of a drogue whose axis is turned up from the stream by an angle."""
+    return np.array([np.cos(angle_rad), 0.0, np.sin(angle_rad)]), np.array([-speed, 0.0, 0.0])
+
+
+def test_drogue_along_the_stream_has_the_sheets_drag_on_its_disc():
+    t, u = _incidence(0.0)
+    drag = 0.5 * DENSITY * 0.8 * np.pi * 0.25 * 0.5**2 * 170.0**2
+    np.testing.assert_allclose(drogue_force(t, u, K), [-drag, 0.0, 0.0], rtol=1e-12)
+
+
+def test_drogue_across_the_stream_has_the_canopys_side_force_on_its_fabric():
+    t, u = _incidence(0.5 * np.pi)
+    side = 0.5 * DENSITY * DROGUE.canopy_side_coefficient * DROGUE.canopy_area_m2 * 170.0**2
+    np.testing.assert_allclose(drogue_force(t, u, K), [-side, 0.0, 0.0], rtol=1e-12, atol=1e-9)
+
+
+@pytest.mark.parametrize(("ratio", "sign"), [(0.7, -1.0), (1.3, 1.0)])
+def test_drogues_lift_and_drag_at_incidence_are_those_of_its_two_coefficients(ratio, sign):
+    """C_D' = C_D cos^2 a + C_s sin^2 a, C_L = (C_s - C_D) sin a cos a: negative for a canopy that is weak sideways."""
+    side = ratio * DROGUE.drag_coefficient / DROGUE.canopy_area_ratio
+    drogue = replace(DROGUE, canopy_side_coefficient=side)
+    k = load_coefficients(HOSE, drogue, DENSITY, VISCOSITY)
+    angle = np.deg2rad(25.0)
+    t, u = _incidence(angle)
+    pressure_area = 0.5 * DENSITY * 170.0**2 * drogue.drag_area_m2 * drogue.drag_coefficient
+    drag = pressure_area * (np.cos(angle) ** 2 + ratio * np.sin(angle) ** 2)
+    lift = pressure_area * (ratio - 1.0) * np.sin(angle) * np.cos(angle)
+    assert lift * sign > 0.0
+    np.testing.assert_allclose(drogue_force(t, u, k), [-drag, 0.0, lift], rtol=1e-12, atol=1e-9)
+
+
+def test_drogue_of_the_sheet_has_no_lift_at_any_incidence():
+    """Its side coefficient is the middle of two strip theories, where side and axial force change alike."""
+    for angle in (0.05, 0.4, 1.2):
+        force = drogue_force(*_incidence(angle), K)
+        assert np.abs(force[1:]).max() < 1e-9 * -force[0]
+
+
+def test_drogues_force_has_no_corner_at_any_incidence_not_even_across_or_from_behind():
+    """The second difference of a smooth function falls with the square of the step: a corner's falls with the first."""
+    k = load_coefficients(HOSE, replace(DROGUE, canopy_side_coefficient=0.3), DENSITY, VISCOSITY)
+
+    def second(step):
+        angles = np.arange(-np.pi, np.pi, step)
+        force = np.array([drogue_force(*_incidence(angle), k) for angle in angles])
+        return np.abs(np.diff(force, 2, axis=0)).max()
+
+    assert second(0.02) / second(0.01) == pytest.approx(4.0, rel=0.02)
+
+
+def test_hoses_load_has_no_corner_at_the_ends_of_the_drag_crisis():
+    across = np.linspace(0.5, 1.9, 20001) * HOSE.crisis_reynolds * VISCOSITY / DIAMETER
+    force = np.array([hose_load_per_length(np.array([1.0, 0, 0]), np.array([0, 0, -u]), K)[2] for u in across])
+    slope = np.diff(force) / np.diff(across)
+    assert np.abs(np.diff(slope)).max() < 2e-3 * np.ptp(slope)
 
 
 @pytest.mark.parametrize("axis", [1, 2])

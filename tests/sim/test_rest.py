@@ -1,9 +1,14 @@
-"""Angles of the chain from its directions; the shape itself is checked in check_cases/test_hose_statics.py."""
+"""Angles of the chain, a drogue with lift; the shape itself is checked in check_cases/test_hose_statics.py."""
+
+from dataclasses import replace
 
 import numpy as np
+import pytest
 
+from dockair.parameters import load_parameters
 from dockair.rotations import exp
-from dockair.sim.hose.rest import hinge_angles
+from dockair.sim.hose.chain import DrogueParameters, HoseParameters
+from dockair.sim.hose.rest import hinge_angles, rest_shape
 
 
 def test_hinge_angles_turn_each_link_into_its_direction():
@@ -22,3 +27,23 @@ def test_straight_hose_has_no_angle_but_the_first_and_a_drooping_one_turns_nose_
     t = np.array([np.cos(0.2), 0.0, np.sin(0.2)])  # toward the tanker, up: it hangs down aft
     angles = hinge_angles(np.array([t, t, t]))
     np.testing.assert_allclose(angles, [[-0.2, 0.0], [0.0, 0.0], [0.0, 0.0]], atol=1e-12)
+
+
+@pytest.mark.parametrize("ratio", [0.7, 1.0, 1.4])
+def test_drogue_with_lift_balances_about_the_hoses_end_and_pulls_with_its_whole_force(ratio):
+    """Force written anew: axial S C_D, across `ratio` times that; the lift lowers or raises the hose's end."""
+    hose, drogue = load_parameters("hose", HoseParameters), load_parameters("drogue", DrogueParameters)
+    drogue = replace(drogue, canopy_side_coefficient=ratio * drogue.drag_coefficient / drogue.canopy_area_ratio)
+    wind, rho = np.array([-120.0, 0.0, 0.0]), 0.909
+    rest = rest_shape(hose, drogue, wind, rho, 1.863e-5)
+    t = rest.t_D_W
+    axial = (wind @ t) * t
+    area = np.pi / 4.0 * drogue.drag_diameter_m**2 * drogue.drag_coefficient
+    force = 0.5 * rho * 120.0 * area * (axial + ratio * (wind - axial))
+    weight = np.array([0.0, 0.0, -9.80665 * drogue.mass_kg])
+    to_mass, to_drag = drogue.hose_joint_x_m - drogue.centre_of_mass_x_m, drogue.hose_joint_x_m - drogue.drag_centre_x_m
+    moment = np.cross(-to_mass * t, weight) + np.cross(-to_drag * t, force)
+    np.testing.assert_allclose(moment, 0.0, atol=1e-9)
+    assert rest.drogue_tension_n == pytest.approx(np.linalg.norm(force + weight), rel=1e-12)
+    neutral = rest_shape(hose, replace(drogue, canopy_side_coefficient=0.5), wind, rho, 1.863e-5)
+    assert np.sign(rest.p_WH[-1, 2] - neutral.p_WH[-1, 2]) == np.sign(ratio - 1.0)

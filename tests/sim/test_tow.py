@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 
 from dockair.parameters import load_parameters
+from dockair.rotations import exp
 from dockair.sim.air.atmosphere import standard_atmosphere
-from dockair.sim.hose.chain import DrogueParameters, HoseParameters
+from dockair.sim.hose.chain import DrogueParameters, HoseParameters, velocities_at
 from dockair.sim.hose.reel import ReelParameters
-from dockair.sim.hose.tow import Tow
+from dockair.sim.hose.tow import PodMotion, Tow
 
 HOSE = load_parameters("hose", HoseParameters)
 DROGUE = load_parameters("drogue", DrogueParameters)
@@ -55,3 +56,32 @@ def test_link_at_the_exit_is_the_one_that_the_wound_in_length_reaches():
     cases = ((-0.1, 0), (0.0, 0), (0.99 * length, 0), (1.01 * length, 1), (3.5 * length, 3), (1e3, HOSE.links - 1))
     for wound_in_m, link in cases:
         assert tow.link_at_exit(wound_in_m) == link
+
+
+def _wound_in(seed):
+    """A crooked tow in motion, 3 m of it in the pod."""
+    rng = np.random.default_rng(seed)
+    n = HOSE.links + 1
+    place = np.column_stack([-np.arange(n) * HOSE.link_length_m + 3.0, *(0.02 * rng.normal(size=(2, n)))])
+    R = np.array([exp(0.05 * rng.normal(size=3)) for _ in range(n)])
+    return place, R, 0.3 * rng.normal(size=(n, 6)), np.zeros(3)
+
+
+def _rates(place, spatial, reference):
+    return velocities_at(place, spatial, reference), np.ascontiguousarray(spatial[:, :3])
+
+
+def test_pod_turned_displaced_and_moving_with_the_whole_scene_guides_the_hose_as_one_at_rest():
+    """The same places, rates and pod, seen from another frame: the tube's forces turn with it."""
+    place, R, spatial, reference = _wound_in(3)
+    tow = make()
+    Q, shift, v, w = exp(np.array([0.4, -0.2, 1.1])), np.array([300.0, -40.0, 7.0]), np.array([5.0, -3.0, 2.0]), 0.1
+    w_W = w * Q[:, 2]
+    moved = place @ Q.T + shift
+    v_at_reference = v + np.cross(w_W, -shift)  # of the tanker's material at the origin of W
+    turned = np.hstack([spatial[:, :3] @ Q.T + w_W, spatial[:, 3:] @ Q.T + v_at_reference])
+    turned[:, 3:] -= np.cross(spatial[:, :3] @ Q.T, shift)
+    pod = PodMotion(R_WT=Q, p_WO=shift, v_WO=v, w_WT=w_W)
+    expected = tow._guided(place, R, *_rates(place, spatial, reference), 3.0, None)
+    got = tow._guided(moved, Q @ R, *_rates(moved, turned, np.zeros(3)), 3.0, pod)
+    np.testing.assert_allclose(got, np.hstack([expected[:, :3] @ Q.T, expected[:, 3:] @ Q.T]), rtol=1e-7, atol=1e-5)
