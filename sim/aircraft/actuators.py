@@ -1,8 +1,8 @@
 """Receiver's control surfaces and engine lever: first-order lags with limits of position and rate.
 
-    d(surface)/dt = sat(a (sat(command) - surface)),     dT/dt = (sat(T_c) - T) / tau          (1)
+    d(surface)/dt = sat(a (sat(command) - surface)),     dT/dt = (sat(T_c) - T) lag          (1)
 
-advanced exactly over a tick while no rate limit is met.
+advanced exactly over a tick while no rate limit is met; the engine's lag is Eq. (3) of `engine`, held over the tick.
 Not modelled: dead zones, hysteresis, hinge moments.
 Source: Stevens, Lewis & Johnson, Aircraft Control and Simulation, chapters 4 and 5.
 """
@@ -11,7 +11,8 @@ import numpy as np
 from numba import njit
 
 from dockair.rotations import Array
-from dockair.sim.aircraft.aerodynamics import AirframeParameters
+from dockair.sim.aircraft.airframe import AirframeData
+from dockair.sim.aircraft.engine import engine_lag_1_s
 from dockair.sim.aircraft.trim import Trim
 
 
@@ -24,11 +25,12 @@ class Actuators:
         step_s: length of a tick.
     """
 
-    def __init__(self, parameters: AirframeParameters, trim: Trim, step_s: float) -> None:
+    def __init__(self, parameters: AirframeData, trim: Trim, step_s: float) -> None:
         self._limits_rad = np.array(parameters.surface_limits_rad)
         self._largest_step_rad = np.array(parameters.surface_rate_limits_rad_s) * step_s
         self._surface_share = -float(np.expm1(-parameters.actuator_bandwidth_rad_s * step_s))
-        self._thrust_share = -float(np.expm1(-step_s / parameters.engine_time_constant_s))
+        self._quick_share = -float(np.expm1(-step_s / parameters.engine_time_constant_s))
+        self._engine, self._step_s = parameters, step_s
         self._range = trim.thrust_range
         self.surfaces_rad: Array = trim.surfaces_rad  #: (3,) elevator, aileron, rudder
         self.thrust_n = trim.thrust_n
@@ -40,8 +42,12 @@ class Actuators:
             self.surfaces_rad, surfaces_command_rad, self._limits_rad, self._largest_step_rad, self._surface_share
         )
         command_n = min(max(thrust_command_n, self._range.idle_n), self._range.military_n)
-        self.thrust_n += self._thrust_share * (command_n - self.thrust_n)
         self.throttle = self._range.throttle(command_n)
+        rise = self.throttle - self._range.throttle(self.thrust_n)
+        share = self._quick_share
+        if rise > self._engine.engine_quick_rise:
+            share = -float(np.expm1(-engine_lag_1_s(self._engine, rise) * self._step_s))
+        self.thrust_n += share * (command_n - self.thrust_n)
 
 
 @njit(cache=True)

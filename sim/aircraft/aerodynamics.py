@@ -1,23 +1,28 @@
-"""Receiver's aerodynamic force and moment: derivatives of an F-16-class airframe about its trim point.
+"""Receiver's aerodynamic force and moment from the tables of an F-16-class airframe.
 
-With the air-relative velocity (U, V, W) of the centre of gravity and the rates (P, Q, R), forward-right-down:
+With the air-relative velocity (U, V, W) of the centre of gravity and the rates (P, Q, R) beyond those of the air,
+forward-right-down, da = aileron/20 deg, dr = rudder/30 deg, e elevator:
 
-    Va^2 = U^2 + V^2 + W^2,   alpha = atan(W / U),   beta = asin(V / Va),   qbar = rho Va^2 / 2      (1)
-    z = (alpha - alpha_0, beta, P b/2Va, Q c/2Va, R b/2Va, elevator - elevator_0, aileron, rudder)   (2)
-    (CX, CY, CZ, Cl, Cm, Cn) = C_0 + D z                                                             (3)
-    force = qbar S (CX, CY, CZ),     moment = qbar S (b Cl, c Cm, b Cn)                              (4)
+    Va^2 = U^2 + V^2 + W^2,   alpha = atan(W / U),   beta = asin(V / Va),   qbar = rho Va^2 / 2          (1)
+    CX = CX(alpha, e)                                          + CXq Q c/2Va                             (2)
+    CY = CYb beta + CYda da + CYdr dr                          + (CYr R + CYp P) b/2Va                   (3)
+    CZ = CZ(alpha) (1 - beta^2) + CZe e                        + CZq Q c/2Va                             (4)
+    Cl = Cl(alpha, beta) + Clda(alpha, beta) da + Cldr(alpha, beta) dr + (Clr R + Clp P) b/2Va           (5)
+    Cm = Cm(alpha, e) + CZ (x_r - x_cg)                        + Cmq Q c/2Va                             (6)
+    Cn = Cn(alpha, beta) + Cnda(alpha, beta) da + Cndr(alpha, beta) dr - CY (x_r - x_cg) c/b
+         + (Cnr R + Cnp P) b/2Va                                                                         (7)
+    force = qbar S (CX, CY, CZ),     moment = qbar S (b Cl, c Cm, b Cn)                                  (8)
 
-C_0 and D (6, 8) come from the tables of the sheet at the trim point (alpha_0, elevator_0): slopes are differences over
-one table interval about it. Moments are carried from the tables' reference to the centre of gravity:
-Cm + CZ (x_r - x_cg),  Cn - CY (x_r - x_cg) c/b.
+Tables are linear between their nodes in each argument, the damping derivatives in alpha. Beyond -10 to 45 degrees of
+alpha and 30 degrees of beta they hold their last value; the last cell of the elevator, which ends at 24 degrees, is
+carried on to its stop at 25. Cl and Cn are odd in beta.
 
 Surfaces are (elevator, aileron, rudder), positive with the trailing edge down or left: nose down, roll to the left,
 nose left. The tables are forward-right-down; the kernel turns its inputs and outputs with `FLU_FROM_FRD`, here and
 nowhere else, so that everything outside is forward-left-up.
 
-Valid within 3 degrees of the trim's angle of attack and 5 degrees of sideslip (CX, CZ and Cm within 0.01 of
-the tables), and at low Mach numbers.
-Not modelled: curvature of the tables, Mach effects, leading-edge flaps, speed brake, unsteady lift, gust gradients.
+Valid at low Mach numbers (the wind tunnel's were below 0.6) and for slow changes of the flow.
+Not modelled: Mach effects, leading-edge flaps, speed brake, unsteady lift, ground effect.
 Source: Stevens, Lewis & Johnson, Aircraft Control and Simulation, section 3.5 and appendix A (NASA TP-1538).
 """
 
@@ -26,75 +31,92 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
+from dockair.errors import DockairError
 from dockair.rotations import FLU_FROM_FRD, Array
+from dockair.sim.aircraft.airframe import NO_ROTATION, AirframeData
 
 _FLIP = np.diag(FLU_FROM_FRD).copy()  # a frozen global of the kernel
 
+# First rows of the tables in `_stack`; columns are angles of attack.
+_CX, _CM, _CZ, _CL, _CN, _CL_AILERON, _CL_RUDDER, _CN_AILERON, _CN_RUDDER, _DAMPING = (
+    0,
+    5,
+    10,
+    11,
+    18,
+    25,
+    32,
+    39,
+    46,
+    53,
+)
+_COLUMNS, _ELEVATORS, _SIDESLIPS = 12, 5, 7
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class AirframeParameters:
+class AirframeParameters(AirframeData):
     """Sheet `airframe`: what the tables are and how they are laid out is said there."""
 
-    mass_kg: float
-    inertia_kg_m2: Array  #: (4,) Ixx, Iyy, Izz, Ixz, forward-right-down
-    wing_area_m2: float
-    chord_m: float
-    span_m: float
     centre_of_gravity: float
     reference_centre: float
     angle_of_attack_rad: Array  #: (12,)
     elevator_rad: Array  #: (5,)
+    sideslip_rad: Array  #: (7,) from 0 on
+    surface_sideslip_rad: Array  #: (7,) either way
     axial_force: Array  #: (5, 12)
     normal_force: Array  #: (12,)
     normal_force_elevator_1_rad: float
     pitching_moment: Array  #: (5, 12)
-    sideslip_rad: float
-    rolling_moment: Array  #: (12,)
-    yawing_moment: Array  #: (12,)
-    side_force_1_rad: Array  #: (3,)
+    rolling_moment: Array  #: (7, 12)
+    yawing_moment: Array  #: (7, 12)
+    side_force_1_rad: Array  #: (3,) sideslip, aileron, rudder
     aileron_reference_rad: float
     rudder_reference_rad: float
-    rolling_moment_aileron: Array  #: (12,)
-    rolling_moment_rudder: Array  #: (12,)
-    yawing_moment_aileron: Array  #: (12,)
-    yawing_moment_rudder: Array  #: (12,)
+    rolling_moment_aileron: Array  #: (7, 12)
+    rolling_moment_rudder: Array  #: (7, 12)
+    yawing_moment_aileron: Array  #: (7, 12)
+    yawing_moment_rudder: Array  #: (7, 12)
     damping: Array  #: (9, 12) CXq, CYr, CYp, CZq, Clr, Clp, Cmq, Cnr, Cnp
-    actuator_bandwidth_rad_s: float
-    surface_limits_rad: Array  #: (3,) elevator, aileron, rudder
-    surface_rate_limits_rad_s: Array  #: (3,)
-    engine_time_constant_s: float
-    thrust_mach: Array  #: (6,)
-    thrust_altitude_m: Array  #: (6,)
-    idle_thrust_n: Array  #: (6, 6) by Mach number and altitude
-    military_thrust_n: Array  #: (6, 6)
 
     @property
-    def inertia_B(self) -> Array:
-        """(3, 3) inertia about the centre of gravity, forward-left-up [kg m^2]."""
-        xx, yy, zz, xz = self.inertia_kg_m2
-        inertia_frd = np.array([[xx, 0.0, -xz], [0.0, yy, 0.0], [-xz, 0.0, zz]])
-        return np.asarray(FLU_FROM_FRD @ inertia_frd @ FLU_FROM_FRD)
+    def angle_of_attack_range_rad(self) -> tuple[float, float]:
+        """Ends of the tables."""
+        return float(self.angle_of_attack_rad[0]), float(self.angle_of_attack_rad[-1])
+
+    def aerodynamics(self, density_kg_m3: float) -> "TabulatedAerodynamics":
+        """Return Eqs. (2) to (8) in air of a density."""
+        constants = [density_kg_m3, self.wing_area_m2, self.span_m, self.chord_m]
+        constants += [self.reference_centre - self.centre_of_gravity, self.normal_force_elevator_1_rad]
+        constants += [*self.side_force_1_rad, self.aileron_reference_rad, self.rudder_reference_rad]
+        for key in ("angle_of_attack_rad", "elevator_rad", "sideslip_rad", "surface_sideslip_rad"):
+            constants += _first_and_step(key, getattr(self, key))
+        return TabulatedAerodynamics(tables=_stack(self), constants=np.array(constants))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class LinearAerodynamics:
-    """Eq. (3) about one trim point, with what turns coefficients into force and moment."""
+class TabulatedAerodynamics:
+    """Eqs. (2) to (8), the tables in one array."""
 
-    C_0: Array  #: (6,) CX, CY, CZ, Cl, Cm, Cn at trim
-    D: Array  #: (6, 8) derivatives after z of Eq. (2)
-    z_0: Array  #: (8,) trim values of z's quantities: alpha_0 and elevator_0, else 0
-    lengths: Array  #: (3,) S, b, c
-    density_kg_m3: float
+    tables: Array  #: (62, 12)
+    constants: Array  #: (19,) density, S, b, c, x_r - x_cg, CZe, CYb, CYda, CYdr, references, first node and step of 4
 
-    def force_and_moment(self, v_B: Array, w_B: Array, surfaces_rad: Array) -> tuple[Array, Array]:
-        """Force [N] and moment [N m] about the centre of gravity, (3,) each, body axes forward-left-up.
+    def force_and_moment(
+        self, v_B: Array, w_B: Array, surfaces_rad: Array, air_rotation_B: Array = NO_ROTATION
+    ) -> tuple[Array, Array]:
+        """See `airframe.Aerodynamics`."""
+        force, moment = _force_and_moment(self.tables, self.constants, v_B, w_B, surfaces_rad, air_rotation_B)
+        return force, moment
+
+    def coefficients(self, alpha_rad: float, beta_rad: float, rates: Array, surfaces_rad: Array) -> Array:
+        """(6,) CX, CY, CZ, Cl, Cm, Cn of Eqs. (2) to (7).
 
         Args:
-            v_B: (3,) velocity of the centre of gravity relative to the air [m/s].
-            w_B: (3,) angular velocity [rad/s].
+            alpha_rad: angle of attack.
+            beta_rad: sideslip, positive with air from the right.
+            rates: (3,) P b/2Va, Q c/2Va, R b/2Va, forward-right-down.
             surfaces_rad: (3,) elevator, aileron, rudder [rad].
         """
-        return _force_and_moment(self.C_0, self.D, self.z_0, self.lengths, self.density_kg_m3, v_B, w_B, surfaces_rad)
+        return np.asarray(_coefficients(self.tables, self.constants, alpha_rad, beta_rad, rates, surfaces_rad))
 
 
 def flow_angles(v_B: Array) -> tuple[float, float, float]:
@@ -106,82 +128,17 @@ def flow_angles(v_B: Array) -> tuple[float, float, float]:
     return airspeed, alpha, beta
 
 
-def static_coefficients(parameters: AirframeParameters, alpha_rad: float, elevator_rad: float) -> Array:
-    """(6,) CX, CY, CZ, Cl, Cm, Cn in straight symmetric flight, of the tables, about the centre of gravity."""
-    p = parameters
-    CX = _bilinear(p.elevator_rad, p.angle_of_attack_rad, p.axial_force, elevator_rad, alpha_rad)
-    CZ = float(np.interp(alpha_rad, p.angle_of_attack_rad, p.normal_force))
-    CZ += p.normal_force_elevator_1_rad * elevator_rad
-    Cm = _bilinear(p.elevator_rad, p.angle_of_attack_rad, p.pitching_moment, elevator_rad, alpha_rad)
-    Cm += CZ * (p.reference_centre - p.centre_of_gravity)
-    return np.array([CX, 0.0, CZ, 0.0, Cm, 0.0])
+def _stack(p: AirframeParameters) -> Array:
+    rows = [p.axial_force, p.pitching_moment, p.normal_force[np.newaxis], p.rolling_moment, p.yawing_moment]
+    rows += [p.rolling_moment_aileron, p.rolling_moment_rudder, p.yawing_moment_aileron, p.yawing_moment_rudder]
+    return np.vstack([*rows, p.damping])
 
 
-def linearise(
-    parameters: AirframeParameters, alpha_rad: float, elevator_rad: float, density_kg_m3: float
-) -> LinearAerodynamics:
-    """Eq. (3) about a trim point.
-
-    Args:
-        parameters: the tables.
-        alpha_rad: alpha_0.
-        elevator_rad: elevator_0.
-        density_kg_m3: of the air flown in.
-    """
-    p = parameters
-    D = np.zeros((6, 8))
-    alpha_step, elevator_step = _half_intervals(p)
-    for column, step_alpha, step_elevator in ((0, alpha_step, 0.0), (5, 0.0, elevator_step)):
-        high = static_coefficients(p, alpha_rad + step_alpha, elevator_rad + step_elevator)
-        low = static_coefficients(p, alpha_rad - step_alpha, elevator_rad - step_elevator)
-        D[:, column] = (high - low) / (2.0 * (step_alpha + step_elevator))
-    _fill_lateral(D, p, alpha_rad)
-    _fill_damping(D, p, alpha_rad)
-    arm = p.reference_centre - p.centre_of_gravity
-    D[4, 3] += D[2, 3] * arm  # the static columns have it from static_coefficients
-    D[5] -= D[1] * arm * p.chord_m / p.span_m
-    return LinearAerodynamics(
-        C_0=static_coefficients(p, alpha_rad, elevator_rad),
-        D=D,
-        z_0=np.array([alpha_rad, 0.0, 0.0, 0.0, 0.0, elevator_rad, 0.0, 0.0]),
-        lengths=np.array([p.wing_area_m2, p.span_m, p.chord_m]),
-        density_kg_m3=density_kg_m3,
-    )
-
-
-def _half_intervals(p: AirframeParameters) -> tuple[float, float]:
-    alpha, elevator = p.angle_of_attack_rad, p.elevator_rad
-    return 0.5 * float(alpha[1] - alpha[0]), 0.5 * float(elevator[1] - elevator[0])
-
-
-def _fill_lateral(D: Array, p: AirframeParameters, alpha_rad: float) -> None:
-    """Columns sideslip, aileron, rudder."""
-    D[1, [1, 6, 7]] = p.side_force_1_rad
-    columns = (
-        (1, p.rolling_moment, p.yawing_moment, p.sideslip_rad),
-        (6, p.rolling_moment_aileron, p.yawing_moment_aileron, p.aileron_reference_rad),
-        (7, p.rolling_moment_rudder, p.yawing_moment_rudder, p.rudder_reference_rad),
-    )
-    for column, rolling, yawing, per in columns:
-        D[3, column] = np.interp(alpha_rad, p.angle_of_attack_rad, rolling) / per
-        D[5, column] = np.interp(alpha_rad, p.angle_of_attack_rad, yawing) / per
-
-
-def _fill_damping(D: Array, p: AirframeParameters, alpha_rad: float) -> None:
-    """Columns of the three rates."""
-    CXq, CYr, CYp, CZq, Clr, Clp, Cmq, Cnr, Cnp = (
-        np.interp(alpha_rad, p.angle_of_attack_rad, row) for row in p.damping
-    )
-    D[[1, 3, 5], 2] = CYp, Clp, Cnp
-    D[[0, 2, 4], 3] = CXq, CZq, Cmq
-    D[[1, 3, 5], 4] = CYr, Clr, Cnr
-
-
-def _bilinear(rows: Array, columns: Array, table: Array, row: float, column: float) -> float:
-    i = int(np.clip(np.searchsorted(rows, row) - 1, 0, len(rows) - 2))
-    t = (row - rows[i]) / (rows[i + 1] - rows[i])
-    low, high = np.interp(column, columns, table[i]), np.interp(column, columns, table[i + 1])
-    return float((1.0 - t) * low + t * high)
+def _first_and_step(key: str, nodes: Array) -> list[float]:
+    steps = np.diff(nodes)
+    if not np.all(np.abs(steps - steps[0]) < 1e-6 * steps[0]):
+        raise DockairError(f"airframe.{key}", expected="evenly spaced nodes, rising", got=nodes.tolist())
+    return [float(nodes[0]), float(nodes[-1] - nodes[0]) / len(steps)]
 
 
 @njit(cache=True)
@@ -192,21 +149,60 @@ def _flow_angles(v_B):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _force_and_moment(C_0, D, z_0, lengths, density, v_B, w_B, surfaces):  # type: ignore[no-untyped-def]
+def _cell(x, first, step, count):  # type: ignore[no-untyped-def]
+    """Cell of a node table and the place in it, not clamped."""
+    s = (x - first) / step
+    i = int(min(max(s, 0.0), count - 2.0))
+    return i, s - i
+
+
+@njit(cache=True)
+def _at(tables, row, t_row, column, t):  # type: ignore[no-untyped-def]
+    """Bilinear value between two rows and two columns."""
+    low = tables[row, column] + t * (tables[row, column + 1] - tables[row, column])
+    high = tables[row + 1, column] + t * (tables[row + 1, column + 1] - tables[row + 1, column])
+    return low + t_row * (high - low)
+
+
+@njit(cache=True)
+def _coefficients(tables, k, alpha, beta, rates, surfaces):  # type: ignore[no-untyped-def]
+    arm, CZ_elevator, CY_beta, CY_aileron, CY_rudder = k[4], k[5], k[6], k[7], k[8]
+    elevator = surfaces[0]
+    aileron, rudder = surfaces[1] / k[9], surfaces[2] / k[10]
+    i, t = _cell(min(max(alpha, k[11]), k[11] + k[12] * (_COLUMNS - 1)), k[11], k[12], _COLUMNS)
+    e, t_e = _cell(elevator, k[13], k[14], _ELEVATORS)
+    end = k[15] + k[16] * (_SIDESLIPS - 1)
+    beta = min(max(beta, -end), end)
+    side = -1.0 if beta < 0.0 else 1.0
+    b, t_b = _cell(abs(beta), k[15], k[16], _SIDESLIPS)
+    s, t_s = _cell(beta, k[17], k[18], _SIDESLIPS)
+    d = np.empty(9)
+    for j in range(9):
+        row = _DAMPING + j
+        d[j] = tables[row, i] + t * (tables[row, i + 1] - tables[row, i])
+    CZ = tables[_CZ, i] + t * (tables[_CZ, i + 1] - tables[_CZ, i])
+    P, Q, R = rates
+    C = np.empty(6)
+    C[0] = _at(tables, _CX + e, t_e, i, t) + d[0] * Q  # Eq. (2)
+    C[1] = CY_beta * beta + CY_aileron * surfaces[1] + CY_rudder * surfaces[2] + d[1] * R + d[2] * P  # Eq. (3)
+    C[2] = CZ * (1.0 - beta * beta) + CZ_elevator * elevator + d[3] * Q  # Eq. (4)
+    C[3] = side * _at(tables, _CL + b, t_b, i, t) + d[4] * R + d[5] * P  # Eq. (5)
+    C[3] += _at(tables, _CL_AILERON + s, t_s, i, t) * aileron + _at(tables, _CL_RUDDER + s, t_s, i, t) * rudder
+    C[4] = _at(tables, _CM + e, t_e, i, t) + C[2] * arm + d[6] * Q  # Eq. (6)
+    C[5] = side * _at(tables, _CN + b, t_b, i, t) - C[1] * arm * k[3] / k[2] + d[7] * R + d[8] * P  # Eq. (7)
+    C[5] += _at(tables, _CN_AILERON + s, t_s, i, t) * aileron + _at(tables, _CN_RUDDER + s, t_s, i, t) * rudder
+    return C
+
+
+@njit(cache=True)
+def _force_and_moment(tables, k, v_B, w_B, surfaces, air_rotation_B):  # type: ignore[no-untyped-def]
     airspeed, alpha, beta = _flow_angles(v_B)
-    S, b, c = lengths
+    S, b, c = k[1], k[2], k[3]
     per_rate = 0.5 / max(airspeed, 1e-3)
-    z = np.empty(8)
-    z[0], z[1] = alpha, beta
-    z[2] = _FLIP[0] * w_B[0] * b * per_rate
-    z[3] = _FLIP[1] * w_B[1] * c * per_rate
-    z[4] = _FLIP[2] * w_B[2] * b * per_rate
-    z[5:] = surfaces
-    C = C_0.copy()
-    for i in range(6):
-        for j in range(8):
-            C[i] += D[i, j] * (z[j] - z_0[j])
-    qbar_S = 0.5 * density * airspeed * airspeed * S  # Eqs. (1) and (4)
+    P, Q, R = w_B[0] - air_rotation_B[0], w_B[1] - air_rotation_B[1], w_B[2] - air_rotation_B[2]
+    rates = (_FLIP[0] * P * b * per_rate, _FLIP[1] * Q * c * per_rate, _FLIP[2] * R * b * per_rate)
+    C = _coefficients(tables, k, alpha, beta, rates, surfaces)
+    qbar_S = 0.5 * k[0] * airspeed * airspeed * S  # Eqs. (1) and (8)
     force, moment = np.empty(3), np.empty(3)
     for i in range(3):
         force[i] = _FLIP[i] * qbar_S * C[i]

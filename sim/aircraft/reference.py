@@ -6,7 +6,7 @@ pass F = w^2 / (s^2 + 2 zeta w s + w^2) the reference velocity r follows, in eac
     r' = F(d),     d = sat(a + k (F(u) - r)),     |d| <= a_max,     |r''| <= j_max                    (1)
 
 A command whose a is the rate of its own u comes out as r = F(u), without overshoot; one without a as a step response
-of bandwidth k. r and its first three derivatives are known exactly and are what the regulator steers along.
+of bandwidth k. W stands for any level axes that the caller gives attitudes against.
 """
 
 from dataclasses import dataclass

@@ -1,38 +1,42 @@
-"""Gains of the receiver's flight control: linear-quadratic feedback and exact steering along a commanded path.
+"""Gains of the receiver's flight control: linear-quadratic feedback, and a model of the flight that is to be flown.
 
-Feedback minimises the integral of x'Q x + z'Q_z z + u'R u of the linear model with two additions: z, the integral of
-the velocity's error, and the gust g as the flight control thinks of it, dg/dt = -(V/L) g + noise:
+Both minimise the integral of y'Q y + z'Q_z z + x'Q_x x + u'R u of the linear model, y the velocity of the probe's tip
+beyond the path's, z its integral; Q and R are diagonal, one over the square of what is tolerated [Bryson & Ho, 5.2].
+Tip at p from the centre of gravity, w the angular velocity beyond trim, R_trim the trim's attitude:
 
-    u = -K x - K_z z - K_g g,     K = R^-1 B' P,     P of the algebraic Riccati equation              (1)
+    y = C x = v + R_trim (w x p)                                                                            (1)
 
-Q and R are diagonal, one over the square of what is tolerated [Bryson & Ho, section 5.2].
+Feedback knows the gust as the flight control thinks of it, dg/dt = -(V/L) g + noise:
 
-Steering: to follow w, a reference velocity r and its first three derivatives (per axis a chain S of integrators),
-state and input must be Pi w and Gamma w, the solution of the regulator equations
+    u = -K x - K_z z - K_g g,     K = R^-1 B' P,     P of the algebraic Riccati equation                   (2)
 
-    Pi S = A Pi + B Gamma,     C Pi = (1, 0, 0, 0) for the three velocities, 0 for the heading        (2)
+Following has its own tolerances. The command is a velocity c and its rate, dc/dt = a, da/dt = -lambda a + noise, and
+what is minimised is y - c:
 
-so that u = Gamma w - K (x - Pi w) tracks without error in the linear model what has no fourth derivative, and the
-feedback's gains do not shape the answer to commands.
-Source: Francis, The linear multivariable regulator problem, SIAM J. Control Optim. 15 (1977).
+    u = -K_m (x, z) - K_c (c, a),     A_m' P_c + P_c S + P E = C' Q (1, 0),     A_m = A - B K_m             (3)
+
+with S the equation of (c, a), E the way of c into z. What nose, wing and tail each do for the tip is left to Eq. (3):
+slowly the aircraft translates by bank and angle of attack, fast it points its nose.
+Source: Anderson & Moore, Optimal Control: Linear Quadratic Methods, chapter 4 (tracking a reference with a model).
 """
 
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import solve_continuous_are
+from scipy.linalg import solve_continuous_are, solve_sylvester
 
-from dockair.rotations import Array
+from dockair.rotations import Array, skew
 from dockair.sim.aircraft.linear_model import ATTITUDE, INPUTS, RATE, STATES, VELOCITY, LinearModel
 
-CHAIN = 4  #: the reference and three derivatives of it
+FOLLOWED = STATES + 3  #: states of the model that is followed: the aircraft's and z
+_Z, _G = slice(STATES, STATES + 3), slice(STATES + 3, STATES + 6)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Tolerances:
-    """What is tolerated: the weights of Q, Q_z and R."""
+    """What is tolerated: the weights of Q, Q_z, Q_x and R."""
 
-    velocity_m_s: Array  #: (3,) forward, left, up
+    velocity_m_s: Array  #: (3,) of the probe's tip: forward, left, up
     integral_m: Array  #: (3,)
     attitude_rad: Array  #: (3,) roll, pitch, yaw
     rate_rad_s: Array  #: (3,)
@@ -42,46 +46,71 @@ class Tolerances:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Gains:
-    """Eqs. (1) and (2)."""
+    """Eqs. (1) to (3)."""
 
-    K: Array  #: (4, 13)
-    K_integral: Array  #: (4, 3)
-    K_gust: Array  #: (4, 3)
-    Pi: Array  #: (13, 12) on the chain: three axes of r, of its first, second, third derivative
-    Gamma: Array  #: (4, 12)
+    C: Array  #: (3, 13)
+    K: Array  #: (4, 19) on x, z, g
+    K_followed: Array  #: (4, 16) on x, z of the model that is followed
+    K_command: Array  #: (4, 6) on c, a
 
 
-def design(model: LinearModel, tolerances: Tolerances, gust_rate_1_s: float) -> Gains:
+def tip_velocity(R_trim: Array, point_B: Array) -> Array:
+    """(3, 13) C of Eq. (1) for a point (3,) from the centre of gravity, body axes [m]."""
+    C = np.zeros((3, STATES))
+    C[:, VELOCITY], C[:, RATE] = np.eye(3), -R_trim @ skew(point_B)
+    return C
+
+
+def design(
+    model: LinearModel, C: Array, feedback: Tolerances, following: Tolerances, gust_1_s: float, command_1_s: Array
+) -> Gains:
     """Gains for a linear model.
 
     Args:
         model: the aircraft about trim.
-        tolerances: the weights.
-        gust_rate_1_s: V/L of the gusts expected [1/s].
+        C: (3, 13) the velocity that is held.
+        feedback: weights against gusts and errors of the model.
+        following: weights of the flight to be flown.
+        gust_1_s: V/L of the gusts expected [1/s].
+        command_1_s: (3,) lambda, how fast accelerations asked for change [1/s].
     """
-    z, g = slice(STATES, STATES + 3), slice(STATES + 3, STATES + 6)
-    A, B = np.zeros((STATES + 6, STATES + 6)), np.zeros((STATES + 6, INPUTS))
-    A[:STATES, :STATES], A[:STATES, g], B[:STATES] = model.A, model.B_gust, model.B
-    A[z, VELOCITY], A[g, g] = np.eye(3), -gust_rate_1_s * np.eye(3)
-    weights = np.zeros(STATES + 6)
-    weights[VELOCITY], weights[z] = tolerances.velocity_m_s**-2.0, tolerances.integral_m**-2.0
-    weights[ATTITUDE], weights[RATE] = tolerances.attitude_rad**-2.0, tolerances.rate_rad_s**-2.0
-    R = np.diag(np.append(tolerances.surfaces_rad, tolerances.thrust_m_s2) ** -2.0)
-    K = np.linalg.solve(R, B.T @ solve_continuous_are(A, B, np.diag(weights), R))
-    Pi, Gamma = _steering(model)
-    return Gains(K=K[:, :STATES], K_integral=K[:, z], K_gust=K[:, g], Pi=Pi, Gamma=Gamma)
+    A, B = _with_integral(model, C)
+    A_gust = np.zeros((STATES + 6, STATES + 6))
+    A_gust[:FOLLOWED, :FOLLOWED], A_gust[:STATES, _G], A_gust[_G, _G] = A, model.B_gust, -gust_1_s * np.eye(3)
+    B_gust = np.vstack([B, np.zeros((3, INPUTS))])
+    K, _ = _riccati(A_gust, B_gust, C, feedback)
+    K_followed, P = _riccati(A, B, C, following)
+    K_command = _feed_forward(A - B @ K_followed, B, C, P, following, command_1_s)
+    return Gains(C=C, K=K, K_followed=K_followed, K_command=K_command)
 
 
-def _steering(model: LinearModel) -> tuple[Array, Array]:
-    """Solve Eq. (2), M X - E X S = (0; outputs) with X = (Pi; Gamma), by stacking the columns of X."""
-    C = np.zeros((4, STATES))
-    C[:3, VELOCITY], C[3, ATTITUDE.stop - 1] = np.eye(3), 1.0
-    S = np.kron(np.eye(CHAIN, k=1), np.eye(3))
-    right = np.zeros((STATES + INPUTS, len(S)))
-    right[STATES : STATES + 3, :3] = np.eye(3)
-    M = np.block([[model.A, model.B], [C, np.zeros((4, INPUTS))]])
-    E = np.zeros_like(M)
-    E[:STATES, :STATES] = np.eye(STATES)
-    stacked = np.kron(np.eye(len(S)), M) - np.kron(S.T, E)
-    X = np.linalg.solve(stacked, right.T.reshape(-1)).reshape(len(S), -1).T
-    return X[:STATES], X[STATES:]
+def _with_integral(model: LinearModel, C: Array) -> tuple[Array, Array]:
+    A, B = np.zeros((FOLLOWED, FOLLOWED)), np.zeros((FOLLOWED, INPUTS))
+    A[:STATES, :STATES], A[_Z, :STATES], B[:STATES] = model.A, C, model.B
+    return A, B
+
+
+def _riccati(A: Array, B: Array, C: Array, t: Tolerances) -> tuple[Array, Array]:
+    """K and P of Eq. (2)."""
+    Q = np.zeros_like(A)
+    Q[:STATES, :STATES] = C.T @ np.diag(t.velocity_m_s**-2.0) @ C
+    Q[ATTITUDE, ATTITUDE] += np.diag(t.attitude_rad**-2.0)
+    Q[RATE, RATE] += np.diag(t.rate_rad_s**-2.0)
+    Q[_Z, _Z] = np.diag(t.integral_m**-2.0)
+    R = _input_weights(t)
+    P = solve_continuous_are(A, B, Q, R)
+    return np.linalg.solve(R, B.T @ P), P
+
+
+def _input_weights(t: Tolerances) -> Array:
+    return np.diag(np.append(t.surfaces_rad, t.thrust_m_s2) ** -2.0)
+
+
+def _feed_forward(A_m: Array, B: Array, C: Array, P: Array, t: Tolerances, command_1_s: Array) -> Array:
+    """(4, 6) K_c of Eq. (3)."""
+    S, E, right = np.zeros((6, 6)), np.zeros((FOLLOWED, 6)), np.zeros((FOLLOWED, 6))
+    S[:3, 3:], S[3:, 3:] = np.eye(3), -np.diag(command_1_s)
+    E[_Z, :3] = -np.eye(3)
+    right[:STATES, :3] = C.T @ np.diag(t.velocity_m_s**-2.0)
+    P_c = solve_sylvester(A_m.T, S, right - P @ E)
+    return np.linalg.solve(_input_weights(t), B.T @ P_c)

@@ -39,6 +39,23 @@ def test_large_command_is_followed_at_the_surfaces_own_rates_up_to_their_stops(s
     np.testing.assert_allclose(actuators.surfaces_rad, sense * AIRFRAME.surface_limits_rad, rtol=1e-9)
 
 
+def test_large_rise_of_thrust_is_slow_and_a_fall_quick() -> None:
+    """From idle to military and back, 1 s each [Stevens & Lewis, appendix A]."""
+    span = TRIM.thrust_range
+    rise, fall = Actuators(AIRFRAME, TRIM, 1e-3), Actuators(AIRFRAME, TRIM, 1e-3)
+    rise.thrust_n, fall.thrust_n = span.idle_n, span.military_n
+    quick = 1.0 - np.exp(-1.0 / AIRFRAME.engine_time_constant_s)
+    for _ in range(1000):
+        rise.step(TRIM.surfaces_rad, span.military_n)
+        fall.step(TRIM.surfaces_rad, span.idle_n)
+    gap = 1.0  # of the range; the book's lag, by Euler steps of 1 ms
+    for _ in range(1000):
+        gap -= 1e-3 * gap * (1.0 if gap <= 0.5 else 1.9 - 1.8 * gap)
+    assert span.throttle(rise.thrust_n) == pytest.approx(1.0 - gap, abs=1e-3)
+    assert span.throttle(rise.thrust_n) < 0.25
+    assert 1.0 - span.throttle(fall.thrust_n) == pytest.approx(quick, rel=1e-9)
+
+
 def test_throttle_is_the_commands_place_in_the_thrust_range() -> None:
     actuators, span = Actuators(AIRFRAME, TRIM, 1e-3), TRIM.thrust_range
     for command_n, throttle in ((-1e6, 0.0), (1e6, 1.0), (0.5 * (span.idle_n + span.military_n), 0.5)):

@@ -1,0 +1,101 @@
+"""Aerodynamic force and moment of an airframe that is known by its derivatives about one flight condition.
+
+With the flow angles alpha and beta, and the rates (P, Q, R) beyond those of the air, forward-right-down, taken to
+stability axes (x along the flow in the plane of symmetry: P_s = P cos alpha + R sin alpha, R_s likewise):
+
+    CL = CL0 + CLalpha alpha + CLq Q c/2Va + CLe elevator,     CD = CD0 + k CL^2                          (1)
+    CX = CL sin alpha - CD cos alpha,                          CZ = -CL cos alpha - CD sin alpha          (2)
+    Cm = Cm0 + Cmalpha alpha + Cmq Q c/2Va + Cme elevator                                                 (3)
+    CY, Cl_s, Cn_s = D (beta, P_s b/2Va, R_s b/2Va, aileron, rudder)                                      (4)
+
+Moments are turned back into body axes; force and moment follow as Eq. (8) of `aerodynamics`. Derivatives after the rate
+of alpha are counted with those after the pitch rate, as in the short period where both are nearly the same.
+
+Valid within the ranges of the sheet, where a lift curve and a polar are straight and parabolic; beyond, alpha and beta
+hold their last value. Not modelled: stall, Mach effects, the lag of the downwash behind a plunging gust.
+Source: Roskam, Airplane Flight Dynamics and Automatic Flight Controls, part I, chapters 3 and 5.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from dockair.rotations import FLU_FROM_FRD, Array
+from dockair.sim.aircraft.airframe import NO_ROTATION, AirframeData
+
+_FLIP = np.diag(FLU_FROM_FRD).copy()  # a frozen global of the kernel
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class DerivativeAirframe(AirframeData):
+    """Sheet `airframe_unmanned`."""
+
+    angle_of_attack_ends_rad: Array  #: (2,)
+    sideslip_end_rad: float
+    lift: Array  #: (4,) CL0, CLalpha, CLq, CLe
+    drag: Array  #: (2,) CD0, k
+    pitching_moment: Array  #: (4,) Cm0, Cmalpha, Cmq, Cme
+    side_force: Array  #: (5,) after beta, P, R, aileron, rudder
+    rolling_moment: Array  #: (5,)
+    yawing_moment: Array  #: (5,)
+
+    @property
+    def angle_of_attack_range_rad(self) -> tuple[float, float]:
+        """Where the lift curve is straight."""
+        return float(self.angle_of_attack_ends_rad[0]), float(self.angle_of_attack_ends_rad[1])
+
+    def aerodynamics(self, density_kg_m3: float) -> "DerivativeAerodynamics":
+        """Return Eqs. (1) to (4) in air of a density."""
+        lateral = np.vstack([self.side_force, self.rolling_moment, self.yawing_moment])
+        sizes = [density_kg_m3, self.wing_area_m2, self.span_m, self.chord_m]
+        ends = [*self.angle_of_attack_ends_rad, self.sideslip_end_rad]
+        constants = np.array([*sizes, *ends, *self.lift, *self.drag, *self.pitching_moment])
+        return DerivativeAerodynamics(constants=constants, lateral=lateral)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class DerivativeAerodynamics:
+    """Eqs. (1) to (4)."""
+
+    constants: Array  #: (17,) density, S, b, c, ends of alpha and beta, lift, drag, pitching moment
+    lateral: Array  #: (3, 5) D of Eq. (4)
+
+    def force_and_moment(
+        self, v_B: Array, w_B: Array, surfaces_rad: Array, air_rotation_B: Array = NO_ROTATION
+    ) -> tuple[Array, Array]:
+        """See `airframe.Aerodynamics`."""
+        force, moment = _force_and_moment(self.constants, self.lateral, v_B, w_B, surfaces_rad, air_rotation_B)
+        return force, moment
+
+
+@njit(cache=True)
+def _force_and_moment(k, lateral, v_B, w_B, surfaces, air_rotation_B):  # type: ignore[no-untyped-def]
+    U, V, W = _FLIP[0] * v_B[0], _FLIP[1] * v_B[1], _FLIP[2] * v_B[2]
+    airspeed = max(np.sqrt(U * U + V * V + W * W), 1e-3)
+    direction = np.arctan2(W, U)
+    alpha = min(max(direction, k[4]), k[5])
+    beta = min(max(np.arcsin(min(max(V / airspeed, -1.0), 1.0)), -k[6]), k[6])
+    S, b, c = k[1], k[2], k[3]
+    P = _FLIP[0] * (w_B[0] - air_rotation_B[0]) * 0.5 * b / airspeed
+    Q = _FLIP[1] * (w_B[1] - air_rotation_B[1]) * 0.5 * c / airspeed
+    R = _FLIP[2] * (w_B[2] - air_rotation_B[2]) * 0.5 * b / airspeed
+    cosine, sine = np.cos(direction), np.sin(direction)
+    CL = k[7] + k[8] * alpha + k[9] * Q + k[10] * surfaces[0]  # Eq. (1)
+    CD = k[11] + k[12] * CL * CL
+    Cm = k[13] + k[14] * alpha + k[15] * Q + k[16] * surfaces[0]  # Eq. (3)
+    z = (beta, P * cosine + R * sine, R * cosine - P * sine, surfaces[1], surfaces[2])
+    CY = Cl = Cn = 0.0
+    for j in range(5):  # Eq. (4)
+        CY += lateral[0, j] * z[j]
+        Cl += lateral[1, j] * z[j]
+        Cn += lateral[2, j] * z[j]
+    qbar_S = 0.5 * k[0] * airspeed * airspeed * S
+    force, moment = np.empty(3), np.empty(3)
+    force[0] = _FLIP[0] * qbar_S * (CL * sine - CD * cosine)  # Eq. (2)
+    force[1] = _FLIP[1] * qbar_S * CY
+    force[2] = _FLIP[2] * qbar_S * (-CL * cosine - CD * sine)
+    moment[0] = _FLIP[0] * qbar_S * b * (Cl * cosine - Cn * sine)
+    moment[1] = _FLIP[1] * qbar_S * c * Cm
+    moment[2] = _FLIP[2] * qbar_S * b * (Cn * cosine + Cl * sine)
+    return force, moment
