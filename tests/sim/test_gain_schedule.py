@@ -1,0 +1,64 @@
+"""Trims and gains between straight flight and turns."""
+
+import numpy as np
+import pytest
+
+from dockair.errors import DockairError
+from dockair.parameters import load_parameters
+from dockair.rotations import exp
+from dockair.sim.air.atmosphere import STANDARD_GRAVITY_M_S2, standard_atmosphere
+from dockair.sim.aircraft.aerodynamics import AirframeParameters
+from dockair.sim.aircraft.flight_control import FlightControlParameters
+from dockair.sim.aircraft.gain_schedule import NODE_RAD, Design, GainSchedule, roll_pitch_yaw
+from dockair.sim.aircraft.trim import level_trim, steady_trim
+
+AIRFRAME = load_parameters("airframe", AirframeParameters)
+PARAMETERS = load_parameters("flight_control", FlightControlParameters)
+AIR = standard_atmosphere(6000.0)
+
+
+@pytest.fixture(scope="module")
+def schedule() -> GainSchedule:
+    wanted = Design(
+        point_B=np.array([6.0, -0.9, 0.6]),
+        feedback=PARAMETERS.tolerances,
+        following=PARAMETERS.following_tolerances,
+        gust_1_s=0.34,
+        command_1_s=PARAMETERS.command_rate_1_s,
+    )
+    return GainSchedule(AIRFRAME, AIR, level_trim(AIRFRAME, 180.0, AIR), wanted)
+
+
+def test_roll_pitch_yaw_are_the_angles_of_three_rotations() -> None:
+    angles = np.array([-0.4, 0.1, 0.05])
+    R = exp(angles[2] * np.eye(3)[2]) @ exp(angles[1] * np.eye(3)[1]) @ exp(angles[0] * np.eye(3)[0])
+    np.testing.assert_allclose(roll_pitch_yaw(R), angles, atol=1e-12)
+
+
+def test_straight_flight_has_the_trim_and_the_gains_it_was_designed_with(schedule: GainSchedule) -> None:
+    row, trim = schedule.at(0.0), level_trim(AIRFRAME, 180.0, AIR)
+    np.testing.assert_array_equal(row.A, schedule.model.A)
+    np.testing.assert_array_equal(row.K, schedule.gains.K)
+    np.testing.assert_allclose(row.trim[:3], [0.0, -trim.pitch_rad, 0.0], atol=1e-12)
+
+
+@pytest.mark.parametrize("bank_deg", [7.5, 12.5, -22.5])
+def test_between_the_nodes_the_trim_is_that_of_a_steady_turn(schedule: GainSchedule, bank_deg: float) -> None:
+    """Half-way, where the line is farthest off: bank within 0.1, surfaces within 0.15 degrees, thrust within 1 %."""
+    rate = STANDARD_GRAVITY_M_S2 * np.tan(np.radians(bank_deg)) / 180.0
+    row, turn = schedule.at(rate), steady_trim(AIRFRAME, 180.0, AIR, turn_rate_rad_s=rate)
+    assert row.trim[0] == pytest.approx(turn.bank_rad, abs=np.radians(0.1))
+    np.testing.assert_allclose(row.trim[3:6], turn.w_WB_B, atol=2e-4)
+    np.testing.assert_allclose(row.trim[6:9], turn.surfaces_rad, atol=np.radians(0.15))
+    assert row.trim[9] * AIRFRAME.mass_kg == pytest.approx(turn.thrust_n, rel=0.01)
+
+
+def test_gains_are_continuous_across_a_node(schedule: GainSchedule) -> None:
+    rate = STANDARD_GRAVITY_M_S2 * np.tan(NODE_RAD) / 180.0
+    below, above = schedule.at(rate * (1.0 - 1e-9)).K, schedule.at(rate * (1.0 + 1e-9)).K
+    np.testing.assert_allclose(below, above, atol=1e-6 * np.abs(below).max())
+
+
+def test_turn_without_a_trim_is_refused(schedule: GainSchedule) -> None:
+    with pytest.raises(DockairError, match="turning at"):
+        schedule.at(0.4)
