@@ -1,12 +1,12 @@
-"""Outlines of tanker and receiver in MuJoCo's primitives: what the camera sees of them and what they strike with.
+"""Outlines of tanker and receiver in MuJoCo's primitives: what they strike with. What is seen of them is `skins`.
 
-A drawing, not physics: masses, inertias and forces come from the parameter sheets. Proportions are those of a
-narrow-body transport with pods under its wings, and of a light single-engined fighter; the tanker's scale with its
-sheet, the receiver's nose and probe with the mounting.
+Rough, and not physics: masses, inertias and forces come from the parameter sheets. Proportions are those of a
+narrow-body transport with a refuelling unit under its tail or wing, and of a light single-engined fighter or a
+long-winged unmanned aircraft; the tanker's scale with its sheet, the receiver's nose and probe with the mounting.
 
 Each piece lies in its aircraft's axes, x forward, y left, z up, origin in the centre of gravity (receiver) or at the
 middle of the wing's root (tanker). `yaw_rad` turns it about z, then `pitch_rad` about y and `roll_rad` about x.
-Not drawn: control surfaces, undercarriage, markings. Lofted meshes may take the place of these pieces.
+Left out: control surfaces, undercarriage. Within a few decimetres these are where the skins are.
 """
 
 from dataclasses import dataclass
@@ -14,9 +14,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from dockair.calibration import Mounting
+from dockair.errors import DockairError
 from dockair.rotations import Array, matrix_from_yaw_pitch_roll, quaternion_from_matrix
 
 Point = tuple[float, float, float]
+
+NOSE_BEHIND_TIP_M = 1.2  #: where the nose ends, behind the probe's tip: the boom must clear the basket
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -45,7 +48,6 @@ class Piece:
     yaw_rad: float = 0.0
     pitch_rad: float = 0.0
     roll_rad: float = 0.0
-    shade: float = 1.0  #: reflectance over the aircraft's own
 
     @property
     def q_wxyz(self) -> list[float]:
@@ -54,13 +56,11 @@ class Piece:
         return [float(c) for c in quaternion_from_matrix(R)]
 
 
-def _pair(
-    name: str, kind: str, at: Point, size: Point, *, yaw: float = 0.0, roll: float = 0.0, shade: float = 1.0
-) -> list[Piece]:
+def _pair(name: str, kind: str, at: Point, size: Point, *, yaw: float = 0.0, roll: float = 0.0) -> list[Piece]:
     """The piece on the left and its mirror image on the right."""
     x, y, z = at
-    left = Piece(f"{name}_left", kind, at, size, yaw_rad=yaw, roll_rad=roll, shade=shade)
-    right = Piece(f"{name}_right", kind, (x, -y, z), size, yaw_rad=-yaw, roll_rad=-roll, shade=shade)
+    left = Piece(f"{name}_left", kind, at, size, yaw_rad=yaw, roll_rad=roll)
+    right = Piece(f"{name}_right", kind, (x, -y, z), size, yaw_rad=-yaw, roll_rad=-roll)
     return [left, right]
 
 
@@ -75,7 +75,7 @@ def tanker_pieces(tanker: TankerParameters) -> list[Piece]:
     wing_half_length = 0.5 * half_span / np.cos(sweep)
     pod_x = exit_x + 0.5 * tanker.pod_length_m
     pod_half = 0.5 * tanker.pod_length_m - tanker.pod_radius_m
-    wing_over_pod_z = -0.45 * r + abs(exit_y) * np.tan(dihedral)
+    over_pod_z = -0.45 * r + abs(exit_y) * np.tan(dihedral) if abs(exit_y) > r else 0.0  # wing or fuselage
     return [
         Piece("fuselage", "capsule", (0.36 * length, 0.0, 0.0), (r, 0.0, 0.0), to=(-0.22 * length, 0.0, 0.0)),
         Piece("tailcone", "ellipsoid", (-0.24 * length, 0.0, 0.12 * r), (0.28 * length, 0.9 * r, 0.8 * r)),
@@ -89,41 +89,57 @@ def tanker_pieces(tanker: TankerParameters) -> list[Piece]:
             roll=dihedral,
         ),
         Piece("fin", "box", (tail_x, 0.0, 2.6 * r), (1.5, 0.12, 1.7 * r), pitch_rad=np.deg2rad(-32.0)),
-        *_pair(
-            "engine", "ellipsoid", (2.2, 0.36 * half_span, -1.25 * r), (2.3, 1.0, 1.0), yaw=0.0, roll=0.0, shade=0.7
-        ),
-        *_pair("pylon", "box", (1.0, 0.36 * half_span, -0.72 * r), (1.4, 0.12, 0.5), shade=0.8),
+        *_pair("engine", "ellipsoid", (2.2, 0.36 * half_span, -1.25 * r), (2.3, 1.0, 1.0), yaw=0.0, roll=0.0),
+        *_pair("pylon", "box", (1.0, 0.36 * half_span, -0.72 * r), (1.4, 0.12, 0.5)),
         Piece(
             "pod",
             "capsule",
             (pod_x + pod_half, exit_y, exit_z),
             (tanker.pod_radius_m, 0.0, 0.0),
             to=(pod_x - pod_half, exit_y, exit_z),
-            shade=0.8,
         ),
         Piece(
             "pod_pylon",
             "box",
-            (pod_x + 0.2, exit_y, 0.5 * (exit_z + wing_over_pod_z)),
-            (0.9, 0.09, 0.5 * abs(wing_over_pod_z - exit_z)),
-            shade=0.8,
+            (pod_x + 0.2, exit_y, 0.5 * (exit_z + over_pod_z)),
+            (0.9, 0.09, 0.5 * abs(over_pod_z - exit_z)),
         ),
     ]
 
 
-def receiver_pieces(mounting: Mounting) -> list[Piece]:
-    """Outline of the receiver in body axes B, without its probe. The nose ends 1.2 m behind the probe's tip."""
-    nose_x = float(mounting.p_BP[0]) - 1.2
+def receiver_pieces(mounting: Mounting, outline: str = "fighter") -> list[Piece]:
+    """Outline of the receiver in body axes B, without its probe: "fighter" or "unmanned".
+
+    Raises:
+        DockairError: another outline.
+    """
+    kinds = {"fighter": _fighter, "unmanned": _unmanned}
+    if outline not in kinds:
+        raise DockairError("outline", expected="a receiver's outline", got=outline, exists=sorted(kinds))
+    return kinds[outline](float(mounting.p_BP[0]) - NOSE_BEHIND_TIP_M)
+
+
+def _fighter(nose_x: float) -> list[Piece]:
     sweep = np.deg2rad(32.0)
     return [
         Piece("fuselage_middle", "capsule", (1.6, 0.0, -0.1), (0.62, 0.0, 0.0), to=(-4.6, 0.0, -0.1)),
         # Three ellipsoids, slender toward the tip, so that the camera beside the nose looks past it
         Piece("fuselage_front", "ellipsoid", (1.4, 0.0, -0.05), (nose_x - 2.3, 0.52, 0.52)),
         Piece("fuselage_nose", "ellipsoid", (nose_x - 1.6, 0.0, -0.05), (1.6, 0.26, 0.26)),
-        Piece("fuselage_intake", "ellipsoid", (0.6, 0.0, -0.75), (2.2, 0.45, 0.42), shade=0.8),
-        Piece("canopy", "ellipsoid", (1.1, 0.0, 0.42), (1.5, 0.36, 0.5), shade=0.4),
-        Piece("nozzle", "capsule", (-5.0, 0.0, -0.1), (0.5, 0.0, 0.0), to=(-5.6, 0.0, -0.1), shade=0.4),
+        Piece("fuselage_intake", "ellipsoid", (0.6, 0.0, -0.75), (2.2, 0.45, 0.42)),
+        Piece("canopy", "ellipsoid", (1.1, 0.0, 0.42), (1.5, 0.36, 0.5)),
+        Piece("nozzle", "capsule", (-5.0, 0.0, -0.1), (0.5, 0.0, 0.0), to=(-5.6, 0.0, -0.1)),
         *_pair("wing", "box", (-1.6, 2.5, -0.1), (1.2, 2.0, 0.05), yaw=0.5 * sweep),
         *_pair("tailplane", "box", (-5.4, 1.6, -0.1), (0.7, 1.0, 0.04), yaw=0.5 * sweep),
         Piece("fin", "box", (-4.9, 0.0, 1.5), (0.9, 0.05, 1.3), pitch_rad=-sweep),
+    ]
+
+
+def _unmanned(nose_x: float) -> list[Piece]:
+    return [
+        Piece("fuselage_middle", "capsule", (1.6, 0.0, 0.0), (0.48, 0.0, 0.0), to=(-4.8, 0.0, 0.0)),
+        Piece("fuselage_nose", "ellipsoid", (nose_x - 2.6, 0.0, 0.0), (2.6, 0.5, 0.48)),
+        *_pair("wing", "box", (-0.2, 5.0, 0.4), (0.55, 4.8, 0.08), yaw=np.deg2rad(2.0), roll=np.deg2rad(1.0)),
+        *_pair("tail", "box", (-4.6, 1.25, 0.92), (0.45, 1.3, 0.04), yaw=np.deg2rad(12.0), roll=np.deg2rad(36.0)),
+        Piece("fin", "box", (-4.9, 0.0, -0.65), (0.35, 0.04, 0.45), pitch_rad=np.deg2rad(30.0)),
     ]

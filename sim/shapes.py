@@ -1,4 +1,4 @@
-"""The primitives of a compiled model, body by body, for whoever draws the world without MuJoCo's renderer.
+"""The visible geoms of a compiled model, body by body, for whoever draws the world without MuJoCo's renderer.
 
 Only geometry and grey value; what moves is the bodies' poses, which `Truth` holds.
 """
@@ -10,6 +10,7 @@ import numpy as np
 
 from dockair.rotations import Array
 
+_VISIBLE_GROUPS = np.array([True, True, True, False, False, False])  # MuJoCo's own default
 _KINDS = {
     mujoco.mjtGeom.mjGEOM_SPHERE: "ellipsoid",
     mujoco.mjtGeom.mjGEOM_CAPSULE: "capsule",
@@ -36,8 +37,9 @@ class Shape:
 
 
 def shapes_of(model: mujoco.MjModel) -> list[Shape]:
-    """Return every geom that can be drawn, in the model's order; planes and height fields are left out."""
-    return [_shape(model, i) for i in range(model.ngeom) if mujoco.mjtGeom(model.geom_type[i]) in _KINDS]
+    """Return every geom that is drawn, in the model's order; planes and height fields are left out."""
+    visible = _VISIBLE_GROUPS[model.geom_group] & (model.geom_rgba[:, 3] > 0.0)
+    return [_shape(model, int(i)) for i in np.flatnonzero(visible) if mujoco.mjtGeom(model.geom_type[i]) in _KINDS]
 
 
 def _shape(model: mujoco.MjModel, i: int) -> Shape:

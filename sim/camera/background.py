@@ -37,8 +37,8 @@ __all__ = ["Background", "available_backend"]
 class Heaven(Shines, Protocol):
     """What is asked of a sky: `dockair.sim.camera.sky.Sky`."""
 
-    def fill(self, out: NDArray[np.float32], R_WC: Array, x: Array, y: Array) -> None:
-        """Fill (rows, columns) relative radiance in the directions (1, -x, -y) of the camera's axes."""
+    def fill(self, out: NDArray[np.float32], R_WC: Array, x: Array, y: Array, place_m: Array | None = None) -> None:
+        """Fill (rows, columns) relative radiance in the directions (1, -x, -y) of the camera's axes from a place."""
         ...
 
     def airlight(self, direction_W: Array) -> float:
@@ -93,6 +93,7 @@ class Background:
         stray: CoarseGrid | None = None,
         dirt: CoarseGrid | None = None,
         extinction_1_m: float = 0.0,
+        place_m: Array | None = None,
     ) -> NDArray[np.float32]:
         """Return (rows, columns) expected electrons of the window, a new array.
 
@@ -104,6 +105,7 @@ class Background:
             stray: electrons added to them; holds the window.
             dirt: factor on both; holds the window.
             extinction_1_m: of the haze before the solids.
+            place_m: (3,) of the camera in axes that stay with the air, for what passes below; None is their origin.
 
         Raises:
             MachineError: backend "mujoco", and no off-screen OpenGL here.
@@ -114,7 +116,7 @@ class Background:
         drawn = blocks.drawn_for(extent)
         x, y = blocks.tangents(drawn)
         picture = self._memory[: math.prod(drawn.shape)].reshape(drawn.shape)
-        self._sky.fill(picture, pose[0], x, y)
+        self._sky.fill(picture, pose[0], x, y, place_m)
         self._solids.draw(picture, data, pose, x, y, haze)
         picture = blocks.to_sensor(picture, drawn, extent)
         return blocks.to_pixels(picture, extent, window, white_e, stray, dirt)

@@ -79,6 +79,7 @@ class NearInfraredCamera:
             are lit from above, but there is no disc, glint or stray light. For no light there is the weather's night.
         weather: clouds, haze, night.
         altitude_m: of the flight.
+        airspeed_m_s: of W along its x through the air: clouds and ground below pass by; 0 is for scenes that stand.
         faults: what breaks, and when.
         automatic_exposure: whether the camera sets its exposure itself.
         background: "mujoco", "analytic", or "auto" for the first that this machine has.
@@ -94,6 +95,7 @@ class NearInfraredCamera:
         sun_direction_W: Array | None,
         weather: Weather | None = None,
         altitude_m: float = 6000.0,
+        airspeed_m_s: float = 0.0,
         faults: Faults | None = None,
         automatic_exposure: bool = True,
         background: str = "auto",
@@ -101,7 +103,7 @@ class NearInfraredCamera:
         weather = weather or Weather()
         self._sheets, self._as_built, self._noise = sheets, as_built, noise
         self._faults = faults or Faults((), len(as_built.led_intensity_w_sr))
-        self._receiver = model.body("receiver").id
+        self._receiver, self._airspeed_m_s = model.body("receiver").id, airspeed_m_s
         camera = as_built.camera
         elevation = np.pi / 2.0 if sun_direction_W is None else float(np.arcsin(sun_direction_W[2]))
         self._response = responses(
@@ -235,14 +237,16 @@ class NearInfraredCamera:
     ) -> NDArray[np.float32]:
         """Return (rows, columns) expected electrons of sky and scene alone, with stray light and dirt if given."""
         exposure_s = self.exposure_s() if exposure_s is None else exposure_s
+        pose = self.pose(data)
         return self._background.electrons(
             data,
-            self.pose(data),
+            pose,
             window,
             self._response.white_e_s * exposure_s,
             stray=stray,
             dirt=None if dirt is None else dirt.grid,
             extinction_1_m=self._extinction_1_m,
+            place_m=pose[1] + np.array([self._airspeed_m_s * data.time, 0.0, 0.0]),
         )
 
     def _sun_in_view(self, data: mujoco.MjData, pose: tuple[Array, Array]) -> tuple[Array, float]:

@@ -8,10 +8,10 @@ because the light's ambient part is (ambient, 0, 1), its direct part (direct, 0,
 colour (rho, 0, 1).
 So a solid in the dark still hides the sky.
 
-The frustum is off-centre, on the outer edges of the blocks asked for. Every solid is one of a few unit meshes
-(ball, tube, cube), stretched; how finely they are cut follows the solid's size in the picture, so that an outline is
-off by a quarter of a block at most, up to a radius of 160 blocks. The meshes' radius is that of the polygon whose
-outline is right in the mean. What lies outside the frustum is left out.
+The frustum is off-centre, on the outer edges of the blocks asked for. Every solid is a patch of one of the model's
+meshes, or one of a few unit meshes (ball, tube, cube), stretched; how finely they are cut follows the solid's size in
+the picture, so that an outline is off by a quarter of a block at most, up to a radius of 160 blocks. Their radius is
+that of the polygon whose outline is right in the mean. What lies outside the frustum is left out.
 
 The scene is shifted so that the lens is its origin, in double precision, before OpenGL's single precision sees it.
 Not modelled: more than 256 grey levels, more than one sample a block (edges are steps of a block). Capsules up to
@@ -28,14 +28,16 @@ from numba import njit
 from numpy.typing import NDArray
 
 from dockair.rotations import Array
+from dockair.sim.camera.meshes import Meshes
 from dockair.sim.camera.solids import BALL, BOX, CAPSULE, Haze, Lighting, Solids, depth_limits_m
-from dockair.sim.camera.unit_meshes import BALLS, CUBE, ENDS, LEVELS, TUBES, unit_meshes
+from dockair.sim.camera.unit_meshes import BALLS, CUBE, ENDS, LEVELS, OTHERS, TUBES, unit_meshes
 from dockair.sim.off_screen import Canvas
 
 _ROUND_END_BLOCKS = 6.0  # radius from which a capsule gets its round ends
 _FLAT_END = 0.25 * math.pi  # length of a flat end that covers the area of a round one, in radii
 _NEAR = 4  # which of the frustum's planes
 _HALF_LEVEL = 128  # of 256: blue is 0 or 255
+_MESH = OTHERS  # this kind and those after it: the model's meshes, one after the other
 
 
 class DrawnSolids:
@@ -56,7 +58,14 @@ class DrawnSolids:
     def __init__(
         self, model: mujoco.MjModel, lighting: Lighting, blocks_per_tangent: float, most: tuple[int, int]
     ) -> None:
-        self._solids, self._lighting, self._most = Solids.of(model), lighting, most
+        self._lighting, self._most = lighting, most
+        s, m = Solids.of(model), Meshes.of(model)
+        self._skins = [m.one(k) for k in range(len(m.geoms))]
+        self._geoms_drawn = np.concatenate([s.geoms, m.geoms])
+        self._middles_m = np.vstack([np.zeros((len(s.geoms), 3)), m.centres_m])
+        around = np.column_stack([m.radii_m, np.ones((len(m.geoms), 2))])
+        kinds, half_sizes_m = np.append(s.kinds, _MESH + np.arange(len(m.geoms))), np.vstack([s.half_sizes_m, around])
+        self._table = kinds, half_sizes_m, np.append(s.reflectances, m.reflectances)
         self._limits_m, self._scale = depth_limits_m(model), blocks_per_tangent
         self._full = max(lighting.ambient + lighting.direct, np.finfo(float).tiny)  # of a white solid facing the Sun
         self._canvas: Canvas | None = None
@@ -84,7 +93,7 @@ class DrawnSolids:
             MachineError: no off-screen OpenGL here.
         """
         R_WC, p_WC = pose
-        if len(self._solids.geoms) == 0:
+        if len(self._geoms_drawn) == 0:
             return
         if self._canvas is None:
             self._open()
@@ -107,11 +116,10 @@ class DrawnSolids:
         self._canvas = None
 
     def _open(self) -> None:
-        meshes = unit_meshes()
+        meshes = unit_meshes(self._skins)
         rows, columns = self._most
         self._canvas = Canvas(meshes, columns, rows, "camera")
-        s = self._solids
-        most = len(s.geoms) + 2 * int((s.kinds == CAPSULE).sum())
+        most = len(self._geoms_drawn) + 2 * int((self._table[0] == CAPSULE).sum())
         self._scene = mujoco.MjvScene(meshes, most)
         for flag in ("SHADOW", "REFLECTION", "SKYBOX", "HAZE", "FOG"):
             self._scene.flags[getattr(mujoco.mjtRndFlag, f"mjRND_{flag}")] = 0
@@ -136,15 +144,16 @@ class DrawnSolids:
 
     def _arrange(self, data: mujoco.MjData, R_WC: Array, p_WC: Array, frustum: Array) -> int:
         """Put into the scene what may be seen; return how many pieces that is."""
-        s = self._solids
-        centres, axes = data.geom_xpos[s.geoms] - p_WC, data.geom_xmat[s.geoms].reshape(-1, 3, 3)
+        geoms = self._geoms_drawn
+        axes = data.geom_xmat[geoms].reshape(-1, 3, 3)
+        centres = data.geom_xpos[geoms] - p_WC + np.einsum("nij,nj->ni", axes, self._middles_m)
         near, far = self._limits_m
         left, right, top, bottom = frustum
         outward_C = [[left, 1, 0], [-right, -1, 0], [top, 0, 1], [-bottom, 0, -1], [-1, 0, 0], [1, 0, 0]]
         planes = np.column_stack([outward_C @ R_WC.T, [0.0, 0.0, 0.0, 0.0, -near, far]])
         meshes = np.empty_like(self._meshes)
         pieces = meshes, self._places, self._turns, self._colours
-        count = _pieces((s.kinds, s.half_sizes_m, s.reflectances), centres, axes, planes, self._scale, pieces)
+        count = _pieces(self._table, centres, axes, planes, self._scale, pieces)
         for i in np.flatnonzero(meshes[:count] != self._meshes[:count]):
             self._geoms[i].dataid = 2 * int(meshes[i])  # MuJoCo counts each mesh and its convex hull
         self._meshes[:count] = meshes[:count]
@@ -184,6 +193,7 @@ def _pieces(
 ) -> int:
     """Fill (mesh, place, turn, colour) of the pieces of what may be in the frustum; return how many.
 
+    A mesh's kind is its number, its first half size the radius of a ball around it.
     Planes are (outward normal, offset), the last two being the near and the far one.
     """
     kinds, half_sizes, reflectances = solids
@@ -204,7 +214,9 @@ def _pieces(
             offset = 0.0 if part == 0 else side * h[2]
             length = h[2] + _FLAT_END * h[0] if kind == CAPSULE and ends == 1 else h[2]
             size = (h[0], h[1], length) if part == 0 else (h[0], side * h[0], side * h[0])
-            if kind == BOX:
+            if kind >= _MESH:
+                meshes[count], size = kind, (1.0, 1.0, 1.0)
+            elif kind == BOX:
                 meshes[count] = CUBE
             elif part > 0:
                 meshes[count] = ENDS + level
@@ -236,6 +248,8 @@ def _along(plane: Array, p: Array) -> float:
 @njit(cache=True)
 def _reach(kind: int, h: Array, M: Array, plane: Array) -> float:
     """How far a solid reaches from its centre along a plane's normal, in units of the normal's length."""
+    if kind >= _MESH:
+        return h[0] * math.sqrt(plane[0] ** 2 + plane[1] ** 2 + plane[2] ** 2)
     x = abs(M[0, 0] * plane[0] + M[1, 0] * plane[1] + M[2, 0] * plane[2])
     y = abs(M[0, 1] * plane[0] + M[1, 1] * plane[1] + M[2, 1] * plane[2])
     z = abs(M[0, 2] * plane[0] + M[1, 2] * plane[1] + M[2, 2] * plane[2])

@@ -2,18 +2,17 @@
 
     balls     spheres and ellipsoids, and the round ends of capsules                       doubly curved
     tubes     the sides of cylinders and capsules                                          curved once
-    facets    the faces of boxes, the flat ends of cylinders, flat ellipsoids in tiles     (nearly) flat
+    facets    the faces of boxes, the flat ends of cylinders, flat ellipsoids in tiles,
+              the triangles of meshes                                                      (nearly) flat
     rim       the basket's rim, which the scene draws as straight capsules, as one torus
 
 An ellipsoid with half-axes a >= b >= c is flat when its middle is so little curved that a rough surface's slopes reach
 as far as the body does; then no single point stands for the glint of its two sides, and they are cut into tiles. Its
-edge remains a ball.
+edge remains a ball. How all these are cut, `tiles` says.
 
-A material follows from the geom's name. Not modelled: meshes, planes, height fields.
-Sources: do Carmo, Differential Geometry of Curves and Surfaces, section 3-3 (second fundamental form of a tile).
+A material follows from the geom's name. Not modelled: planes, height fields.
 """
 
-import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -22,26 +21,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dockair.rotations import Array
+from dockair.sim.camera.meshes import mesh_of
 from dockair.sim.camera.sheets import SurfaceParameters
 from dockair.sim.camera.solids import VISIBLE_GROUPS
+from dockair.sim.camera.tiles import EDGE_COS, Tile, ellipsoid_tiles, face, is_flat, triangle_tile
 
 PAINT, METAL, RUBBER, GLASS = range(4)
 RIM_GEOMS = "basket_rim"  #: how the names of the rim's pieces begin
 _MATERIALS = {"basket_": METAL, "coupling_": METAL, "probe_": METAL, "hose_": RUBBER, "led_housing_": RUBBER}
-_GLASS_GEOM = "canopy"  # the receiver's; the drogue's are canopy_0, canopy_1, ...
+_GLASS_GEOM = "skin_canopy"  # the receiver's; the drogue's are canopy_0, canopy_1, ...
 _NEAR_LEDS = ("basket_rib", "coupling_", "probe_")  # what the LEDs shine on from nearby
-_FLAT_RATIO = 10.0  # of an ellipsoid's longest to its shortest half-axis
-_TILE_M = 0.5  # tiles of flat faces are no longer than this, up to _MOST_TILES a side
-_MOST_TILES = 12
-_TILES_ALONG, _TILES_AROUND = 20, 32  # of a flat ellipsoid
-_EDGE_COS = math.cos(0.4)  # of the angle between normal and thin axis where its edge begins
-_THINNEST_M = 0.02  # faces narrower than this are edges
 _SKIN_M = 1e-3  # a ray that starts on a surface starts this far off it
 
 _G = mujoco.mjtGeom
 Vector = tuple[float, float, float]
-#: A tile's frame, half sides and curvature, as in `Facets`.
-Tile = tuple[Array, tuple[float, float], Vector]
 
 
 class Balls(NamedTuple):
@@ -195,68 +188,24 @@ def _facets(model: mujoco.MjModel, i: int) -> list[Tile]:
     """Frame, half sides and curvature of each tile of geom i."""
     kind, size = model.geom_type[i], np.array(model.geom_size[i])
     if kind == _G.mjGEOM_BOX:
-        return [tile for axis in range(3) for side in (1.0, -1.0) for tile in _face(size, axis, side)]
+        return [tile for axis in range(3) for side in (1.0, -1.0) for tile in face(size, axis, side)]
     if kind == _G.mjGEOM_CYLINDER:  # a disc as the square of its area
         half = 0.5 * np.sqrt(np.pi) * size[0]
         box = np.array([half, half, size[1]])
-        return [tile for side in (1.0, -1.0) for tile in _face(box, 2, side)]
-    if kind == _G.mjGEOM_ELLIPSOID and _is_flat(size):
-        return _ellipsoid_tiles(size)
+        return [tile for side in (1.0, -1.0) for tile in face(box, 2, side)]
+    if kind == _G.mjGEOM_ELLIPSOID and is_flat(size):
+        return ellipsoid_tiles(size)
+    if kind == _G.mjGEOM_MESH:
+        corners, normals, triangles = mesh_of(model, int(model.geom_dataid[i]))
+        return [triangle_tile(corners[t], normals[t]) for t in triangles]
     return []
-
-
-def _is_flat(axes: Array) -> bool:
-    return bool(axes.max() > _FLAT_RATIO * axes.min())
-
-
-def _face(half: Array, axis: int, side: float) -> list[Tile]:
-    """The face of a box across one axis, in tiles."""
-    one, two = (axis + 1) % 3, (axis + 2) % 3
-    if min(half[one], half[two]) < 0.5 * _THINNEST_M:
-        return []
-    counts = [int(np.clip(np.ceil(2.0 * half[k] / _TILE_M), 1, _MOST_TILES)) for k in (one, two)]
-    sides = half[one] / counts[0], half[two] / counts[1]
-    frame = np.zeros((4, 3))
-    frame[0, axis], frame[1, axis], frame[2, one], frame[3, two] = side * half[axis], side, 1.0, 1.0
-    tiles: list[Tile] = []
-    for j in range(counts[0]):
-        for k in range(counts[1]):
-            placed = frame.copy()
-            placed[0, one], placed[0, two] = (2 * j + 1) * sides[0] - half[one], (2 * k + 1) * sides[1] - half[two]
-            tiles.append((placed, sides, (0.0, 0.0, 0.0)))
-    return tiles
-
-
-def _ellipsoid_tiles(axes: Array) -> list[Tile]:
-    """An ellipsoid cut along its longest axis, and around it."""
-    order = np.argsort(-axes)
-    longest, across, thin = (np.eye(3)[k] * axes[k] for k in order)
-    step_b, step_a = np.pi / _TILES_ALONG, 2.0 * np.pi / _TILES_AROUND
-    tiles: list[Tile] = []
-    for b in (np.arange(_TILES_ALONG) + 0.5) * step_b - 0.5 * np.pi:
-        for a in (np.arange(_TILES_AROUND) + 0.5) * step_a:
-            around = np.cos(a) * thin + np.sin(a) * across
-            p = np.cos(b) * around + np.sin(b) * longest
-            along_b = -np.sin(b) * around + np.cos(b) * longest
-            along_a = np.cos(b) * (-np.sin(a) * thin + np.cos(a) * across)
-            gradient = p / axes**2
-            n = gradient / np.linalg.norm(gradient)
-            if abs(n[order[2]]) < _EDGE_COS:
-                continue
-            t1 = along_b / np.linalg.norm(along_b)
-            t2 = np.cross(n, t1)
-            area = float(np.linalg.norm(np.cross(along_a, along_b))) * step_a * step_b
-            half = 0.5 * float(np.linalg.norm(along_b)) * step_b
-            C = np.array([t1, t2]) @ np.diag(axes**-2.0) @ np.array([t1, t2]).T / np.linalg.norm(gradient)
-            tiles.append((np.array([p, n, t1, t2]), (half, 0.25 * area / half), (C[0, 0], C[0, 1], C[1, 1])))
-    return tiles
 
 
 def _ball_table(rows: list[tuple[int, int, Array, float, float]]) -> Balls:
     geom, material, axes, at_z, side = zip(*rows, strict=True) if rows else ((),) * 5
     table = np.reshape(axes, (-1, 3)).astype(float)
     thin = [int(np.argmin(a)) for a in table]
-    most_cos = [_EDGE_COS if _is_flat(a) else 2.0 for a in table]
+    most_cos = [EDGE_COS if is_flat(a) else 2.0 for a in table]
     return Balls(_index(geom), _index(material), table, _real(at_z), _real(side), _index(thin), _real(most_cos))
 
 

@@ -1,17 +1,20 @@
 """What hides what: rays from a point through the scene's real geometry. No OpenGL, so both backgrounds agree.
 
-Every solid is convex: a ray is in it from one distance to another, and meets it at the first of the two that is not
-behind its start; surfaces are met from inside, too. In a solid's own axes, o being the start and d the ray,
+Every solid but a mesh is convex: a ray is in it from one distance to another, and meets it at the first of the two that
+is not behind its start; surfaces are met from inside, too. In a solid's own axes, o being the start and d the ray,
 
     ball       |A^-1 (o + t d)|^2 <= 1                      A = diag of half axes                                (1)
     tube       (o + t d)_x^2 + (o + t d)_y^2 <= r^2                                                              (2)
     slab       |o + t d|_k <= h_k                                                                                (3)
 
-A box is what three slabs share, a cylinder a tube and a slab; a capsule is a cylinder and the balls at its ends.
+A box is what three slabs share, a cylinder a tube and a slab; a capsule is a cylinder and the balls at its ends. A
+triangle with corners a, b, c of a mesh is met at t, where
+
+    o + t d = a + u (b - a) + v (c - a),    u >= 0, v >= 0, u + v <= 1                                           (4)
 
 Only geoms that are drawn hide: those in a visible group and not fully transparent.
 Not modelled: partly hidden sources (a source is a point), transparent things.
-Source: Glassner (ed.), An Introduction to Ray Tracing, ch. 2.
+Sources: Glassner (ed.), An Introduction to Ray Tracing, ch. 2; Moeller & Trumbore 1997 (4).
 """
 
 import math
@@ -23,9 +26,11 @@ from numba import njit
 from numpy.typing import NDArray
 
 from dockair.rotations import Array
+from dockair.sim.camera.meshes import Meshes
 from dockair.sim.camera.solids import BALL, BOX, CAPSULE, Solids
 
 _ALONG = 1e-300  # least squared component across a tube, of a ray that does not run along it
+_ROUNDING = 1e-9  # of distances to boxes, relative and in metres
 _NOWHERE = (math.inf, -math.inf)
 
 Vector = tuple[float, float, float]
@@ -39,6 +44,7 @@ class Obstacles(NamedTuple):
     kinds: NDArray[np.int64]  #: (n,) as of `solids`
     half_sizes_m: Array  #: (n, 3) as of `solids`
     radii_m: Array  #: (n,) of a ball around each
+    meshes: Meshes
 
     @classmethod
     def of(cls, model: mujoco.MjModel) -> "Obstacles":
@@ -48,7 +54,9 @@ class Obstacles(NamedTuple):
             DockairError: the model has a visible geom that is no solid.
         """
         s = Solids.of(model)
-        return cls(s.geoms.astype(np.int64), s.kinds, s.half_sizes_m, np.array(model.geom_rbound[s.geoms]))
+        return cls(
+            s.geoms.astype(np.int64), s.kinds, s.half_sizes_m, np.array(model.geom_rbound[s.geoms]), Meshes.of(model)
+        )
 
 
 def is_clear(obstacles: Obstacles, data: mujoco.MjData, p_W: Array, direction_W: Array, distance_m: float) -> bool:
@@ -85,6 +93,7 @@ def first_hits(obstacles: Obstacles, data: mujoco.MjData, p_W: Array, directions
     """(n,) distances along unit vectors (n, 3) to the nearest surface [m]; -1 for none within `reach`."""
     out = np.full(len(directions), reach)
     _cast(obstacles, data.geom_xpos, data.geom_xmat, p_W, directions, out)
+    _cast_at_meshes(obstacles.meshes, data.geom_xpos, data.geom_xmat, p_W, directions, out)
     out[out == reach] = -1.0
     return out
 
@@ -105,6 +114,67 @@ def _cast(obstacles: Obstacles, xpos: Array, xmat: Array, p: Array, directions: 
             at = start if start >= 0.0 else stop
             if start <= stop and 0.0 <= at < nearest[i]:
                 nearest[i] = at
+
+
+@njit(cache=True)
+def _cast_at_meshes(meshes: Meshes, xpos: Array, xmat: Array, p: Array, directions: Array, nearest: Array) -> None:
+    """The same for meshes."""
+    for k in range(len(meshes.geoms)):
+        g, radius = meshes.geoms[k], meshes.radii_m[k]
+        M, m = xmat[g], meshes.centres_m[k]
+        o = _into(M, (p[0] - xpos[g, 0], p[1] - xpos[g, 1], p[2] - xpos[g, 2]))
+        x, y, z = m[0] - o[0], m[1] - o[1], m[2] - o[2]
+        square = x * x + y * y + z * z
+        for i in range(len(nearest)):
+            ray = _into(M, (directions[i, 0], directions[i, 1], directions[i, 2]))
+            along = x * ray[0] + y * ray[1] + z * ray[2]
+            if square - along * along > radius * radius or along + radius < 0.0 or along - radius > nearest[i]:
+                continue
+            for run in range(meshes.first_run[k], meshes.first_run[k + 1]):
+                if _meets_box(meshes.run_box_m[run], o, ray, nearest[i]):
+                    for t in range(meshes.run_start[run], meshes.run_start[run + 1]):
+                        nearest[i] = min(nearest[i], _meets_triangle(meshes, t, o, ray))
+
+
+@njit(cache=True)
+def _meets_box(box: Array, o: Vector, d: Vector, reach: float) -> bool:
+    start, stop = 0.0, reach
+    for k in range(3):
+        if d[k] == 0.0:
+            if not box[0, k] <= o[k] <= box[1, k]:
+                return False
+            continue
+        one, other = (box[0, k] - o[k]) / d[k], (box[1, k] - o[k]) / d[k]
+        start, stop = max(start, min(one, other)), min(stop, max(one, other))
+    return start <= stop * (1.0 + _ROUNDING) + _ROUNDING
+
+
+@njit(cache=True)
+def _meets_triangle(meshes: Meshes, t: int, o: Vector, d: Vector) -> float:
+    """Distance, Eq. (4); infinity for a miss."""
+    a, b, c = (
+        meshes.corners_m[meshes.triangles[t, 0]],
+        meshes.corners_m[meshes.triangles[t, 1]],
+        meshes.corners_m[meshes.triangles[t, 2]],
+    )
+    p, q = (b[0] - a[0], b[1] - a[1], b[2] - a[2]), (c[0] - a[0], c[1] - a[1], c[2] - a[2])
+    from_a = (o[0] - a[0], o[1] - a[1], o[2] - a[2])
+    across, turned = _cross(d, q), _cross(from_a, p)
+    det = _dot(p, across)
+    if det == 0.0:
+        return math.inf
+    u, v, at = _dot(from_a, across) / det, _dot(d, turned) / det, _dot(q, turned) / det
+    return at if u >= 0.0 and v >= 0.0 and u + v <= 1.0 and at >= 0.0 else math.inf
+
+
+@njit(cache=True)
+def _cross(a: Vector, b: Vector) -> Vector:
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@njit(cache=True)
+def _dot(a: Vector, b: Vector) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @njit(cache=True)

@@ -219,6 +219,9 @@ class SkyParameters:
     ground_reflectance: float
     ground_contrast: float
     ground_cell_m: float
+    water_cover: float
+    water_reflectance: float
+    coast_cell_m: float
     aerosol_optical_depth: float
     aerosol_scale_m: float
     haze_depth_m: float

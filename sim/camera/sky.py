@@ -1,7 +1,7 @@
 """What is infinitely far away: clear sky, cloud above with gaps, cloud deck and ground below, haze, night.
 
-Relative radiance, 1 = a white Lambertian surface in normal sunlight, as a function of the direction in W alone: c is
-the cosine of the angle X from the Sun, s the sine of the elevation.
+Relative radiance, 1 = a white Lambertian surface in normal sunlight, toward a direction in W: c is the cosine of the
+angle X from the Sun, s the sine of the elevation.
 
     J(c) = airlight f,   f = 1 + a (exp(-d X) - exp(-d pi/2)) + e c^2                                           (1)
     clear sky   J (1 - exp(-b m)),   b = -ln(1 - zenith/airlight),   m = 1/(|s| + 0.025 exp(-11 |s|))              (2)
@@ -17,48 +17,39 @@ endless air at 90 degrees from the Sun are the sheet's. w is the thickness of cl
 slant paths finite where a layer is seen edge-on. J' has less Sun in it where cloud shades the air (mean of the
 layer); J_h less where the haze itself does. The light that cloud sends down is `clouds`.
 
-Nothing here moves: W goes with the tanker, and in the minutes of a docking the clouds stay where they are.
-Not modelled: twilight, moon, vapour trails, shadows on the deck, polarisation; cloud at flight level but as haze. Cloud
-above is one layer that starts over the aircraft; within it, or under the deck's top, this is not valid.
+Deck and ground stay where they are as the camera passes over them (`layer_table`); land is patches of all sizes, darker
+and lighter, and water. What is above goes along with the camera, as W does.
+Not modelled: wind, twilight, moon, vapour trails, shadows on the deck, polarisation; cloud at flight level but as haze.
+Cloud above is one layer that starts over the aircraft; within it, or under the deck's top, this is not valid.
 Sources: ISO 15469 (CIE S 011), sky type 12; Rozenberg 1966 (air mass at the horizon); 3.912/V as in radiometry (7).
 """
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import ndtri
 
-from dockair.errors import DockairError
 from dockair.rotations import Array
 from dockair.sim.camera.clouds import Droplets, Texture, optical_depth
+from dockair.sim.camera.earth import air_mass, dip_sine, meet_sphere, unit
+from dockair.sim.camera.layer_table import LayerTable, columns_below, lay_under
 from dockair.sim.camera.radiometry import extinction_1_m
 from dockair.sim.camera.sheets import SkyParameters
 from dockair.sim.camera.sky_table import DirectionTable
+from dockair.sim.camera.weather import Weather
+
+__all__ = ["Sky", "Weather"]
 
 _TILES = 48  # of the table, a side
 _NODE_RAD = 2.0 / (64 * _TILES)
+_LAYER_TILES = 32  # of the tables of deck and ground
+_LAYER_NODE_RAD = 2.0 / (64 * _LAYER_TILES)
 _OVERHEAD = (0.0, 0.0, 1.0)
-_LAYERS = 0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0xD6E8FEB86659FD93  # keys apart: cloud above, deck, ground
+#: Keys apart: cloud above, deck, ground, coasts.
+_LAYERS = 0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0xD6E8FEB86659FD93, 0xA0761D6478BD642F
+_COAST = 0.1  # standard deviations of the noise over which land turns into water
 _AMBIENT_DIRECTIONS = 1024
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Weather:
-    """The flight's weather, as the scenario says."""
-
-    cloud_cover: float = 0.0  #: share of the layer above that is cloud, 0 to 1
-    cloud_optical_depth: float = 8.0  #: mean where there is cloud, straight through
-    visibility_m: float = 100e3  #: at flight level
-    night: bool = False
-
-    def __post_init__(self) -> None:
-        if not 0.0 <= self.cloud_cover <= 1.0:
-            raise DockairError("weather.cloud_cover", expected="0 to 1", got=self.cloud_cover)
-        if not 0.0 <= self.cloud_optical_depth < math.inf:
-            raise DockairError("weather.cloud_optical_depth", expected="a depth >= 0", got=self.cloud_optical_depth)
-        if not self.visibility_m > 0.0:
-            raise DockairError("weather.visibility_m", expected="a distance > 0 m", got=self.visibility_m)
 
 
 class Sky:
@@ -85,8 +76,8 @@ class Sky:
         self._droplets = Droplets(
             asymmetry=p.cloud_asymmetry, size_parameter=2.0 * math.pi * p.droplet_radius_m / p.wavelength_m
         )
-        cells = p.cloud_cell_m, p.deck_cell_m, p.ground_cell_m
-        self._above, self._deck, self._ground = (
+        cells = p.cloud_cell_m, p.deck_cell_m, p.ground_cell_m, p.coast_cell_m
+        self._above, self._deck, self._ground, self._coasts = (
             Texture(key=key ^ layer, cell_m=cell, spectral_exponent=p.cloud_spectral_exponent)
             for layer, cell in zip(_LAYERS, cells, strict=True)
         )
@@ -95,30 +86,53 @@ class Sky:
         excess = extinction_1_m(weather.visibility_m) - extinction_1_m(p.clear_visibility_m)
         self._haze_depth = max(excess, 0.0) * p.haze_depth_m
         self._shade()
-        self._table = DirectionTable(self.radiance, _TILES)
+        self._table = DirectionTable(self._upward, _TILES)
+        top_m = self._top_m = p.deck_top_m if self._has_deck else 0.0  # of what is met first from above
+        self._ground_table = LayerTable(self._below, _LAYER_TILES, 1, altitude_m, p.earth_radius_m)
+        self._deck_table = LayerTable(self._over, _LAYER_TILES, 2, altitude_m - top_m, p.earth_radius_m + top_m)
         self.ambient = self._ambient()  #: mean relative radiance of all directions: what lights the Sun's lee
 
-    def fill(self, out: NDArray[np.float32], R_WC: Array, x: Array, y: Array) -> None:
-        """Write the relative radiance toward (1, -x_j, -y_i), C axes, into out (rows, columns)."""
+    def fill(self, out: NDArray[np.float32], R_WC: Array, x: Array, y: Array, place_m: Array | None = None) -> None:
+        """Write what is seen in directions of the camera's axes.
+
+        Args:
+            out: (rows, columns) relative radiance toward (1, -x_j, -y_i), written.
+            R_WC: attitude of the camera.
+            x: (columns,) evenly spaced and rising.
+            y: (rows,) evenly spaced.
+            place_m: (3,) where it has come to since the start, in axes that stay with the air; None is the start.
+        """
         if self._weather.night:
             out[:] = self._p.night
-        else:
-            self._table.fill(out, R_WC, x, y)
+            return
+        place = np.zeros(3) if place_m is None else np.asarray(place_m, dtype=float)
+        R, x, y = np.ascontiguousarray(R_WC, dtype=float), np.asarray(x, dtype=float), np.asarray(y, dtype=float)
+        below = np.empty((len(y), 2), dtype=np.int64)
+        height_m = self._altitude_m + float(place[2]) - self._top_m
+        columns_below(R, x, y, dip_sine(self._p.earth_radius_m + self._top_m, height_m), below)
+        partly = np.flatnonzero((below[:, 0] > 0) | (below[:, 1] < len(x)))
+        if len(partly) > 0:
+            rows = slice(int(partly[0]), int(partly[-1]) + 1)
+            self._table.fill(out[rows], R, x, y[rows])
+        if np.any(below[:, 0] < below[:, 1]):
+            ground = self._ground_table.nodes(place, R, x, y, below)
+            deck = self._deck_table.nodes(place, R, x, y, below) if self._has_deck else ground
+            lay_under(out, R, x, y, below, ground, deck, self._has_deck)
 
     def beam(self, directions_W: Array) -> Array:
         """Return (n,) transmittance of cloud and haze for sunlight from (n, 3) directions; 1 without either."""
-        d = _unit(directions_W)
+        d = unit(directions_W)
         if self._weather.night:
             return np.zeros(len(d))
         mu = self._slope(d) / (1.0 + self._p.cloud_aspect)
-        through = np.exp(-self._depth_above(d) / mu - self._haze_depth * _air_mass(d[:, 2]))
-        return np.where(self._surface(d[:, 2], self._altitude_m)[0], 0.0, through)
+        through = np.exp(-self._depth_above(d) / mu - self._haze_depth * air_mass(d[:, 2]))
+        return np.where(self._surface(d[:, 2], 0.0)[0], 0.0, through)
 
     def airlight(self, direction_W: Array) -> float:
         """Return the relative radiance of endless haze toward a direction (3,): what far objects fade into."""
         if self._weather.night:
             return self._p.night
-        d = _unit(np.asarray(direction_W, dtype=float)[None])
+        d = unit(np.asarray(direction_W, dtype=float)[None])
         return float(self._haze(d @ self._sun)[0])
 
     @property
@@ -128,23 +142,44 @@ class Sky:
         return self.ambient / (self.ambient + direct)
 
     def radiance(self, directions_W: Array) -> Array:
-        """Return (n,) relative radiances toward (n, 3) directions: what `fill` reads between nodes of a table."""
-        return self._radiance(_unit(directions_W), with_aureole=True)
+        """Return (n,) relative radiances toward (n, 3) directions at the start: what `fill` reads between nodes."""
+        return self._radiance(unit(directions_W), with_aureole=True)
 
     def _radiance(self, d: Array, with_aureole: bool) -> Array:
         if self._weather.night:
             return np.full(len(d), self._p.night)
-        cosine = np.clip(d[:, 0] * self._sun[0] + d[:, 1] * self._sun[1] + d[:, 2] * self._sun[2], -1.0, 1.0)
-        out = np.empty(len(d))
-        ground = self._surface(d[:, 2], self._altitude_m)[0]
-        up, down = np.flatnonzero(~ground), np.flatnonzero(ground)
-        out[up] = self._sky(d[up], cosine[up], with_aureole)
-        out[down] = self._land(d[down], cosine[down])
+        out, here = self._upward(d, with_aureole), np.zeros(3)
+        down = np.flatnonzero(self._surface(d[:, 2], self._top_m)[0])
+        out[down] = self._below(d[down], here)[:, 0]
         if self._has_deck:
-            seen = np.flatnonzero(self._surface(d[:, 2], self._altitude_m - self._p.deck_top_m)[0])
-            out[seen] = self._with_deck(d[seen], cosine[seen], out[seen])
-        clear = np.exp(-self._haze_depth * _air_mass(d[:, 2]))
-        return np.asarray(out * clear + self._haze(cosine) * (1.0 - clear))
+            light, clear = self._over(d[down], here).T
+            out[down] = light + clear * out[down]
+        return out
+
+    def _upward(self, d: Array, with_aureole: bool = True) -> Array:
+        """Sky behind haze; where there is a layer, as if there were none."""
+        return self._behind_haze(self._sky(d, self._cosine(d), with_aureole), d)
+
+    def _below(self, d: Array, key_m: Array) -> Array:
+        """(n, 1) ground from a place; sky where a ray passes it. Behind haze, but for when a deck is before it."""
+        cosine = self._cosine(d)
+        out = self._sky(d, cosine, with_aureole=True)
+        down = np.flatnonzero(self._surface(d[:, 2], 0.0, float(key_m[2]))[0])
+        out[down] = self._land(d[down], cosine[down], key_m)
+        return (out if self._has_deck else self._behind_haze(out, d))[:, None]
+
+    def _over(self, d: Array, key_m: Array) -> Array:
+        """(n, 2) light of the deck from a place, behind haze, and transmittance of deck, air and haze before it."""
+        light, through = self._cloud_deck(d, self._cosine(d), key_m)
+        return np.column_stack([self._behind_haze(light, d), through * np.exp(-self._haze_depth * air_mass(d[:, 2]))])
+
+    def _behind_haze(self, light: Array, d: Array) -> Array:
+        clear = np.exp(-self._haze_depth * air_mass(d[:, 2]))
+        return np.asarray(light * clear + self._haze(self._cosine(d)) * (1.0 - clear))
+
+    def _cosine(self, d: Array) -> Array:
+        s = self._sun
+        return np.clip(d[:, 0] * s[0] + d[:, 1] * s[1] + d[:, 2] * s[2], -1.0, 1.0)
 
     def _sky(self, d: Array, cosine: Array, with_aureole: bool) -> Array:
         """Clear sky, Eq. (2), and the cloud in it, Eq. (3)."""
@@ -167,33 +202,41 @@ class Sky:
             light += self._droplets.aureole(depth, mu, cosine)
         return np.asarray(front + before * light + beyond * np.exp(-depth / mu))
 
-    def _land(self, d: Array, cosine: Array) -> Array:
+    def _land(self, d: Array, cosine: Array, key_m: Array) -> Array:
         """The ground through the air under the deck's top (or under the aircraft), Eqs. (4) and (6)."""
         p = self._p
-        _, distance, mu = self._surface(d[:, 2], self._altitude_m)
-        noise = self._ground.at(d[:, 0] * distance, d[:, 1] * distance, _NODE_RAD * distance / np.sqrt(mu))
-        land = p.ground_reflectance * np.maximum(1.0 + p.ground_contrast * noise, 0.0)
+        _, distance, mu = self._surface(d[:, 2], 0.0, float(key_m[2]))
+        at = key_m[0] + d[:, 0] * distance, key_m[1] + d[:, 1] * distance, _LAYER_NODE_RAD * distance / np.sqrt(mu)
+        land = p.ground_reflectance * np.maximum(1.0 + p.ground_contrast * self._ground.at(*at), 0.0)
+        if p.water_cover > 0.0:
+            shore = float(ndtri(1.0 - p.water_cover))
+            water = np.clip(0.5 + (self._coasts.at(*at) - shore) / _COAST, 0.0, 1.0)
+            land += water * (p.water_reflectance - land)
         light = land * self._sine_sun * self._light_below
-        top = p.deck_top_m if self._has_deck else self._altitude_m
-        return self._through_air(light, d[:, 2], cosine, 0.0, top)
+        return self._through_air(light, d[:, 2], cosine, 0.0, p.deck_top_m if self._has_deck else self._altitude_m)
 
-    def _with_deck(self, d: Array, cosine: Array, below: Array) -> Array:
-        """The deck before what is below it, Eqs. (4) to (6)."""
+    def _cloud_deck(self, d: Array, cosine: Array, key_m: Array) -> tuple[Array, Array]:
+        """Light of the deck with the air before it, and the transmittance of both, Eqs. (4) to (6)."""
         p = self._p
-        _, distance, mu = self._surface(d[:, 2], self._altitude_m - p.deck_top_m)
-        noise = self._deck.at(d[:, 0] * distance, d[:, 1] * distance, _NODE_RAD * distance / np.sqrt(mu))
+        _, distance, mu = self._surface(d[:, 2], p.deck_top_m, float(key_m[2]))
+        at = key_m[0] + d[:, 0] * distance, key_m[1] + d[:, 1] * distance, _LAYER_NODE_RAD * distance / np.sqrt(mu)
+        noise = self._deck.at(*at)
         depth = optical_depth(noise, p.deck_cover, p.deck_optical_depth)
         reflectance = 1.0 - self._droplets.transmittance(depth * (1.0 + p.cloud_aspect) / (mu + p.cloud_aspect))
         facing = np.clip(self._mu_sun * (1.0 + p.cloud_aspect * noise), 0.0, 1.0)
-        light = reflectance * facing * self._light_below + (1.0 - reflectance) * below
-        return self._through_air(light, d[:, 2], cosine, p.deck_top_m, self._altitude_m)
+        light, high = reflectance * facing * self._light_below, self._altitude_m
+        clear = self._clear(d[:, 2], p.deck_top_m, high)
+        return self._through_air(light, d[:, 2], cosine, p.deck_top_m, high), (1.0 - reflectance) * clear
 
     def _through_air(self, light: Array, sine: Array, cosine: Array, low_m: float, high_m: float) -> Array:
         """Light from below through the clear air between two heights, Eq. (6)."""
+        clear = self._clear(sine, low_m, high_m)
+        return np.asarray(light * clear + self._source(cosine, self._light_below, self._direct_below) * (1.0 - clear))
+
+    def _clear(self, sine: Array, low_m: float, high_m: float) -> Array:
         p = self._p
         depth = p.aerosol_optical_depth * (math.exp(-low_m / p.aerosol_scale_m) - math.exp(-high_m / p.aerosol_scale_m))
-        clear = np.exp(-depth * _air_mass(sine))
-        return np.asarray(light * clear + self._source(cosine, self._light_below, self._direct_below) * (1.0 - clear))
+        return np.asarray(np.exp(-depth * air_mass(sine)))
 
     def _source(self, cosine: Array, light: float, direct: float) -> Array:
         """J of Eq. (1) in air that `light` of all sunlight reaches, `direct` of that as a beam."""
@@ -214,13 +257,13 @@ class Sky:
         self._light_below = 1.0 - cover + cover * float(self._droplets.transmittance(np.asarray(depth)))
         self._direct_below = (1.0 - cover + cover * math.exp(-0.5 * depth / self._mu_sun)) / self._light_below
         self._has_deck = self._p.deck_cover > 0.0 and self._altitude_m > self._p.deck_top_m
-        beam = math.exp(-self._haze_depth * float(_air_mass(self._sun[2:])[0]))
+        beam = math.exp(-self._haze_depth * float(air_mass(self._sun[2:])[0]))
         through = float(self._droplets.transmittance(np.asarray(self._haze_depth)))
         self._haze_light = beam, self._mu_sun * max(through - beam, 0.0) * self._light_below
 
     def _clear_mass(self, sine: Array) -> Array:
         """(n,) air mass of clear air, Eq. (2); a ray that would go through the ground counts as one that skims it."""
-        mass, level = _air_mass(sine), float(_air_mass(np.zeros(1))[0])
+        mass, level = air_mass(sine), float(air_mass(np.zeros(1))[0])
         r = self._p.earth_radius_m + self._altitude_m
         drop_m = r * sine * sine / (1.0 + np.sqrt(np.maximum(1.0 - sine * sine, 0.0)))
         thicker = np.exp(np.minimum(drop_m, self._altitude_m) / self._p.aerosol_scale_m)
@@ -241,13 +284,9 @@ class Sky:
         w = self._p.cloud_aspect
         return np.maximum(d[:, 2] + w, 0.5 * w)
 
-    def _surface(self, sine: Array, depth_m: float) -> tuple[NDArray[np.bool_], Array, Array]:
-        """Whether rays meet a sphere so far below, the distance, and the cosine of incidence there, Eq. (4)."""
-        r = self._p.earth_radius_m + self._altitude_m
-        q = (r - depth_m) ** 2 - r * r * (1.0 - sine * sine)
-        meets = (sine < 0.0) & (q > 0.0) & (depth_m > 0.0)
-        root = np.sqrt(np.maximum(q, 1.0))
-        return meets, -r * sine - root, root / (r - depth_m)
+    def _surface(self, sine: Array, top_m: float, rise_m: float = 0.0) -> tuple[NDArray[np.bool_], Array, Array]:
+        """What rays of (n,) sines do to the sphere of a height, from so much higher than the flight."""
+        return meet_sphere(sine, self._p.earth_radius_m + top_m, self._altitude_m + rise_m - top_m)
 
     def _ambient(self) -> float:
         """Mean radiance over a Fibonacci sphere; the aureole counts as direct light."""
@@ -259,14 +298,3 @@ class Sky:
         across = np.sqrt(1.0 - z * z)
         directions = np.stack([across * np.cos(turn), across * np.sin(turn), z], axis=1)
         return float(self._radiance(directions, with_aureole=False).mean())
-
-
-def _air_mass(sine: Array) -> Array:
-    s = np.abs(sine)
-    return np.asarray(1.0 / (s + 0.025 * np.exp(-11.0 * s)))
-
-
-def _unit(directions: Array) -> Array:
-    d = np.asarray(directions, dtype=float)
-    length = np.sqrt(d[:, 0] * d[:, 0] + d[:, 1] * d[:, 1] + d[:, 2] * d[:, 2])
-    return np.asarray(d / length[:, None])

@@ -4,10 +4,10 @@
 
 in units of a white Lambertian surface in normal sunlight: reflectance rho, unit normal n, unit vector s toward the
 Sun, extinction b, slant range r. `ambient` is the mean radiance of all directions, `direct` what clouds and haze let
-through of the Sun. A solid is a sphere, ellipsoid, capsule, cylinder or box, opaque and matt; both ways
-of drawing it (`drawn`, `traced`) take it from here.
+through of the Sun. A solid is a sphere, ellipsoid, capsule, cylinder or box, or a mesh of triangles (`meshes`), opaque
+and matt; both ways of drawing it (`drawn`, `traced`) take it from here.
 
-Not modelled: shadows, interreflections, gloss (glints are point sources of their own), meshes.
+Not modelled: shadows, interreflections, gloss (glints are point sources of their own).
 Source: Koschmieder's law of air light, in Middleton, Vision through the Atmosphere, ch. 4.
 """
 
@@ -35,7 +35,7 @@ _KIND_OF = {
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Solids:
-    """The visible geoms of a model, in its order."""
+    """The visible geoms of a model that are no meshes, in its order."""
 
     geoms: NDArray[np.intp]  #: (n,) their numbers in the model
     kinds: NDArray[np.int64]  #: (n,)
@@ -44,19 +44,21 @@ class Solids:
 
     @classmethod
     def of(cls, model: mujoco.MjModel) -> "Solids":
-        """Take every geom of a visible group that is not fully transparent.
+        """Take every geom of a visible group that is not fully transparent, but for meshes.
 
         Raises:
-            DockairError: one of them is neither sphere, ellipsoid, capsule, cylinder nor box.
+            DockairError: one of them is neither sphere, ellipsoid, capsule, cylinder, box nor mesh.
         """
         visible = VISIBLE_GROUPS[model.geom_group].astype(bool) & (model.geom_rgba[:, 3] > 0.0)
-        geoms = np.flatnonzero(visible)
+        geoms = np.flatnonzero(visible & (model.geom_type != int(mujoco.mjtGeom.mjGEOM_MESH)))
         types = [mujoco.mjtGeom(model.geom_type[i]) for i in geoms]
         for i, kind in zip(geoms, types, strict=True):
             if kind not in _KIND_OF:
                 name = model.geom(int(i)).name or f"number {i}"
                 got = kind.name.removeprefix("mjGEOM_").lower()
-                raise DockairError(f"geom {name}", expected="a sphere, ellipsoid, capsule, cylinder or box", got=got)
+                raise DockairError(
+                    f"geom {name}", expected="a sphere, ellipsoid, capsule, cylinder, box or mesh", got=got
+                )
         kinds = np.array([_KIND_OF[kind] for kind in types], dtype=np.int64)
         size = model.geom_size[geoms]
         spheres = np.array([kind == mujoco.mjtGeom.mjGEOM_SPHERE for kind in types], dtype=bool)

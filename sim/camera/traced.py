@@ -11,7 +11,7 @@ s and the place n of the entry are no small differences of large numbers, so tha
 linear in x, and its coefficients are worked out in double precision. A capsule is a tube up to its two balls, a
 cylinder a tube cut by one slab. The nearest solid wins, block by block. Only entries count: a solid that the lens
 stands in is not seen, as with OpenGL's culled back faces. What a block shows depends on its own ray alone; which are
-looked at for a solid, `spans` says.
+looked at for a solid, `spans` says. Meshes are `traced_meshes`.
 
 Not modelled: more than one ray a block (edges are steps of a block).
 Source: Glassner (ed.), An Introduction to Ray Tracing, ch. 2.
@@ -23,8 +23,10 @@ from numba import njit
 from numpy.typing import NDArray
 
 from dockair.rotations import Array
+from dockair.sim.camera.meshes import Meshes
 from dockair.sim.camera.solids import BALL, BOX, CAPSULE, CYLINDER, Haze, Lighting, Solids, depth_limits_m
 from dockair.sim.camera.spans import Placed, place
+from dockair.sim.camera.traced_meshes import trace_meshes
 
 _F = np.float32
 _ZERO, _ONE, _MISS = _F(0.0), _F(1.0), _F(np.nan)
@@ -54,7 +56,7 @@ class TracedSolids:
     name = "analytic"
 
     def __init__(self, model: mujoco.MjModel, lighting: Lighting) -> None:
-        self._solids, self._lighting = Solids.of(model), lighting
+        self._solids, self._meshes, self._lighting = Solids.of(model), Meshes.of(model), lighting
         self._limits_m = depth_limits_m(model)
         self._memory = np.empty(0, dtype=np.float32)
         self._placed = Placed.room_for(len(self._solids.geoms), 0)
@@ -91,7 +93,9 @@ class TracedSolids:
         nearest.fill(far)
         shade = light.ambient, light.direct, haze.extinction_1_m, haze.airlight
         solids = s.kinds, s.half_sizes_m, s.reflectances
-        _trace(out, nearest, solids, self._placed, count, x, y, R_WC.T @ light.toward_W, shade, near)
+        sun_C = R_WC.T @ light.toward_W
+        _trace(out, nearest, solids, self._placed, count, x, y, sun_C, shade, near)
+        trace_meshes(out, nearest, self._meshes, poses[1:], pose, x, y, sun_C, shade, near)
 
     def close(self) -> None:
         """Nothing to free."""

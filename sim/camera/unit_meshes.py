@@ -1,4 +1,4 @@
-"""Unit meshes that solids are drawn with: balls, tubes and round ends in several finenesses, and a cube.
+"""Meshes that solids are drawn with: balls, tubes and round ends of radius 1 in several finenesses, a cube; more.
 
 A ball or tube of n slices has the outline of a polygon with n corners; its corners stand at
 
@@ -9,6 +9,7 @@ finenesses here. Normals are those of the round body; between them OpenGL interp
 up to 1 - cos(pi/n): 7.6, 1.9, 0.3 %.
 """
 
+from collections.abc import Sequence
 from itertools import pairwise
 
 import mujoco
@@ -22,14 +23,15 @@ SLICES = (8, 16, 40)
 #: up to 160 blocks); the first is for what is too thin to show its shade.
 LEVELS: Array = np.array([2.0, 25.0, np.inf])
 BALLS, TUBES, ENDS, CUBE = (k * len(SLICES) for k in range(4))  #: numbers of the first of each kind
+OTHERS = CUBE + 1  #: of the first that is no unit mesh
 
 _Mesh = tuple[Array, Array, NDArray[np.int64]]  # vertices (n, 3), their normals (n, 3), triangles (m, 3)
 
 
-def unit_meshes() -> mujoco.MjModel:
-    """Return a model that holds the meshes and nothing else."""
+def unit_meshes(others: Sequence[_Mesh] = ()) -> mujoco.MjModel:
+    """Return a model that holds the meshes, others after them, and nothing else."""
     spec = mujoco.MjSpec()
-    meshes = [*map(_ball, SLICES), *map(_tube, SLICES), *map(_end, SLICES), _cube()]
+    meshes = [*map(_ball, SLICES), *map(_tube, SLICES), *map(_end, SLICES), _cube(), *others]
     for i, (vertices, normals, triangles) in enumerate(meshes):
         mesh = spec.add_mesh(name=f"mesh_{i}", inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL)
         mesh.uservert, mesh.userface = vertices.ravel().tolist(), triangles.ravel().tolist()

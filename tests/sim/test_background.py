@@ -31,7 +31,7 @@ class PlainSky:
         self.level, self.slopes = level, slopes
         self.ambient, self.direct, self.air = 1.0, 0.0, 0.6
 
-    def fill(self, out: np.ndarray, R_WC: np.ndarray, x: np.ndarray, y: np.ndarray) -> None:
+    def fill(self, out: np.ndarray, R_WC: np.ndarray, x: np.ndarray, y: np.ndarray, place_m: object = None) -> None:
         out[:] = self.level + self.slopes[0] * x + self.slopes[1] * y[:, None]
 
     def beam(self, directions_W: np.ndarray) -> np.ndarray:

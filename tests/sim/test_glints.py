@@ -9,8 +9,10 @@ import pytest
 from dockair.parameters import load_parameters
 from dockair.rotations import exp, quaternion_from_matrix
 from dockair.sim.camera.glints import Glints, find_glints
+from dockair.sim.camera.meshes import Meshes
 from dockair.sim.camera.mirrors import GLASS, METAL, PAINT, RUBBER, Mirrors, material_of, rim_of
 from dockair.sim.camera.sheets import LightParameters, SurfaceParameters
+from dockair.sim.camera.solids import VISIBLE_GROUPS
 
 LIGHT = load_parameters("light", LightParameters)
 SHEET = load_parameters("surfaces", SurfaceParameters)
@@ -180,7 +182,7 @@ def test_materials_go_by_the_names_of_the_scene() -> None:
         "coupling_body",
         "probe_tip",
         "hose_3",
-        "canopy",
+        "skin_canopy",
         "canopy_7",
     ]
     assert [material_of(n) for n in names] == [PAINT, PAINT, METAL, METAL, METAL, RUBBER, GLASS, PAINT]
@@ -251,31 +253,47 @@ def test_a_rim_lit_and_seen_along_its_axis_shows_two_arcs_of_two_radians() -> No
     assert glints.area_m2_sr.sum() == pytest.approx(arcs * 0.008 / (4.0 * np.sqrt(2.0 * np.pi) * 0.1), rel=0.03)
 
 
+def _suns(world, p_WC: np.ndarray, rng: np.random.Generator) -> list[np.ndarray]:
+    """A hundred of all directions, and 150 that a random triangle of the tanker's skin mirrors to the lens."""
+    meshes, toward = Meshes.of(world.model), []
+    while len(toward) < 150:
+        t = rng.integers(len(meshes.triangles))
+        g = meshes.geoms[np.searchsorted(meshes.first_triangle, t, side="right") - 1]
+        R, corners = world.data.geom_xmat[g].reshape(3, 3), meshes.triangles[t]
+        n = _unit(*(R @ meshes.normals[corners].mean(axis=0)))
+        sight = _unit(*(p_WC - world.data.geom_xpos[g] - R @ meshes.corners_m[corners].mean(axis=0)))
+        if n @ sight > 0.05 and world.model.geom(int(g)).name.startswith("tanker"):
+            toward.append(2.0 * (n @ sight) * n - sight)
+    return [_unit(*rng.normal(size=3)) for _ in range(100)] + toward
+
+
 def test_in_the_scene_the_surface_halves_the_angle_where_it_glints(make_world) -> None:
     """By the normal of MuJoCo's own ray, within three rms slopes, for 97 % of every part's light.
 
-    The rest lies where two bodies meet or at a patch's faint end. The rim is drawn in straight pieces, 7.5 degrees off.
+    The rest lies where two bodies meet or at a patch's faint end. The rim is drawn in straight pieces, 7.5 degrees off;
+    MuJoCo's rays see a skin's triangles flat, up to half a slice of 22.5 degrees off the round surface.
     """
     world = make_world(p_PD_B=(4.0, 0.0, 0.0))
     p_WC = world.truth.p_WB + world.truth.R_WB @ world.parameters.mounting.p_BC
-    mirrors, rng, found = Mirrors.of(world.model), np.random.default_rng(2), {}
+    mirrors, found = Mirrors.of(world.model), {}
     smooth = {f"{material}_roughness_rad": 0.02 for material in ("paint", "metal", "rubber", "glass")}
     surfaces = replace(SHEET, metal_share=1.0, faintest_radiance=0.2, **smooth)
-    for _ in range(100):
-        sun, normal, geom = _unit(*rng.normal(size=3)), np.zeros(3), np.zeros(1, dtype=np.int32)
+    for sun in _suns(world, p_WC, np.random.default_rng(2)):
+        normal, geom = np.zeros(3), np.zeros(1, dtype=np.int32)
         glints = find_glints(world.model, world.data, mirrors, p_WC, sun, surfaces, LIGHT)
         for p, area in zip(glints.p_W, glints.area_m2_sr, strict=True):
             sight, d = _unit(*(p - p_WC)), np.linalg.norm(p - p_WC)
-            if mujoco.mj_ray(world.model, world.data, p_WC, sight, None, 1, -1, geom, normal) >= 0.0:
+            if mujoco.mj_ray(world.model, world.data, p_WC, sight, VISIBLE_GROUPS, 1, -1, geom, normal) >= 0.0:
                 half_way = np.arccos(np.clip(normal @ _unit(*(sun - sight)), -1.0, 1.0))
-                part = "_".join(world.model.geom(int(geom[0])).name.split("_")[:2])
+                part = "_".join(world.model.geom(int(geom[0])).name.replace("skin_", "").split("_")[:2])
                 found.setdefault(part, []).append((half_way, area / d**2))
     parts = {part: np.array(rows).T for part, rows in found.items()}
-    assert np.median(parts["basket_rim"][0]) < 0.13
-    for part in ("tanker_wing", "tanker_tailplane", "tanker_tailcone", "tanker_engine", "probe_mast", "basket_rib"):
+    assert np.median(parts["basket_rim"][0]) < 0.15
+    flat = {"probe_mast": 0.06, "basket_rib": 0.06, "tanker_wing": 0.06, "tanker_tailplane": 0.06}
+    for part, limit in (flat | {"tanker_fuselage": 0.2, "tanker_engine": 0.25}).items():
         half_way, light = parts[part]
-        assert len(light) > 100
-        assert light[half_way > 0.06].sum() < 0.03 * light.sum(), part
+        assert len(light) > 50
+        assert light[half_way > limit].sum() < 0.03 * light.sum(), part
 
 
 def test_the_same_world_gives_the_same_glints_to_the_bit(make_world) -> None:

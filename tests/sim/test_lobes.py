@@ -232,7 +232,7 @@ def test_paint_mirrors_by_fresnels_law_of_a_dielectric() -> None:
         ("tanker_x", "paint_share"),
         ("basket_rib_3", "metal_share"),
         ("hose_4", "rubber_share"),
-        ("canopy", "glass_share"),
+        ("skin_canopy", "glass_share"),
     ],
 )
 def test_a_glint_is_as_bright_as_its_materials_share(geom: str, share: str) -> None:

@@ -14,7 +14,9 @@ from dockair.sim.camera.sheets import SkyParameters
 from dockair.sim.camera.sky import Sky, Weather
 
 SHEET = load_parameters("sky", SkyParameters)
-BARE = replace(SHEET, deck_cover=0.0, ground_contrast=0.0, aerosol_optical_depth=0.0)  # nothing random is left
+BARE = replace(  # nothing random is left
+    SHEET, deck_cover=0.0, ground_contrast=0.0, water_cover=0.0, aerosol_optical_depth=0.0
+)
 ALTITUDE_M = 6000.0
 FOCAL_PX = 16e-3 / 5.5e-6
 X, Y = ((2.0 * np.arange(n) + 0.5 - 0.5 * (2 * n - 1)) / FOCAL_PX for n in (1024, 544))  # blocks of 2 x 2 pixels

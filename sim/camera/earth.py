@@ -1,0 +1,42 @@
+"""Lines of sight over a round Earth: where they meet it, and through how much air.
+
+A ray of elevation sine s from the height h over a sphere of radius a, r = a + h, and its air mass:
+
+    d = -r s - sqrt(q),   q = a^2 - r^2 (1 - s^2),   mu = sqrt(q)/a,      m = 1/(|s| + 0.025 exp(-11 |s|))        (1)
+
+Source: Rozenberg 1966 (air mass at the horizon).
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dockair.rotations import Array
+
+
+def meet_sphere(sine: Array, radius_m: float, height_m: float) -> tuple[NDArray[np.bool_], Array, Array]:
+    """Whether rays meet a sphere below, the distance and the cosine of incidence there; else those of skimming it."""
+    r = radius_m + height_m
+    q = radius_m**2 - r * r * (1.0 - sine * sine)
+    meets = (sine < 0.0) & (q > 0.0) & (height_m > 0.0)
+    root = np.sqrt(np.maximum(q, 1.0))
+    return meets, -r * sine - root, root / radius_m
+
+
+def dip_sine(radius_m: float, height_m: float) -> float:
+    """Sine of the angle below level from which on a sphere is seen; 1 from within it."""
+    return math.sqrt(1.0 - (radius_m / (radius_m + height_m)) ** 2) if height_m > 0.0 else 1.0
+
+
+def air_mass(sine: Array) -> Array:
+    """(n,) air masses, Eq. (1), of rays with these sines of elevation."""
+    s = np.abs(sine)
+    return np.asarray(1.0 / (s + 0.025 * np.exp(-11.0 * s)))
+
+
+def unit(directions: Array) -> Array:
+    """(n, 3) unit vectors."""
+    d = np.asarray(directions, dtype=float)
+    length = np.sqrt(d[:, 0] * d[:, 0] + d[:, 1] * d[:, 1] + d[:, 2] * d[:, 2])
+    return np.asarray(d / length[:, None])

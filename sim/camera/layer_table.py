@@ -1,0 +1,294 @@
+"""What is seen of a layer below, cloud deck or ground, tabulated by direction from places that the camera passes.
+
+The layer is a sphere of radius a about a centre under the camera, whose structure is fixed in the plane: a point of it
+goes by its level way from the camera's place. A ray d, of any length n, from the height h over the layer meets it at
+
+    k = (2 h - h^2/r)/(sqrt(d_z^2 - n^2 e) - d_z),   e = (2 h - h^2/r)/r,   r = a + h,     o = k (d_x, d_y)        (1)
+
+A table is of one place, its key, and serves all places around; from the key, D away, the same point is seen toward
+
+    (o_x + D_x, o_y + D_y, -h' - q),    q = a - sqrt(a^2 - o'^2) = o'^2/2a (1 + o'^2/4a^2 + ...)                   (2)
+
+with h' the key's height, o' the level way from there; the horizon is near enough for two terms. Keys stand on a grid, a
+third of the layer's depth apart, so that the picture is a function of the place alone. A feature stays where it is as
+the camera moves and turns; what it fades into changes with the key by less than the eye sees. Rays that skim past the
+layer are taken to the farthest it reaches.
+
+Source: Praun & Hoppe 2003 (octahedral maps), as `sky_table`.
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from dockair.rotations import Array
+from dockair.sim.camera.sky_table import directions_from_nodes
+
+_TILE, _SHIFT = 64, 6  # nodes a side, and its power of 2
+_STEEPEST = 2.74  # as of `sky_table`
+_SIDE = _TILE + 1  # of what is kept of a tile: with the next ones' first nodes, so that it is read alone
+_STRETCH = 2.0  # most by which Eq. (2) widens the way between two directions
+_KEYS_PER_DEPTH = 3.0
+
+Geometry = tuple[float, float, float, float, float, float]  # e, 2 h - h^2/r, h', 1/a, D_x, D_y
+Interval = NDArray[np.int64]
+
+
+class Nodes(NamedTuple):
+    """Values (nodes channels,) of a table for the kernel, tile after tile: what is near is near in memory."""
+
+    values: NDArray[np.float32]
+    side: int
+    geometry: Geometry
+
+
+class LayerTable:
+    """Values of a layer at nodes of directions.
+
+    Args:
+        function: (m, 3) unit vectors and the key's place (3,) -> (m, channels) values.
+        tiles: a side, each of 64 x 64 nodes.
+        channels: how many values a node has.
+        height_m: of the origin over the layer.
+        radius_m: of the layer's sphere.
+    """
+
+    def __init__(
+        self, function: Callable[[Array, Array], Array], tiles: int, channels: int, height_m: float, radius_m: float
+    ) -> None:
+        self._function, self._tiles = function, tiles
+        self._height_m, self._radius_m = height_m, radius_m
+        self._values: NDArray[np.float32] = np.zeros(((tiles * _SIDE) ** 2, channels), dtype=np.float32)
+        self._is_known = np.zeros((tiles, tiles), dtype=np.bool_)
+        self._key = np.zeros(3)
+
+    def nodes(self, place_m: Array, R_WC: Array, x: Array, y: Array, below: Interval) -> Nodes:
+        """Return the table for a place, known wherever a picture looks.
+
+        Args:
+            place_m: (3,) of the camera from the origin.
+            R_WC: its attitude.
+            x: (columns,) tangents to the right.
+            y: (rows,) tangents below the axis.
+            below: (rows, 2) first column and one past the last that see the layer.
+        """
+        step_m = self._height_m / _KEYS_PER_DEPTH
+        key = np.round(np.asarray(place_m, dtype=float) / step_m) * step_m
+        if not np.array_equal(key, self._key):
+            self._key = key
+            self._is_known[:] = False
+        geometry, side = self._geometry(place_m), self._tiles * _TILE
+        missing, R = np.zeros_like(self._is_known), np.ascontiguousarray(R_WC, dtype=float)
+        step = max(_step(x), _step(y), 1e-9)
+        stride = max(1, int((_TILE - 1) / (0.5 * (side - 2) * _STEEPEST * _STRETCH * step)))
+        if _mark(R, x, y, below, stride, side, geometry, self._is_known, missing):
+            for row, column in np.argwhere(missing):
+                self._compute(int(row), int(column))
+        return Nodes(self._values.ravel(), side, geometry)
+
+    def _geometry(self, place_m: Array) -> Geometry:
+        height, a = self._height_m + float(place_m[2]), self._radius_m
+        twice = 2.0 * height - height * height / (a + height)
+        aside = place_m - self._key
+        key_height = self._height_m + float(self._key[2])
+        return twice / (a + height), twice, key_height, 1.0 / a, float(aside[0]), float(aside[1])
+
+    def _compute(self, row: int, column: int) -> None:
+        """Tabulate a tile."""
+        own, first = np.arange(_SIDE), (row * self._tiles + column) * _SIDE * _SIDE
+        i, j = np.meshgrid(own + row * _TILE, own + column * _TILE, indexing="ij")
+        directions = directions_from_nodes(i.ravel(), j.ravel(), self._tiles * _TILE)
+        self._values[first : first + _SIDE * _SIDE] = self._function(directions, self._key)
+        self._is_known[row, column] = True
+
+
+def _step(x: Array) -> float:
+    return abs(float(x[-1] - x[0])) / (len(x) - 1) if len(x) > 1 else 0.0
+
+
+@njit(cache=True)
+def columns_below(R: Array, x: Array, y: Array, sine: float, out: Interval) -> None:
+    """Fill (rows, 2) the columns whose rays point down by more than an angle; there they are one after the other.
+
+    Args:
+        R: attitude of the camera.
+        x: (columns,) rising tangents to the right.
+        y: (rows,) tangents below the axis.
+        sine: of the angle, positive.
+        out: first column and one past the last of each row.
+    """
+    k2 = sine * sine
+    for i in range(len(y)):
+        a, b = R[2, 0] - y[i] * R[2, 2], R[2, 1]  # the ray's z is a - x b
+        square, half, rest = b * b - k2, a * b, a * a - k2 * (1.0 + y[i] * y[i])
+        square = square if abs(square) > 1e-12 else 1e-12
+        disc = half * half - square * rest
+        low, high = 1.0, 0.0
+        if disc <= 0.0:
+            if square > 0.0 and a < 0.0:
+                low, high = -np.inf, np.inf
+        else:
+            root = np.sqrt(disc)
+            one, other = (half - root) / square, (half + root) / square
+            first, last = min(one, other), max(one, other)
+            if square < 0.0:
+                if a - 0.5 * (first + last) * b < 0.0:
+                    low, high = first, last
+            elif b > 0.0:
+                low, high = last, np.inf
+            else:
+                low, high = -np.inf, first
+        out[i, 0] = np.searchsorted(x, low)
+        out[i, 1] = max(np.searchsorted(x, high), out[i, 0]) if low <= high else out[i, 0]
+
+
+@njit(cache=True, error_model="numpy")
+def lay_under(
+    out: NDArray[np.float32], R: Array, x: Array, y: Array, below: Interval, ground: Nodes, deck: Nodes, has_deck: bool
+) -> None:
+    """Write the radiance of ground, or of a deck (light, transmittance) before it, into the columns that see it."""
+    tangents, n = x.astype(np.float32), len(x)
+    corner, down, right = np.empty(n, np.int32), np.empty(n, np.float32), np.empty(n, np.float32)
+    for i in range(len(y)):
+        left, stop = below[i]
+        if left == stop:
+            continue
+        row, part, count = out[i, left:stop], tangents[left:stop], stop - left
+        places = corner[:count], down[:count], right[:count]
+        _place(R, part, y[i], ground, places)
+        _read(ground, places, row)
+        if has_deck:
+            _place(R, part, y[i], deck, places)
+            _read_over(deck, places, row)
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _toward(
+    dx: np.float32, dy: np.float32, dz: np.float32, g: tuple[np.float32, ...]
+) -> tuple[np.float32, np.float32, np.float32]:
+    """Eqs. (1) and (2)."""
+    e, twice, key_height, a, aside_x, aside_y = g
+    square = dz * dz - (dx * dx + dy * dy + dz * dz) * e
+    k = twice / (np.sqrt(max(square, np.float32(0.0))) - min(dz, np.float32(0.0)))
+    ox, oy = k * dx + aside_x, k * dy + aside_y
+    level = ox * ox + oy * oy
+    sag = level * a  # times half, and the next term of the root's series; a is the sphere's inverse radius
+    return ox, oy, -key_height - np.float32(0.5) * sag * (np.float32(1.0) + np.float32(0.25) * sag * a)
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _node(x: np.float32, y: np.float32, z: np.float32, half: np.float32) -> tuple[np.float32, np.float32]:
+    """Fractional row and column of a direction of any length, as of `sky_table`."""
+    zero = np.float32(0.0)
+    scale = half / (abs(x) + abs(y) + abs(z))
+    p_y, p_z = y * scale, z * scale
+    q_y, q_z = half - abs(p_z), half - abs(p_y)
+    q_y, q_z = (q_y if p_y >= zero else -q_y), (q_z if p_z >= zero else -q_z)
+    return half - (q_z if x < zero else p_z), half - (q_y if x < zero else p_y)
+
+
+@njit(cache=True)
+def _single(g: Geometry) -> tuple[np.float32, ...]:
+    return np.float32(g[0]), np.float32(g[1]), np.float32(g[2]), np.float32(g[3]), np.float32(g[4]), np.float32(g[5])
+
+
+@njit(cache=True, error_model="numpy")
+def _place(
+    R: Array,
+    x: NDArray[np.float32],
+    y_i: float,
+    nodes: Nodes,
+    places: tuple[NDArray[np.int32], NDArray[np.float32], NDArray[np.float32]],
+) -> None:
+    """Fill, for a row of blocks, the node before each and the parts of the way to the next ones."""
+    corner, down, right = places
+    last, half, tiles = np.int32(nodes.side - 3), np.float32(0.5 * (nodes.side - 2)), np.int32(nodes.side // _TILE)
+    width, rest, shift = np.int32(_SIDE), np.int32(_TILE - 1), np.int32(_SHIFT)
+    a_x, b_x = np.float32(R[0, 0] - y_i * R[0, 2]), np.float32(R[0, 1])
+    a_y, b_y = np.float32(R[1, 0] - y_i * R[1, 2]), np.float32(R[1, 1])
+    a_z, b_z = np.float32(R[2, 0] - y_i * R[2, 2]), np.float32(R[2, 1])
+    g = _single(nodes.geometry)
+    for j in range(len(x)):
+        to_x, to_y, to_z = _toward(a_x - x[j] * b_x, a_y - x[j] * b_y, a_z - x[j] * b_z, g)
+        v, u = _node(to_x, to_y, to_z, half)
+        row, column = max(min(np.int32(v), last), np.int32(0)), max(min(np.int32(u), last), np.int32(0))
+        tile = (row >> shift) * tiles + (column >> shift)
+        corner[j] = (tile * width + (row & rest)) * width + (column & rest)
+        down[j], right[j] = v - np.float32(row), u - np.float32(column)
+
+
+@njit(cache=True)
+def _read(
+    nodes: Nodes,
+    places: tuple[NDArray[np.int32], NDArray[np.float32], NDArray[np.float32]],
+    out: NDArray[np.float32],
+) -> None:
+    values, (corner, down, right) = nodes.values, places
+    for j in range(len(out)):
+        k = np.uint32(corner[j])
+        below = k + np.uint32(_SIDE)
+        a = values[k] + right[j] * (values[k + np.uint32(1)] - values[k])
+        b = values[below] + right[j] * (values[below + np.uint32(1)] - values[below])
+        out[j] = a + down[j] * (b - a)
+
+
+@njit(cache=True)
+def _read_over(
+    nodes: Nodes,
+    places: tuple[NDArray[np.int32], NDArray[np.float32], NDArray[np.float32]],
+    out: NDArray[np.float32],
+) -> None:
+    """Light of the layer, and what it lets through of what is in `out`."""
+    values, (corner, down, right) = nodes.values, places
+    for j in range(len(out)):
+        k, s, t = np.uint32(2) * np.uint32(corner[j]), right[j], down[j]
+        one, two, three = k + np.uint32(1), k + np.uint32(2), k + np.uint32(3)
+        m = k + np.uint32(2 * _SIDE)
+        a = values[k] + s * (values[two] - values[k])
+        c = values[one] + s * (values[three] - values[one])
+        b = values[m] + s * (values[m + np.uint32(2)] - values[m])
+        d = values[m + np.uint32(1)] + s * (values[m + np.uint32(3)] - values[m + np.uint32(1)])
+        out[j] = a + t * (b - a) + (c + t * (d - c)) * out[j]
+
+
+@njit(cache=True)
+def _mark(
+    R: Array,
+    x: Array,
+    y: Array,
+    below: Interval,
+    stride: int,
+    side: int,
+    geometry: Geometry,
+    known: NDArray[np.bool_],
+    missing: NDArray[np.bool_],
+) -> bool:
+    """Mark what is not known of the tiles of every stride-th block and their neighbours; say whether that is any."""
+    tiles, any_missing, g = known.shape[0], False, _single(geometry)
+    half = np.float32(0.5 * (side - 2))
+    for line in range(0, len(y) + stride - 1, stride):
+        i = min(line, len(y) - 1)
+        left, stop = below[i]
+        for along in range(left, stop + stride - 1 if stop > left else left, stride):
+            x_j = x[min(along, stop - 1)]
+            to_x, to_y, to_z = _toward(
+                np.float32(R[0, 0] - y[i] * R[0, 2] - x_j * R[0, 1]),
+                np.float32(R[1, 0] - y[i] * R[1, 2] - x_j * R[1, 1]),
+                np.float32(R[2, 0] - y[i] * R[2, 2] - x_j * R[2, 1]),
+                g,
+            )
+            v, u = _node(to_x, to_y, to_z, half)
+            row, column = int(v) // _TILE, int(u) // _TILE
+            for a in range(row - 1, row + 2):
+                for b in range(column - 1, column + 2):
+                    r, c = a, b
+                    if a < 0 or a >= tiles:  # the square's edges meet their own mirror images
+                        r, c = min(max(a, 0), tiles - 1), tiles - 1 - c
+                    if b < 0 or b >= tiles:
+                        r, c = tiles - 1 - r, min(max(c, 0), tiles - 1)
+                    if not known[r, c]:
+                        missing[r, c] = any_missing = True
+    return any_missing

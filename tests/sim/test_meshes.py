@@ -1,0 +1,176 @@
+"""Triangle meshes in the camera: by rays and by OpenGL alike, and as MuJoCo's own rays meet them."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+
+from dockair.calibration import Mounting
+from dockair.parameters import load_parameters
+from dockair.rotations import exp, quaternion_from_matrix
+from dockair.sim.camera.drawn import DrawnSolids
+from dockair.sim.camera.meshes import Meshes
+from dockair.sim.camera.mirrors import Mirrors
+from dockair.sim.camera.occlusion import Obstacles, first_hits
+from dockair.sim.camera.solids import VISIBLE_GROUPS, Haze, Lighting
+from dockair.sim.camera.tiles import triangle_tile
+from dockair.sim.camera.traced import TracedSolids
+from dockair.sim.lofts import body
+from dockair.sim.outlines import TankerParameters
+from dockair.sim.skins import Skin, receiver_skins, tanker_skins
+
+BLOCKS_PER_TANGENT = 500.0
+X, Y = np.arange(-200, 201) / BLOCKS_PER_TANGENT, np.arange(-120, 121) / BLOCKS_PER_TANGENT
+SKY = -1.0
+SUN = np.array([-0.6, 0.48, 0.64])
+SUNLIT = Lighting(toward_W=SUN, ambient=0.25, direct=0.75)
+MOUNTING = Mounting(R_BC=np.eye(3), p_BC=np.array([3.3, -0.45, 0.75]), p_BP=np.array([6.0, -0.9, 0.6]))
+SKINS = {
+    "tanker": tanker_skins(load_parameters("tanker", TankerParameters)),
+    "fighter": receiver_skins(MOUNTING),
+    "unmanned": receiver_skins(MOUNTING, "unmanned"),
+}
+FAR = {"tanker": 60.0, "fighter": 18.0, "unmanned": 25.0}
+
+World = tuple[mujoco.MjModel, mujoco.MjData]
+
+
+def _world(skins: list[Skin], **more: Any) -> World:
+    spec = mujoco.MjSpec()
+    spec.stat.extent, spec.visual.map.znear, spec.visual.map.zfar = 20.0, 0.005, 100.0
+    for skin in skins:
+        mesh = spec.add_mesh(name=skin.name, inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL)
+        mesh.uservert = skin.mesh.vertices_m.ravel().tolist()
+        mesh.userface = mesh.userfacenormal = skin.mesh.triangles.ravel().tolist()
+        mesh.usernormal = skin.mesh.normals.ravel().tolist()
+        grey = {"rgba": [0.5 * skin.shade] * 3 + [1.0]}
+        geom = mujoco.mjtGeom.mjGEOM_MESH
+        spec.worldbody.add_geom(name=skin.name, type=geom, meshname=skin.name, **(grey | more))
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    return model, data
+
+
+@pytest.fixture(scope="module", params=SKINS)
+def world(request: pytest.FixtureRequest) -> Iterator[tuple[str, mujoco.MjModel, mujoco.MjData]]:
+    yield request.param, *_world(SKINS[request.param])
+
+
+def _looking_at_it(distance: float, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    rng = np.random.default_rng(seed)
+    R = exp(rng.normal(0.0, 1.0, 3))
+    return R, -distance * R[:, 0] + R[:, 1:] @ rng.uniform(-0.1, 0.1, 2) * distance
+
+
+def _draw(way: Any, data: mujoco.MjData, pose: Any, x: np.ndarray = X, y: np.ndarray = Y) -> np.ndarray:
+    out = np.full((len(y), len(x)), SKY, dtype=np.float32)
+    way.draw(out, data, pose, x, y, Haze(extinction_1_m=1e-3, airlight=0.2))
+    return out
+
+
+@pytest.mark.gl
+@pytest.mark.parametrize("near", [1.0, 0.25])
+def test_opengl_and_rays_agree_but_for_edges(world: Any, near: float) -> None:
+    """99.9 % of the blocks within two of 256 grey levels, from all sides, near enough to clip, too."""
+    name, model, data = world
+    drawn, traced = DrawnSolids(model, SUNLIT, BLOCKS_PER_TANGENT, (len(Y), len(X))), TracedSolids(model, SUNLIT)
+    apart, shown = 0.0, 0.0
+    for seed in range(6):
+        pose = _looking_at_it(near * FAR[name], seed)
+        one, other = (_draw(way, data, pose) for way in (drawn, traced))
+        apart += (np.abs(one - other) > 2.0 / 255.0).mean() / 6.0
+        shown += (other != SKY).mean() / 6.0
+    drawn.close()
+    assert shown > 0.03
+    assert apart < 1e-3
+
+
+def test_blocks_show_a_mesh_where_mujocos_rays_meet_it(world: Any) -> None:
+    """A block in 23; the skins are closed, so that the first face met looks at the lens."""
+    name, model, data = world
+    pose = _looking_at_it(FAR[name], 11)
+    shown = _draw(TracedSolids(model, SUNLIT), data, pose) != SKY
+    wrong, count, geom = 0, 0, np.empty(1, dtype=np.int32)
+    for i in range(0, len(Y), 5):
+        for j in range(i % 4, len(X), 5):
+            ray = pose[0] @ np.array([1.0, -X[j], -Y[i]])
+            hit = mujoco.mj_ray(model, data, pose[1], ray / np.linalg.norm(ray), VISIBLE_GROUPS, 1, -1, geom)
+            wrong += (hit >= 0.0) != shown[i, j]
+            count += hit >= 0.0
+    assert count > 30
+    assert wrong == 0
+
+
+def test_rays_from_anywhere_meet_meshes_where_mujocos_do(world: Any) -> None:
+    """A thousand rays each from three places, one of them inside the outline; single precision of the mesh apart."""
+    name, model, data = world
+    rng = np.random.default_rng(4)
+    for place in (np.array([0.2 * FAR[name], 0.0, 1.5]), np.array([-FAR[name], 3.0, -2.0]), np.zeros(3)):
+        toward = rng.normal(0.0, 0.15 * FAR[name], (1000, 3)) - place
+        toward /= np.linalg.norm(toward, axis=1, keepdims=True)
+        hits = first_hits(Obstacles.of(model), data, place, toward, np.inf)
+        wanted = np.array([mujoco.mj_ray(model, data, place, v, VISIBLE_GROUPS, 1, -1, None) for v in toward])
+        assert (wanted >= 0.0).sum() > 40
+        same = np.isclose(hits, wanted, atol=1e-5)
+        assert (~same).sum() <= 2  # rays along a face
+
+
+def test_a_window_is_the_full_pictures_bit_for_bit(world: Any) -> None:
+    name, model, data = world
+    pose, traced = _looking_at_it(0.3 * FAR[name], 2), TracedSolids(model, SUNLIT)
+    whole = _draw(traced, data, pose)
+    assert (whole != SKY).mean() > 0.05
+    for rows, columns in (
+        (slice(0, 241), slice(0, 1)),
+        (slice(7, 8), slice(3, 370)),
+        (slice(80, 161), slice(133, 264)),
+    ):
+        assert np.array_equal(_draw(traced, data, pose, X[columns], Y[rows]), whole[rows, columns])
+
+
+def test_no_ray_slips_between_triangles() -> None:
+    """A closed drum before the lens: no sky inside its outline, at a hundred attitudes."""
+    drum = body(np.array([[0.5, 1.0, 1.0, 0.0, 0.0, 2.0], [-0.5, 1.0, 1.0, 0.0, 0.0, 2.0]]), 37, 5)
+    model, data = _world([Skin("drum", drum, 1.0)])
+    traced = TracedSolids(model, SUNLIT)
+    for seed in range(100):
+        R = exp(np.random.default_rng(seed).normal(0.0, 1.0, 3))
+        shown = _draw(traced, data, (R, -4.0 * R[:, 0])) != SKY
+        j, i = np.meshgrid(X, Y)
+        assert shown[np.hypot(j, i) < 0.1].all()
+
+
+def test_backs_are_not_seen_and_hidden_groups_neither() -> None:
+    drum = body(np.array([[0.5, 1.0, 1.0, 0.0, 0.0, 2.0], [-0.5, 1.0, 1.0, 0.0, 0.0, 2.0]]), 16)
+    inside = _world([Skin("drum", drum, 1.0)])
+    assert np.all(_draw(TracedSolids(inside[0], SUNLIT), inside[1], (np.eye(3), np.zeros(3))) == SKY)
+    hidden = _world([Skin("drum", drum, 1.0)], group=3)
+    assert len(Meshes.of(hidden[0]).geoms) == 0
+    assert np.all(_draw(TracedSolids(hidden[0], SUNLIT), hidden[1], (np.eye(3), np.array([-4.0, 0.0, 0.0]))) == SKY)
+
+
+def test_triangles_of_a_round_body_have_its_curvature_and_area() -> None:
+    """Of a drum of radius 2: 1/2 around, 0 along; all tiles together have the mesh's area, but for their tilt."""
+    drum = body(np.array([[1.0, 2.0, 2.0, 0.0, 0.0, 2.0], [-1.0, 2.0, 2.0, 0.0, 0.0, 2.0]]), 48, 8)
+    side = drum.triangles[: 2 * 48 * 8]
+    area = 0.0
+    for triangle in side:
+        frame, half, (c_11, c_12, c_22) = triangle_tile(drum.vertices_m[triangle], drum.normals[triangle])
+        C = np.array([[c_11, c_12], [c_12, c_22]])
+        assert np.sort(np.linalg.eigvalsh(C)) == pytest.approx([0.0, 0.5], abs=0.01)
+        around = frame[2:] @ np.cross([1.0, 0.0, 0.0], frame[1])
+        assert around @ C @ around == pytest.approx(0.5, abs=0.01)
+        np.testing.assert_allclose(frame[1:] @ frame[1:].T, np.eye(3), atol=1e-9)
+        area += 4.0 * half[0] * half[1]
+    assert area == pytest.approx(2.0 * 48 * 2.0 * 2.0 * np.sin(np.pi / 48), rel=5e-4)
+
+
+def test_meshes_mirror_with_every_triangle() -> None:
+    model, _ = _world(SKINS["fighter"])
+    facets = Mirrors.of(model).facets
+    assert len(facets.geom) == len(Meshes.of(model).triangles)
+    turned, _ = _world(SKINS["fighter"], quat=quaternion_from_matrix(exp(np.array([0.3, 0.2, 0.1]))))
+    assert np.allclose(np.sort(Mirrors.of(turned).facets.half.prod(axis=1)), np.sort(facets.half.prod(axis=1)))
