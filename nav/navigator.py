@@ -19,17 +19,16 @@ that the track is lost and the code read again.
 """
 
 import math
-from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dockair.calibration import LedRing, NavigationSheets, StartGeometry
+from dockair.calibration import LedRing, NavigationSheets
 from dockair.errors import DockairError
-from dockair.messages import CameraFrame, ImuSample, NavSolution, Window
+from dockair.messages import CameraFrame, ImuSample, NavSolution, TankerAnnouncement, Window
 from dockair.nav.fusion import FusionSettings, RelativeFilter
 from dockair.nav.guidance.approach import Guidance, GuidanceSettings, RelativeState
 from dockair.nav.identify.code import CodeSettings, code_of
@@ -42,7 +41,7 @@ from dockair.nav.integrity.fault_test import IntegritySettings
 from dockair.nav.integrity.monitor import Integrity, IntegrityStatus, check_integrity
 from dockair.nav.pose.estimate import PoseStatus, solve_pose
 from dockair.nav.track import RingTracker, TrackSettings
-from dockair.rotations import Array, exp
+from dockair.rotations import Array
 
 _EVEN_LEDS = 5  # four are seldom more than an accident
 
@@ -80,7 +79,6 @@ class Navigator:
         )  # fmt: skip
         self._guidance = Guidance(self._settings.guidance, sheets.control_rate_hz)
         self._points_D = sheets.ring.positions_D
-        self._recent_imu: deque[ImuSample] = deque(maxlen=round(sheets.gyro.rate_hz * self._settings.fusion.buffer_s))
         self._time_s = 0.0
         self._frame_time_s = self._used_time_s = float("nan")
         self._integrity: Integrity | None = None
@@ -88,13 +86,15 @@ class Navigator:
         self._candidates_px: Array = np.empty((0, 2))
         self._led_pixels_px: Array = np.full((len(self._points_D), 2), np.nan)
 
+    def announce(self, announcement: TankerAnnouncement) -> None:
+        """Take note of what the tanker is about to do."""
+        self._guidance.announce(announcement)
+
     def step(self, imu: Sequence[ImuSample], frame: CameraFrame | None) -> NavSolution:
         """Take the gyro samples and the frame that arrived since the last control tick."""
-        if imu:
-            self._time_s = imu[-1].time_stamp_s
-            self._recent_imu.extend(imu)
-            self._filter.propagate(imu)
-        else:  # the IMU has dropped out: the last rate is held
+        if self._filter.propagate(imu):
+            self._time_s = self._filter.imu_time_s
+        else:  # the IMU has dropped out, or says nothing that can be used: the last rate is held
             self._time_s += 1.0 / self._sheets.control_rate_hz
         if frame is not None:
             self._take(frame)
@@ -187,22 +187,8 @@ class Navigator:
         roll_rad = expected_rad + math.remainder(found.roll_rad - expected_rad, symmetry_rad)
         turn_rad = math.remainder(roll_rad - believed_rad, 2.0 * math.pi)
         if abs(turn_rad) > self._settings.turned_rad:
-            self._turn_belief(turn_rad, time_s)
+            self._filter.turn_drogue(turn_rad, time_s)
         return roll_rad
-
-    def _turn_belief(self, roll_rad: float, time_s: float) -> None:
-        """Start the belief afresh where it is, the drogue rolled about its axis."""
-        now = self._filter.state(time_s)
-        sigma = np.sqrt(np.diag(now.covariance))
-        start = StartGeometry(
-            p_PD_B=now.p_PD_B,
-            sigma_p_m=sigma[3:6],
-            R_BD=now.R_BD @ exp(np.array([roll_rad, 0.0, 0.0])),
-            sigma_R_rad=float(sigma[:3].max()),
-        )
-        self._filter = RelativeFilter(replace(self._sheets, start=start), self._settings.fusion)
-        before = [k for k, sample in enumerate(self._recent_imu) if sample.time_stamp_s <= time_s]
-        self._filter.propagate(list(self._recent_imu)[before[-1] if before else 0 :])
 
     def _shown(self, pixels: Array, window: Window) -> bool:
         """Whether a window holds all of the pixels (n, 2) that are on the sensor."""

@@ -1,6 +1,7 @@
 """Makes a scenario's world, sensors and navigator: the only place where as-built and nominal values are both known."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import partial
 from typing import TypeVar
 
 import numpy as np
@@ -14,15 +15,17 @@ from dockair.nav.guidance.phases import PhaseLimits
 from dockair.nav.navigator import Navigator, NavigatorSettings
 from dockair.parameters import load_parameters
 from dockair.rotations import Array, matrix_from_yaw_pitch_roll
+from dockair.scenarios import build_receiver
+from dockair.scenarios.build_air import air_motion
 from dockair.scenarios.exact_json import name_of
 from dockair.scenarios.message_log import NavigatorRecipe
 from dockair.scenarios.schema import Scenario
 from dockair.scenarios.truth_navigation import TruthNavigator
 from dockair.sim.air.atmosphere import Air, standard_atmosphere
-from dockair.sim.air.turbulence import DrydenField, TurbulenceParameters, gust_sigma
-from dockair.sim.aircraft.aerodynamics import AirframeParameters
+from dockair.sim.aircraft.announcer import Announcer, TankerSheet
 from dockair.sim.aircraft.flight_control import FlightControlParameters
 from dockair.sim.aircraft.receiver import Receiver
+from dockair.sim.aircraft.tanker import TankerPath, TankerPathParameters
 from dockair.sim.aircraft.trim import level_trim
 from dockair.sim.as_built import AsBuilt, AsBuiltParameters, draw_as_built
 from dockair.sim.basket import place_leds
@@ -84,6 +87,7 @@ class Parts:
     as_built: AsBuilt
     clock: Clock
     periods: Periods
+    announcer: Announcer
 
 
 def build(scenario: Scenario, seed: int) -> Parts:
@@ -99,24 +103,37 @@ def build(scenario: Scenario, seed: int) -> Parts:
     """
     clock = Clock(scenario.rates.physics_hz)
     air = standard_atmosphere(scenario.flight.altitude_m)
-    mounting = _sheet(scenario, "mounting", MountingParameters).mounting()
+    mounting = _sheet(scenario, scenario.hardware.receiver_sheet("mounting"), MountingParameters).mounting()
+    airframe = build_receiver.airframe(scenario, scenario.parameters)
     receiver = Receiver(
-        airframe=_sheet(scenario, "airframe", AirframeParameters),
-        flight_control=_sheet(scenario, "flight_control", FlightControlParameters),
+        airframe=airframe,
+        flight_control=_sheet(scenario, scenario.hardware.receiver_sheet("flight_control"), FlightControlParameters),
+        probe_B=mounting.p_BP,
         airspeed_m_s=scenario.flight.airspeed_m_s,
         air=air,
         step_s=clock.step_s,
         rng=random_stream(seed, "inertial_velocity"),
     )
     parameters = _world_parameters(scenario, air, mounting)
-    offset = scenario.start.sigma_p_m * random_stream(seed, "start").normal(size=3)
-    start = WorldStart(p_PD_B=scenario.start.p_PD_B + offset, settle_s=SETTLE_S)
-    world = World(parameters, receiver, _gusts(scenario, seed, clock), start, clock)
     sheets = _navigation_sheets(scenario, parameters)
     _check_ring(sheets.ring, parameters.drogue)
+    faults = Faults([table.fault for table in scenario.faults], sheets.ring.count)
+    offset = scenario.start.sigma_p_m * random_stream(seed, "start").normal(size=3)
+    start = WorldStart(p_PD_B=scenario.start.p_PD_B + offset, settle_s=SETTLE_S)
+    motion = air_motion(
+        scenario,
+        partial(_sheet, scenario),
+        parameters,
+        clock,
+        random_stream(seed, "gust"),
+        receiver_span_m=airframe.span_m,
+        receiver_points_B=airframe.gust_points_m,
+        settle_s=SETTLE_S,
+    )
+    path, announcer = _tanker_path(scenario, seed, parameters)
+    world = World(parameters, receiver, motion, start, clock, faults.reel_locked, path)
     place_leds(world.model, world.data, sheets.ring)
     as_built = _as_built(scenario, seed, sheets)
-    faults = Faults([table.fault for table in scenario.faults], sheets.ring.count)
     if scenario.navigation.is_truth:
         camera, recipe = None, None
         navigator: Navigates = TruthNavigator(sheets, guidance_settings(scenario))
@@ -142,6 +159,7 @@ def build(scenario: Scenario, seed: int) -> Parts:
         sheets=sheets,
         clock=clock,
         periods=periods,
+        announcer=announcer,
     )
 
 
@@ -168,20 +186,25 @@ def _world_parameters(scenario: Scenario, air: Air, mounting: Mounting) -> World
         air=air,
         airspeed_m_s=scenario.flight.airspeed_m_s,
         sun_direction_W=SUN_OVERHEAD if sun_W is None else sun_W,
+        receiver_outline=scenario.hardware.airframe,
     )
 
 
-def _gusts(scenario: Scenario, seed: int, clock: Clock) -> DrydenField | None:
-    turbulence = scenario.turbulence
-    if turbulence.model == "none":
-        return None
-    parameters = _sheet(scenario, "turbulence", TurbulenceParameters)
-    sigma = turbulence.sigma_m_s
-    if turbulence.intensity is not None:
-        sigma = gust_sigma(turbulence.intensity, scenario.flight.altitude_m)
-    if sigma is not None:
-        parameters = replace(parameters, sigma_m_s=sigma)
-    return DrydenField(parameters, scenario.flight.airspeed_m_s, clock.step_s, random_stream(seed, "gust"))
+def _tanker_path(scenario: Scenario, seed: int, world: WorldParameters) -> tuple[TankerPath, Announcer]:
+    sheet = _sheet(scenario, "tanker_path", TankerSheet)
+    table = scenario.tanker
+    flown = TankerPathParameters(
+        manoeuvre=table.manoeuvre,
+        starts_s=table.starts_s,
+        leg_s=table.leg_s,
+        bank_rad=float(np.radians(table.bank_deg)),
+        turns_left=table.turns == "left",
+        descent_rad=float(np.radians(table.descent_deg)),
+        roll_rate_rad_s=sheet.roll_rate_rad_s,
+        pull_over_rate_rad_s=sheet.pull_over_rate_rad_s,
+    )
+    path = TankerPath(flown, world.airspeed_m_s, -np.asarray(world.tanker.exit_m))
+    return path, Announcer(path, sheet, random_stream(seed, "announcement"))
 
 
 def _navigation_sheets(scenario: Scenario, world: WorldParameters) -> NavigationSheets:
@@ -189,7 +212,7 @@ def _navigation_sheets(scenario: Scenario, world: WorldParameters) -> Navigation
     wind_W = np.array([-world.airspeed_m_s, 0.0, 0.0])
     hose, drogue = load_parameters("hose", HoseParameters), load_parameters("drogue", DrogueParameters)
     rest = rest_shape(hose, drogue, wind_W, world.air.density_kg_m3, world.air.kinematic_viscosity_m2_s)
-    trim = level_trim(load_parameters("airframe", AirframeParameters), world.airspeed_m_s, world.air)
+    trim = level_trim(build_receiver.airframe(scenario, {}), world.airspeed_m_s, world.air)
     camera, ring = scenario.hardware.camera, scenario.hardware.ring
     start = StartGeometry(
         p_PD_B=scenario.start.p_PD_B,
@@ -269,6 +292,7 @@ def _camera(scenario: Scenario, seed: int, as_built: AsBuilt, faults: Faults, wo
             night=weather.night,
         ),
         altitude_m=scenario.flight.altitude_m,
+        airspeed_m_s=scenario.flight.airspeed_m_s,
         faults=faults,
         automatic_exposure=table.exposure == "auto",
         background=table.background,

@@ -159,6 +159,7 @@ class BenchSubject(Enum):
     SENSORS = "sensors"
     IMAGE = "image"
     POSE = "pose"
+    WORLD = "world"
 
 
 @app.command()
@@ -173,8 +174,8 @@ def bench(
 ) -> None:
     """Say how fast the closed loop runs here and where its time goes; or how fast the stages of one part are.
 
-    The parts are the sensors, the image stages and the pose solvers, these two beside OpenCV's; only flight and sensors
-    depend on the scenario.
+    The parts are the sensors, the image stages and the pose solvers, these two beside OpenCV's, and the world beside a
+    bare step of MuJoCo; only flight and sensors depend on the scenario.
     """
     from dockair.scenarios.output import show_bench, show_stages_bench, show_working
     from dockair.scenarios.schema import load_scenario
@@ -203,6 +204,10 @@ def _stages_bench(subject: BenchSubject, scenario: "Scenario") -> dict[str, Any]
         from dockair.scenarios.bench_pose import bench_pose
 
         return bench_pose()
+    if subject is BenchSubject.WORLD:
+        from dockair.scenarios.bench_world import bench_world
+
+        return bench_world()
     from dockair.sim.opengl import kind_of_context
 
     os.environ.setdefault("MUJOCO_GL", kind_of_context())  # mujoco.Renderer asks for it at its first import

@@ -71,6 +71,7 @@ OUTCOME_REWARD = {
     Outcome.ABORT: -5.0,
     Outcome.COLLISION: -20.0,
     Outcome.TIMEOUT: 0.0,
+    Outcome.DIVERGED: 0.0,
 }
 _ACTION_COST_1_S = 0.02  # of a full deflection of every axis; small beside the 1.2 of a second's approach at 1.2 m/s
 
@@ -150,7 +151,7 @@ class DockEnv(gymnasium.Env[NDArray[np.float64], NDArray[np.float32]]):
             outcome = self._outcome(self._tick)
             if outcome is not None:
                 break
-        truncated = outcome is Outcome.TIMEOUT
+        truncated = outcome in (Outcome.TIMEOUT, Outcome.DIVERGED)
         reward = before_m - self._distance_m(self._tick.truth) - self._action_cost(command)
         if outcome is not None:
             reward += OUTCOME_REWARD[outcome]

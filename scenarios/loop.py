@@ -10,8 +10,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from dockair.messages import CameraFrame, ImuSample, NavSolution, ReceiverCommand
+from dockair.messages import CameraFrame, ImuSample, NavSolution, ReceiverCommand, TankerAnnouncement
 from dockair.scenarios.build import build
+from dockair.scenarios.message_log import announce_to
 from dockair.scenarios.metrics import Result
 from dockair.scenarios.recorder import Recorder
 from dockair.scenarios.referee import Outcome, Referee
@@ -19,6 +20,7 @@ from dockair.scenarios.schema import Scenario
 from dockair.scenarios.truth_navigation import TruthNavigator
 from dockair.sim.camera.camera import NearInfraredCamera
 from dockair.sim.truth import Truth
+from dockair.sim.world import DivergedError
 
 Progress = Callable[[Truth, NavSolution], None]
 
@@ -32,6 +34,7 @@ class Tick:
     frame: CameraFrame | None
     solution: NavSolution
     outcome: Outcome | None
+    announcement: TankerAnnouncement | None = None
 
 
 class Flight:
@@ -47,7 +50,7 @@ class Flight:
         parts = build(scenario, seed)
         self.scenario, self.clock, self.sheets = scenario, parts.clock, parts.sheets
         self.world, self.camera, self.imu, self.navigator = parts.world, parts.camera, parts.imu, parts.navigator
-        self.as_built, self._faults = parts.as_built, parts.faults
+        self.as_built, self._faults, self._announcer = parts.as_built, parts.faults, parts.announcer
         self.referee = Referee()
         self._full_frames = full_frames
         self._periods = parts.periods
@@ -70,8 +73,13 @@ class Flight:
         """
         self._command = self._next_command if command is None else command
         imu: list[ImuSample] = []
+        diverged, truth = False, self.world.truth
         for _ in range(self._periods.control):
-            truth = self.world.step(self._command)
+            try:
+                truth = self.world.step(self._command)
+            except DivergedError:  # the flight ends with the last truth that was sound
+                diverged = True
+                break
             self.referee.watch(truth)
             if truth.tick % self._periods.gyro == 0:
                 imu += self._sampled(truth)
@@ -80,11 +88,18 @@ class Flight:
         frame = self._delivered(truth.time_s)
         if isinstance(self.navigator, TruthNavigator):
             self.navigator.truth = truth
+        announcement = self._announcer.due(truth.time_s)
+        if announcement is not None:
+            announce_to(self.navigator, announcement)
         solution = self.navigator.step(tuple(imu), frame)
         self._next_command = solution.command
         self._window = solution.window or self.sheets.camera.full_window
         outcome = self.referee.judge(truth, solution.phase, self.scenario.flight.duration_s)
-        return Tick(truth=truth, imu=tuple(imu), frame=frame, solution=solution, outcome=outcome)
+        if diverged:
+            outcome = Outcome.DIVERGED
+        return Tick(
+            truth=truth, imu=tuple(imu), frame=frame, solution=solution, outcome=outcome, announcement=announcement
+        )
 
     def close(self) -> None:
         """Free the camera's off-screen context."""

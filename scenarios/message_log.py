@@ -2,7 +2,8 @@
 
 | file               | one row a control tick                                                             |
 |--------------------|------------------------------------------------------------------------------------|
-| messages.parquet   | IMU samples and, if one arrived, the frame: lossless PNG, window, stamp, exposure, gain |
+| messages.parquet   | IMU samples and, if they arrived, the frame (lossless PNG, window, stamp, exposure, gain) and |
+|                    | what the tanker announced                                                          |
 | estimates.parquet  | every field of `NavSolution`; all numbers as 64-bit floats                         |
 | navigator.json     | the navigator's class, its calibration sheets and settings, floats to the last bit,      |
 |                    | and a digest of the navigation's sources                                                 |
@@ -32,7 +33,7 @@ from numpy.typing import NDArray
 
 from dockair.calibration import NavigationSheets
 from dockair.errors import DockairError, MachineError
-from dockair.messages import CameraFrame, ImuSample, Navigates, NavSolution, Window
+from dockair.messages import CameraFrame, ImuSample, Navigates, NavSolution, TankerAnnouncement, Window
 from dockair.rotations import Array
 from dockair.scenarios.exact_json import decode, encode, import_by_name
 
@@ -53,6 +54,7 @@ _MESSAGE_SCHEMA = pa.schema(
         *[(name, pa.int32()) for name in _WINDOW_COLUMNS],
         ("exposure_s", pa.float64()),
         ("gain", pa.float64()),
+        ("announcement", _FLOATS),
         ("png", pa.binary()),
     ]
 )
@@ -91,6 +93,13 @@ class NavigatorRecipe:
         return cls(class_name=table["navigator"], sheets=sheets, settings=settings)
 
 
+def announce_to(navigator: Navigates, announcement: TankerAnnouncement) -> None:
+    """Tell a navigator what the tanker is about to do, if it listens."""
+    announce = getattr(navigator, "announce", None)
+    if announce is not None:
+        announce(announcement)
+
+
 def code_fingerprint() -> str:
     """Return a digest of the navigation's sources, and of Python's and its libraries' versions."""
     package = files("dockair.nav")
@@ -116,6 +125,7 @@ class TickMessages:
     imu: tuple[ImuSample, ...]
     frame: CameraFrame | None
     png: bytes | None  #: the frame's pixels as stored
+    announcement: TankerAnnouncement | None = None
 
 
 def numbers(value: Any) -> Array:
@@ -133,6 +143,9 @@ def estimate_row(solution: NavSolution) -> dict[str, Array | str]:
     return {name: value if isinstance(value, str) else numbers(value) for name, value in values.items()}
 
 
+_Entry = tuple[tuple[ImuSample, ...], CameraFrame | None, TankerAnnouncement | None, NavSolution]
+
+
 class MessageLog:
     """Writes the three files while a flight goes on; use it in a `with` statement."""
 
@@ -143,21 +156,25 @@ class MessageLog:
             folder / MESSAGES, _MESSAGE_SCHEMA, compression={"png": "NONE"} | dict.fromkeys(_compressed(), "ZSTD")
         )
         self._estimates = pq.ParquetWriter(folder / ESTIMATES, _ESTIMATE_SCHEMA, compression="ZSTD")
-        self._queue: queue.Queue[tuple[tuple[ImuSample, ...], CameraFrame | None, NavSolution] | None] = queue.Queue(
-            QUEUE_TICKS
-        )
+        self._queue: queue.Queue[_Entry | None] = queue.Queue(QUEUE_TICKS)
         self._failure: BaseException | None = None
         self._thread = threading.Thread(target=self._work, name="message log", daemon=True)
         self._thread.start()
 
-    def append(self, imu: Sequence[ImuSample], frame: CameraFrame | None, solution: NavSolution) -> None:
+    def append(
+        self,
+        imu: Sequence[ImuSample],
+        frame: CameraFrame | None,
+        solution: NavSolution,
+        announcement: TankerAnnouncement | None = None,
+    ) -> None:
         """Take one control tick; blocks while the encoder is too far behind.
 
         Raises:
             MachineError: the disk refused an earlier tick.
         """
         self._raise_failure()
-        self._queue.put((tuple(imu), frame, solution))
+        self._queue.put((tuple(imu), frame, announcement, solution))
 
     def close(self) -> None:
         """Write what is still waiting and close the files.
@@ -197,8 +214,8 @@ class MessageLog:
             if self._failure is not None:
                 continue  # keep taking, so that the flight is not blocked before it is told
             try:
-                messages.append(_message_row(entry[0], entry[1]))
-                estimates.append(estimate_row(entry[2]))
+                messages.append(_message_row(*entry[:3]))
+                estimates.append(estimate_row(entry[3]))
                 if len(messages) == ROW_GROUP_TICKS:
                     self._flush(messages, estimates)
             except BaseException as failure:  # noqa: B036 - handed to the flight's thread
@@ -217,16 +234,18 @@ class MessageLog:
 
 
 def _compressed() -> list[str]:
-    imu = ("gyro_time_stamp_s", "gyro_angular_rate_rad_s", "accelerometer_specific_force_m_s2")
-    leaves = [f"{name}.list.element" for name in imu]
+    leaves = [f"{f.name}.list.element" for f in _MESSAGE_SCHEMA if f.type == _FLOATS]
     return leaves + [f.name for f in _MESSAGE_SCHEMA if f.type != _FLOATS and f.name != "png"]
 
 
-def _message_row(imu: tuple[ImuSample, ...], frame: CameraFrame | None) -> dict[str, Any]:
+def _message_row(
+    imu: tuple[ImuSample, ...], frame: CameraFrame | None, announcement: TankerAnnouncement | None
+) -> dict[str, Any]:
     row: dict[str, Any] = {
         "gyro_time_stamp_s": [sample.time_stamp_s for sample in imu],
         "gyro_angular_rate_rad_s": [float(rate) for sample in imu for rate in sample.angular_rate_rad_s],
         "accelerometer_specific_force_m_s2": [float(f) for sample in imu for f in sample.specific_force_m_s2],
+        "announcement": numbers(announcement).tolist(),
     }
     if frame is not None:
         row |= {name: getattr(frame.window, name) for name in _WINDOW_COLUMNS}
@@ -265,9 +284,11 @@ def _tick_from_row(row: dict[str, Any], pixels: bool) -> TickMessages:
         ImuSample(time_stamp_s=t, angular_rate_rad_s=rate, specific_force_m_s2=force)
         for t, rate, force in zip(row["gyro_time_stamp_s"], rates, forces, strict=True)
     )
-    png = row["png"]
+    png, said = row["png"], row.get("announcement")
+    names = [f.name for f in fields(TankerAnnouncement)]
+    announcement = TankerAnnouncement(**dict(zip(names, said, strict=True))) if said else None
     if png is None:
-        return TickMessages(imu=imu, frame=None, png=None)
+        return TickMessages(imu=imu, frame=None, png=None, announcement=announcement)
     window = Window(*(row[name] for name in _WINDOW_COLUMNS))
     frame = CameraFrame(
         time_stamp_s=row["frame_time_stamp_s"],
@@ -276,7 +297,7 @@ def _tick_from_row(row: dict[str, Any], pixels: bool) -> TickMessages:
         exposure_s=row["exposure_s"],
         gain=row["gain"],
     )
-    return TickMessages(imu=imu, frame=frame, png=png)
+    return TickMessages(imu=imu, frame=frame, png=png, announcement=announcement)
 
 
 def png_from_pixels(pixels: NDArray[np.uint8]) -> bytes:

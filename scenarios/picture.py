@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from dockair.errors import DockairError
 from dockair.rotations import Array
@@ -64,11 +65,23 @@ def _points(flight: Any, name: str, unit: str = "m") -> Array:
     return np.column_stack([_values(flight, f"{name}_{axis}_{unit}") for axis in "xyz"])
 
 
+def _from_exit(flight: Any, points_W: Array, moments: slice = slice(None)) -> Array:
+    """(n, 3) points of n ticks, or (1, m, 3) of one, from the hose's exit in level axes along the tanker's heading."""
+    w, x, y, z = (_values(flight, f"truth_q_WT_{axis}") for axis in "wxyz")
+    turn, place = Rotation.from_quat(np.column_stack([x, y, z, w])), _points(flight, "truth_p_WT")
+    exit_W = place + turn.apply(-place[0])  # at the start the exit is W's origin, and T's axes are W's
+    ahead = turn.apply([1.0, 0.0, 0.0])[moments]
+    level = Rotation.from_rotvec(np.outer(-np.arctan2(ahead[:, 1], ahead[:, 0]), [0.0, 0.0, 1.0])).as_matrix()
+    from_exit_W = points_W.reshape(len(level), -1, 3) - exit_W[moments, None]
+    return np.asarray(np.einsum("kij,kmj->kmi", level, from_exit_W).reshape(points_W.shape))
+
+
 def _draw_side_view(axes: Any, flight: Any) -> None:
-    tip, drogue = _points(flight, "truth_p_WP"), _points(flight, "truth_p_WD")
+    tip, drogue = (_from_exit(flight, _points(flight, name)) for name in ("truth_p_WP", "truth_p_WD"))
     held = np.flatnonzero(_values(flight, "truth_latched"))
     moment = int(held[0]) if len(held) else int(np.argmin(np.linalg.norm(tip - drogue, axis=1)))
-    hose = np.array(flight["truth_p_WH_m"][moment].as_py()).reshape(-1, 3)
+    hose = np.array(flight["truth_p_WH_m"][moment].as_py()).reshape(1, -1, 3)
+    hose = _from_exit(flight, hose, slice(moment, moment + 1))[0]
     phases = flight["nav_phase"].to_pylist()
     axes.plot(hose[:, 0], hose[:, 2], color="#3a3a3a", lw=2.5, label="hose")
     axes.plot(drogue[:, 0], drogue[:, 2], color=_GREY, lw=0.8, label="drogue's path")

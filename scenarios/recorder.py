@@ -46,7 +46,7 @@ class Recorder:
         """Take one control tick."""
         self._log.append(tick.truth, tick.imu, tick.frame, tick.solution)
         if self._messages is not None:
-            self._messages.append(tick.imu, tick.frame, tick.solution)
+            self._messages.append(tick.imu, tick.frame, tick.solution, tick.announcement)
 
     def __enter__(self) -> Self:
         return self

@@ -25,6 +25,7 @@ from dockair.errors import DockairError
 from dockair.rotations import Array
 from dockair.scenarios.message_log import (
     NavigatorRecipe,
+    announce_to,
     code_fingerprint,
     estimate_row,
     read_estimates,
@@ -102,6 +103,8 @@ def replay_in_this_process(out_dir: str | Path) -> ReplayReport:
     for messages, recorded in itertools.zip_longest(read_messages(folder), read_estimates(folder)):
         if messages is None or recorded is None:
             raise DockairError(str(folder), expected="as many messages as estimates", got="a cut-off recording")
+        if messages.announcement is not None:
+            announce_to(navigator, messages.announcement)
         replayed = estimate_row(navigator.step(messages.imu, messages.frame))
         for name in replayed:
             if name not in recorded or not same_bits(recorded[name], replayed[name]):

@@ -16,11 +16,12 @@ from dockair.clock import Clock
 from dockair.errors import DockairError
 from dockair.parameters import load_parameters, read_sheet
 from dockair.rotations import Array
+from dockair.scenarios.air_tables import BowWave, Gusts, Turbulence, Wake
 from dockair.scenarios.fault_tables import FaultTable
 from dockair.scenarios.refusal import Expected, refusal
 from dockair.scenarios.scenario_file import ScenarioFile
 
-OutcomeName = Literal["contact", "miss", "rim_strike", "abort", "collision", "timeout"]
+OutcomeName = Literal["contact", "miss", "rim_strike", "abort", "collision", "timeout", "diverged"]
 
 
 def _tuple_from_list(value: Any) -> Any:
@@ -70,31 +71,15 @@ class Rates(_Table):
         return self
 
 
-class Turbulence(_Table):
-    """Gusts. One of `sigma_m_s` and `intensity`; without either the air is still."""
+class Tanker(_Table):
+    """What the tanker flies; how fast it rolls and pulls over, and what it announces, sheet `tanker_path` says."""
 
-    model: Literal["none", "dryden"] = "none"  #: "dryden" as soon as one of the others is given; "none" overrules them
-    sigma_m_s: float | None = Field(default=None, ge=0.0, le=15.0)
-    intensity: Literal["light", "moderate", "severe"] | None = None  #: MIL-F-8785C, at the flight's altitude
-
-    @model_validator(mode="before")
-    @classmethod
-    def _model_follows(cls, table: Any) -> Any:
-        if isinstance(table, Mapping) and "model" not in table and ("sigma_m_s" in table or "intensity" in table):
-            return {**table, "model": "dryden"}
-        return table
-
-    @model_validator(mode="after")
-    def _one_strength(self) -> Self:
-        if self.sigma_m_s is not None and self.intensity is not None:
-            raise DockairError(
-                "turbulence",
-                expected="one of sigma_m_s and intensity",
-                got={"sigma_m_s": self.sigma_m_s, "intensity": self.intensity},
-            )
-        if self.model == "dryden" and self.sigma_m_s is None and self.intensity is None:
-            raise DockairError("turbulence", expected="sigma_m_s or intensity beside the model", got=self.model)
-        return self
+    manoeuvre: Literal["straight", "racetrack", "toboggan"] = "straight"
+    starts_s: float = Field(default=2.0, ge=0.0, le=600.0)  #: when the first turn, or the descent, begins
+    turns: Literal["left", "right"] = "left"
+    bank_deg: float = Field(default=25.0, gt=0.0, le=45.0)
+    leg_s: float = Field(default=60.0, ge=0.0, le=600.0)  #: between two turns
+    descent_deg: float = Field(default=3.0, gt=0.0, le=10.0)  #: of the toboggan, below the horizon
 
 
 class Sun(_Table):
@@ -181,8 +166,9 @@ class CameraOptions(_Table):
 
 
 class Hardware(_Table):
-    """Grade of the IMU; calibration sheets of one's own, as paths from the scenario's file, else the project's."""
+    """The receiver, the grade of its IMU; calibration sheets of one's own, as paths from the scenario's file."""
 
+    airframe: Literal["fighter", "unmanned"] = "fighter"
     imu: Literal["tactical", "mti", "consumer"] = "mti"
     camera: str | None = None
     ring: str | None = None
@@ -193,6 +179,10 @@ class Hardware(_Table):
             if path is not None and not Path(path).is_file():
                 raise DockairError(f"hardware.{key}", expected="the path of a calibration sheet", got=path)
         return self
+
+    def receiver_sheet(self, name: Literal["airframe", "flight_control", "mounting"]) -> str:
+        """Return the name of the receiver's own sheet of a kind."""
+        return name if self.airframe == "fighter" else f"{name}_{self.airframe}"
 
 
 class Accept(_Table):
@@ -233,8 +223,12 @@ class Scenario(_Table):
     claim: str = ""  #: the sentence that the flight is there to show
     seed: int = Field(default=0, ge=0, le=2**63 - 1)
     flight: FlightConditions = FlightConditions()
+    tanker: Tanker = Tanker()
     rates: Rates = Rates()
     turbulence: Turbulence = Turbulence()
+    gusts: Gusts = ()
+    wake: Wake = Wake()
+    bow_wave: BowWave = BowWave()
     sun: Sun = Sun()
     weather: Weather = Weather()
     camera: CameraOptions = CameraOptions()
@@ -258,15 +252,19 @@ class Scenario(_Table):
     def _parameters_fit(self) -> Self:
         for sheet, overrides in self.parameters.items():
             load_parameters(sheet, make_dataclass(sheet, sorted(read_sheet(sheet))), overrides)  # checks only
-            if sheet.startswith(("imu_", "filter_")) and sheet not in self.chosen_sheets:
+            if (
+                sheet.startswith(("imu_", "filter_", "airframe", "flight_control", "mounting"))
+                and sheet not in self.chosen_sheets
+            ):
                 expected = f"a sheet that this scenario uses ({', '.join(self.chosen_sheets)})"
                 raise DockairError(f"parameters.{sheet}", expected=expected, got=sheet)
         return self
 
     @property
-    def chosen_sheets(self) -> tuple[str, str]:
-        """Sheets that are chosen by name: of the IMU and of the filter."""
-        return f"imu_{self.hardware.imu}", f"filter_{self.camera.filter}"
+    def chosen_sheets(self) -> tuple[str, ...]:
+        """Sheets that are chosen by name: of the IMU, of the filter and of the receiver."""
+        receiver = (self.hardware.receiver_sheet(name) for name in ("airframe", "flight_control", "mounting"))
+        return f"imu_{self.hardware.imu}", f"filter_{self.camera.filter}", *receiver
 
     @property
     def sun_W(self) -> Array | None:

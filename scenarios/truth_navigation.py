@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from dockair.calibration import NavigationSheets
-from dockair.messages import CameraFrame, ImuSample, NavSolution
+from dockair.messages import CameraFrame, ImuSample, NavSolution, TankerAnnouncement
 from dockair.nav.guidance.approach import Guidance, GuidanceSettings, RelativeState
 from dockair.rotations import Array
 from dockair.sim.truth import Truth
@@ -22,6 +22,10 @@ class TruthNavigator:
         self._sheets = sheets
         self._guidance = Guidance(settings, sheets.control_rate_hz)
         self.truth: Truth | None = None
+
+    def announce(self, announcement: TankerAnnouncement) -> None:
+        """Take note of what the tanker is about to do."""
+        self._guidance.announce(announcement)
 
     def step(self, imu: Sequence[ImuSample], frame: CameraFrame | None) -> NavSolution:
         """Return the true relative state and what the guidance commands on it."""

@@ -1,12 +1,16 @@
-"""What a world is made of: the sheets and the flight condition, the receiver, the gusts, the start."""
+"""What a world is made of: the sheets and the flight condition, the receiver, the air's motion, the start."""
 
 from dataclasses import dataclass
+from functools import cache
 from typing import Protocol
+
+import numpy as np
 
 from dockair.calibration import Mounting
 from dockair.messages import ReceiverCommand
 from dockair.rotations import Array
 from dockair.sim.air.atmosphere import Air
+from dockair.sim.air.motion import AirState
 from dockair.sim.hose.chain import DrogueParameters, HoseParameters
 from dockair.sim.hose.coupling import CouplingParameters
 from dockair.sim.hose.reel import ReelParameters
@@ -58,6 +62,7 @@ class Airframe(Protocol):
         v_WB: Array,
         w_WB_B: Array,
         air_velocity_W: Array,
+        air_rotation_B: Array,
         specific_force_B: Array,
         command: ReceiverCommand,
     ) -> tuple[Array, Array]:
@@ -65,16 +70,25 @@ class Airframe(Protocol):
         ...
 
 
-class GustField(Protocol):
-    """What the world needs of the gusts: `dockair.sim.air.turbulence.DrydenField`."""
+class AirAround(Protocol):
+    """What the world needs of the air's motion: `dockair.sim.air.motion.AirMotion`."""
 
     def step(self) -> None:
         """Advance by one tick."""
         ...
 
-    def velocity(self, x_W: Array) -> Array:
-        """(n, 3) gust in W axes at places x (n,)."""
+    def at(self, tow_places_W: Array, R_WB: Array, p_WB: Array, R_WT: Array, p_WT: Array) -> AirState:
+        """The air's motion at the tow's bodies and about the receiver, beyond the undisturbed wind."""
         ...
+
+
+@cache
+def still_air(bodies: int) -> AirState:
+    """Air that does not move at so many bodies of the tow, nor at the receiver."""
+    places, nowhere = np.zeros((bodies, 3)), np.zeros(3)
+    for array in (places, nowhere):
+        array.setflags(write=False)
+    return AirState(tow_W=places, receiver_W=nowhere, receiver_rotation_B=nowhere)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -90,6 +104,7 @@ class WorldParameters:
     air: Air
     airspeed_m_s: float
     sun_direction_W: Array  #: (3,) from the scene to the Sun
+    receiver_outline: str = "fighter"  #: name of what the receiver looks like
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

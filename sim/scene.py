@@ -1,16 +1,20 @@
 """The MuJoCo model of the world, built by MjSpec: tanker, hose on its reel, drogue, receiver with probe, light.
 
-Frame W: origin at the hose's exit from the pod, x forward, z up; it moves with the tanker's trim velocity, so that the
-tanker stands still and the air blows. Bodies "tanker", "hose_0" ... "hose_{n-1}", "drogue", "receiver"; geoms
+Frame W: origin at the hose's exit at the start, x forward, z up; it moves with the tanker's velocity at the start, so
+that a tanker flying straight stands still and the air blows. Bodies "tanker", "hose_0" ... "hose_{n-1}", "drogue",
+"receiver"; geoms
 "probe_...", "basket_...", "coupling_...", "hose_...", "fuselage_..." and so on; sites "led_0" ... "led_7", "coupling",
 "probe_tip".
 
-Who touches whom: the probe touches basket, coupling and hose; every other part of the receiver touches hose, drogue and
-tanker. Hose and drogue touch nothing of the tanker. Grey values are reflectances near 850 nm.
+What is seen of tanker and receiver are lofted skins, "tanker_skin_..." and "skin_..."; they touch nothing. What they
+strike with are primitives in a group that is not drawn. Who touches whom: the probe touches basket, coupling and hose;
+every other part of the receiver touches hose, drogue and tanker. Hose and drogue touch nothing of the tanker. Grey
+values are reflectances near 850 nm.
 
-Joints: "reel" slides link 0 along the pod's axis, 0 at full trail, positive wound in (the outer stop's buffer gives a
-little beyond 0); each link, and the drogue on the last one, has two hinges "<body>_y", "<body>_z" at its front end, and
-no twist.
+Joints: "tanker" and "receiver" are free. The tanker is prescribed: so heavy that nothing which pulls at it changes its
+acceleration by more than rounding, its weight made up for, it carries the hose along with all its inertia. "reel"
+slides link 0 along the pod's axis, 0 at full trail, positive wound in (the outer stop gives a little beyond 0);
+each link, and the drogue on the last one, has two hinges "<body>_y", "<body>_z" at its front end, and no twist.
 """
 
 from dataclasses import dataclass
@@ -27,11 +31,17 @@ from dockair.sim.hose.chain import DrogueParameters, HoseParameters
 from dockair.sim.hose.coupling import CouplingParameters
 from dockair.sim.hose.reel import ReelParameters
 from dockair.sim.outlines import Piece, TankerParameters, receiver_pieces, tanker_pieces
+from dockair.sim.skins import Skin, receiver_skins, tanker_skins
 
 # Contact bits
 _PROBE, _RECEIVER = 1, 2
 
+# Of the prescribed tanker: hose and drogue pull with some 2 kN, at 20 m from its origin: 2e-7 m/s^2, 4e-8 rad/s^2
+_TANKER_MASS_KG = 1e10
+_TANKER_INERTIA_KG_M2 = 1e12
+
 _RECEIVER_REFLECTANCE = 0.4  # grey paint near 850 nm; drawing only
+_NOT_DRAWN = 3  # group of geoms that are struck and not seen
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -48,6 +58,7 @@ class SceneParameters:
     receiver_inertia_B: Array  #: (3, 3) about the centre of gravity [kg m^2]
     sun_direction_W: Array  #: (3,) unit vector from the scene to the Sun
     step_s: float
+    receiver_outline: str = "fighter"  #: of `outlines` and `skins`
 
 
 def build_scene(parameters: SceneParameters) -> mujoco.MjModel:
@@ -56,8 +67,8 @@ def build_scene(parameters: SceneParameters) -> mujoco.MjModel:
     spec.modelname = "dockair"
     _set_options(spec, parameters.step_s)
     _add_sky_and_sun(spec, parameters.sun_direction_W)
-    _add_tanker(spec, parameters.tanker)
-    drogue = _add_hose(spec, parameters)
+    tanker = _add_tanker(spec, parameters.tanker)
+    drogue = _add_hose(spec, tanker, parameters)
     add_drogue(drogue, parameters.drogue, parameters.coupling, _PROBE | _RECEIVER)
     _add_receiver(spec, parameters)
     latch = spec.add_equality(
@@ -65,7 +76,21 @@ def build_scene(parameters: SceneParameters) -> mujoco.MjModel:
     )
     latch.name2, latch.active = "coupling", False
     latch.solref[:] = parameters.coupling.latch_time_constant_s, parameters.coupling.latch_damping_ratio
-    return spec.compile()
+    model = spec.compile()
+    model.opt.tolerance *= _share_of_others(model)
+    return model
+
+
+def _share_of_others(model: mujoco.MjModel) -> float:
+    """Mean of the mass matrix's diagonal without the tanker over that with it.
+
+    MuJoCo's solver divides what a step gains by the mean: beside the tanker's mass it would never begin.
+    """
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    diagonal = data.M[model.M_rowadr + model.M_rownnz - 1]  # the last of each row of the lower triangle
+    tanker = model.joint("tanker").dofadr[0]
+    return float(np.delete(diagonal, slice(tanker, tanker + 6)).mean() / diagonal.mean())
 
 
 def _set_options(spec: Any, step_s: float) -> None:
@@ -103,7 +128,7 @@ def _add_sky_and_sun(spec: Any, sun_direction_W: Array) -> None:
     )
 
 
-def _add_pieces(body: Any, pieces: list[Piece], prefix: str, reflectance: float, contact: dict[str, Any]) -> None:
+def _add_pieces(body: Any, pieces: list[Piece], prefix: str, contact: dict[str, Any]) -> None:
     kinds = {
         "ellipsoid": mujoco.mjtGeom.mjGEOM_ELLIPSOID,
         "box": mujoco.mjtGeom.mjGEOM_BOX,
@@ -115,25 +140,48 @@ def _add_pieces(body: Any, pieces: list[Piece], prefix: str, reflectance: float,
             name=prefix + piece.name,
             type=kinds[piece.kind],
             size=list(piece.size),
-            rgba=grey(min(reflectance * piece.shade, 1.0)),
+            group=_NOT_DRAWN,
             mass=0.0,
             **placed,
             **contact,
         )
 
 
-def _add_tanker(spec: Any, tanker: TankerParameters) -> None:
+def _add_skins(spec: Any, body: Any, skins: list[Skin], prefix: str, reflectance: float) -> None:
+    for skin in skins:
+        name, corners, triangles = prefix + skin.name, skin.mesh.vertices_m, skin.mesh.triangles
+        mesh = spec.add_mesh(name=name, inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL)
+        mesh.uservert, mesh.userface = corners.ravel().tolist(), triangles.ravel().tolist()
+        mesh.usernormal, mesh.userfacenormal = skin.mesh.normals.ravel().tolist(), triangles.ravel().tolist()
+        body.add_geom(
+            name=name,
+            type=mujoco.mjtGeom.mjGEOM_MESH,
+            meshname=name,
+            rgba=grey(min(reflectance * skin.shade, 1.0)),
+            mass=0.0,
+            contype=0,
+            conaffinity=0,
+        )
+
+
+def _add_tanker(spec: Any, tanker: TankerParameters) -> Any:
+    """Add the tanker; return its body."""
     body = spec.worldbody.add_body(name="tanker", pos=-np.asarray(tanker.exit_m))
+    body.add_freejoint(name="tanker")
+    body.explicitinertial, body.mass, body.gravcomp = True, _TANKER_MASS_KG, 1.0
+    body.ipos, body.inertia = [0.0, 0.0, 0.0], [_TANKER_INERTIA_KG_M2] * 3
     contact = {"contype": 0, "conaffinity": _RECEIVER}
-    _add_pieces(body, tanker_pieces(tanker), "tanker_", tanker.reflectance, contact)
+    _add_pieces(body, tanker_pieces(tanker), "tanker_", contact)
+    _add_skins(spec, body, tanker_skins(tanker), "tanker_skin_", tanker.reflectance)
+    return body
 
 
-def _add_hose(spec: Any, parameters: SceneParameters) -> Any:
-    """Add reel and links; return the drogue's body, hinged on the last one."""
+def _add_hose(spec: Any, tanker: Any, parameters: SceneParameters) -> Any:
+    """Add reel and links to the tanker; return the drogue's body, hinged on the last one."""
     hose, drogue, reel = parameters.hose, parameters.drogue, parameters.reel
     length, mass = hose.link_length_m, hose.link_mass_kg
     across = mass * (length**2 / 12.0 + hose.radius_m**2 / 4.0)
-    parent, joint_at = spec.worldbody, [0.0, 0.0, 0.0]
+    parent, joint_at = tanker, list(parameters.tanker.exit_m)
     stiffness = hose.bending_stiffness_n_m2 / length
     damping = hose.bending_damping_n_m2_s / length
     for i in range(hose.links):
@@ -183,7 +231,8 @@ def _add_receiver(spec: Any, parameters: SceneParameters) -> None:
     body.ipos = [0.0, 0.0, 0.0]
     body.fullinertia = [*np.diag(inertia), inertia[0, 1], inertia[0, 2], inertia[1, 2]]
     contact = {"contype": _RECEIVER, "conaffinity": 0, "friction": sliding(parameters.drogue.friction)}
-    _add_pieces(body, receiver_pieces(mounting), "", _RECEIVER_REFLECTANCE, contact)
+    _add_pieces(body, receiver_pieces(mounting, parameters.receiver_outline), "", contact)
+    _add_skins(spec, body, receiver_skins(mounting, parameters.receiver_outline), "skin_", _RECEIVER_REFLECTANCE)
     _add_probe(body, mounting, coupling, parameters.drogue.friction)
     body.add_site(name="probe_tip", pos=mounting.p_BP, size=[0.01] * 3)
 

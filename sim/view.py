@@ -1,7 +1,8 @@
 """A third person's view of the world; nothing that flies looks through it.
 
 The eye follows a point from behind and to the left. Greys are near-infrared reflectances in the scene's own
-light, with the shadow side filled in; LEDs are drawn as small bright spheres, though near infrared is invisible.
+light, with the shadow side filled in; LEDs are drawn as small bright spheres, though near infrared is invisible. The
+point looked at is made the origin before OpenGL's single precision sees the scene, which may be far from W's.
 """
 
 from typing import Any
@@ -46,6 +47,7 @@ class ThirdPersonView:
         self._camera = mujoco.MjvCamera()
         self._camera.distance, self._camera.azimuth = _DISTANCE_M, _AZIMUTH_DEG
         self._camera.elevation = _ELEVATION_DEG
+        self._near = mujoco.MjData(model)  # the scene about the point looked at
         self._leds = [i for i in range(model.nsite) if model.site(i).name.startswith("led_")]
 
     def render(self, data: mujoco.MjData, look_at_W: Array) -> NDArray[np.uint8]:
@@ -55,13 +57,15 @@ class ThirdPersonView:
             data: of the world; not changed.
             look_at_W: (3,) point in the middle of the picture [m].
         """
-        self._camera.lookat[:] = look_at_W
-        everything = mujoco.mjtCatBit.mjCAT_ALL.value
-        mujoco.mjv_updateScene(self._model, data, self._option, None, self._camera, everything, self._scene)
+        self._camera.lookat[:] = 0.0
+        near, everything = self._near, mujoco.mjtCatBit.mjCAT_ALL.value
+        near.geom_xpos[:], near.geom_xmat[:] = data.geom_xpos - look_at_W, data.geom_xmat
+        near.light_xdir[:] = data.light_xdir
+        mujoco.mjv_updateScene(self._model, near, self._option, None, self._camera, everything, self._scene)
         for light in self._scene.lights[: self._scene.nlight]:
             light.ambient[:] = _FILL_LIGHT
         for led in self._leds:
-            self._add_led(data.site_xpos[led])
+            self._add_led(data.site_xpos[led] - look_at_W)
         height, width = self._shape
         rect = mujoco.MjrRect(0, 0, _OVERSAMPLING * width, _OVERSAMPLING * height)
         fine = np.empty((rect.height, rect.width, 3), dtype=np.uint8)
@@ -78,11 +82,11 @@ class ThirdPersonView:
         self._renderer.free()
         self._context.free()
 
-    def _add_led(self, position_W: Any) -> None:
+    def _add_led(self, position: Any) -> None:
         if self._scene.ngeom >= self._scene.maxgeom:
             return
         geom = self._scene.geoms[self._scene.ngeom]
         size, axes = np.full(3, _LED_RADIUS_M), np.eye(3).ravel()
-        mujoco.mjv_initGeom(geom, mujoco.mjtGeom.mjGEOM_SPHERE, size, position_W, axes, _LED_RGBA)
+        mujoco.mjv_initGeom(geom, mujoco.mjtGeom.mjGEOM_SPHERE, size, position, axes, _LED_RGBA)
         geom.emission = 1.0
         self._scene.ngeom += 1

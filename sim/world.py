@@ -2,42 +2,50 @@
 
 Order within a tick, all forces from the state at its beginning:
 
-    gusts -> air loads on hose and drogue, guide of the hose in the pod, pull of the reel, receiver's own forces
-          -> MuJoCo's second half step (constraints, implicitfast) -> coupling decides -> gusts move on
+    air's motion -> air loads on hose and drogue, guide of the hose in the pod, pull of the reel, receiver's own forces
+          -> MuJoCo's second half step (constraints, implicitfast) -> coupling decides -> gusts and tanker move on
           -> MuJoCo's first half step (kinematics, contacts of the new state) -> Truth
 
-Frame W: origin at the hose's exit from the pod, x forward, z up, moving with the tanker's trim velocity (Galilean), so
-the air in W blows with (-V, 0, 0) plus the gust. The tanker does not move in W.
+Frame W: origin at the hose's exit at the start, x forward, z up, moving with the tanker's velocity at the start
+(Galilean), so that the air in W blows with (-V, 0, 0) plus its own motion. A tanker that flies straight does not move
+in W; one that turns or descends is led along its path, and takes the hose with it: over a tick its acceleration is the
+difference of the path's velocities, so that hose and drogue feel every inertial load.
 
-At construction the hose starts from its shape at rest and settles in the gusts while the receiver waits far behind;
-then the receiver is put, trimmed and at rest in W, where the probe's tip stands to the drogue's *mean* place over the
-second half of that time as asked.
+At construction the hose starts from its shape at rest and settles in the gusts, the tanker flying straight, while the
+receiver waits far behind; then the receiver is put, trimmed and at rest in W, where the probe's tip stands to the
+drogue's *mean* place over the second half of that time as asked.
 
-Not modelled: tanker motion, wake and bow wave, fuel flow.
+Not modelled: fuel flow; what hose and receiver do to the tanker.
 """
 
 import copy
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import mujoco
 import numpy as np
+from numba import njit
 
 from dockair.clock import Clock
 from dockair.errors import DockairError
 from dockair.messages import ReceiverCommand
 from dockair.rotations import Array, quaternion_from_matrix
+from dockair.sim import truth as layout
 from dockair.sim.addresses import Addresses
 from dockair.sim.air.atmosphere import STANDARD_GRAVITY_M_S2
-from dockair.sim.hose.chain import cross
+from dockair.sim.air.motion import AirState
+from dockair.sim.aircraft.tanker import TankerPath, TankerPathParameters
 from dockair.sim.hose.coupling import CouplingState, next_coupling_state, probe_in_coupling
 from dockair.sim.hose.reel import Reel
 from dockair.sim.hose.rest import hinge_angles
 from dockair.sim.hose.tow import Tow
-from dockair.sim.parts import Airframe, GustField, WorldParameters, WorldStart
+from dockair.sim.led_tanker import LedTanker
+from dockair.sim.parts import AirAround, Airframe, WorldParameters, WorldStart, still_air
 from dockair.sim.scene import SceneParameters, build_scene
-from dockair.sim.truth import Truth
+from dockair.sim.step_limit import check_step
+from dockair.sim.truth import Truth, observed, truth_of
 
-__all__ = ["World", "WorldParameters", "WorldStart", "WorldState"]
+__all__ = ["World", "DivergedError", "WorldParameters", "WorldStart", "WorldState"]
 
 _WAITING_PLACE_M = (-300.0, 0.0, -20.0)  # of the receiver while the hose settles: out of everybody's way
 _STATE = mujoco.mjtState.mjSTATE_INTEGRATION
@@ -45,27 +53,20 @@ _DIVERGED = 1e10  # acceleration at which MuJoCo calls a step unstable [m/s^2 or
 _GRAVITY = np.array([0.0, 0.0, -STANDARD_GRAVITY_M_S2])
 
 
+class DivergedError(DockairError):
+    """The integration has become unstable; the world's truth is still that of the last tick that was not."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class WorldState:
     """Everything that a world remembers; opaque."""
 
     engine: Array
-    parts: tuple[Reel, Airframe, GustField | None]
+    parts: tuple[Reel, Airframe, AirAround | None]
     coupling: CouplingState
     truth: Truth
-    gusts_W: Array
-    specific_force_B: Array
-
-
-@dataclass(slots=True, eq=False)
-class _Reactions:
-    """Forces that MuJoCo solved for in the last tick."""
-
-    root_tension_n: float
-    drogue_tension_n: float
-    coupling_force_n: float
-    a_WB: Array
-    alpha_WB_B: Array
+    seen: Array
+    air: AirState
 
 
 class World:
@@ -74,9 +75,11 @@ class World:
     Args:
         parameters: sheets and flight condition.
         receiver: the receiver's forces, trimmed.
-        gusts: the field, or None for still air.
+        air: motion of the air, or None for still air.
         start: relative geometry and settling time.
         clock: physics rate.
+        reel_locked: whether the reel is dead at a time of the flight [s]; while the hose settles it is 0.
+        tanker_path: what the tanker flies; straight on by default.
 
     Attributes:
         truth: the state now.
@@ -85,27 +88,40 @@ class World:
     """
 
     def __init__(
-        self, parameters: WorldParameters, receiver: Airframe, gusts: GustField | None, start: WorldStart, clock: Clock
+        self,
+        parameters: WorldParameters,
+        receiver: Airframe,
+        air: AirAround | None,
+        start: WorldStart,
+        clock: Clock,
+        reel_locked: Callable[[float], bool] | None = None,
+        tanker_path: TankerPath | None = None,
     ) -> None:
         if not start.settle_s >= 0.0:
             raise DockairError("start.settle_s", expected="a time >= 0", got=start.settle_s)
-        self.parameters, self._receiver, self._gusts, self._clock = parameters, receiver, gusts, clock
+        self.parameters, self._receiver, self._air, self._clock = parameters, receiver, air, clock
+        self._reel_locked = reel_locked
         self.model = build_scene(_scene_parameters(parameters, receiver, clock))
         self.data = mujoco.MjData(self.model)
         self._at = Addresses.of(self.model)
+        self._keep_views(self._at, self.data)
         self._wind_W = np.array([-parameters.airspeed_m_s, 0.0, 0.0])
         p = parameters
         self._tow = Tow(p.hose, p.drogue, p.reel, p.air, self._wind_W, clock.step_s)
         self._coupling = CouplingState.READY
+        self._tip_in_body, exit_T = np.array(p.mounting.p_BP), np.array(p.tanker.exit_m, dtype=float)
+        path = tanker_path or TankerPath(TankerPathParameters(), p.airspeed_m_s, -exit_T)
+        self._tanker = LedTanker(path, self.model, self.data, self._at, exit_T, clock.step_s)
         self.rest = rest = self._tow.rest
+        check_step(self.model, parameters, rest.root_tension_n)
         self.data.qpos[self._at.hinges] = hinge_angles(np.vstack([rest.t_W, rest.t_D_W])).ravel()
         self._put_receiver(np.array(_WAITING_PLACE_M))
-        self._reactions = _Reactions(rest.root_tension_n, rest.drogue_tension_n, 0.0, np.zeros(3), np.zeros(3))
+        self._tensions = rest.root_tension_n, rest.drogue_tension_n, 0.0
         self._observe(0)
         p_WD_mean = self._settle(round(start.settle_s / clock.step_s))
         R_WB = np.asarray(receiver.trim_R_WB)
         self._put_receiver(p_WD_mean - R_WB @ (start.p_PD_B + p.mounting.p_BP))
-        self._reactions.a_WB, self._reactions.alpha_WB_B = np.zeros(3), np.zeros(3)
+        self.data.qacc[self._at.receiver_dof] = 0.0
         self._observe(0)
 
     def step(self, command: ReceiverCommand) -> Truth:
@@ -115,12 +131,12 @@ class World:
             R_WB=truth.R_WB,
             v_WB=truth.v_WB,
             w_WB_B=truth.w_WB_B,
-            air_velocity_W=self._wind_W + truth.gust_B_m_s,
-            specific_force_B=self._specific_force_B,
+            air_velocity_W=self._wind_W + self._air_state.receiver_W,
+            air_rotation_B=self._air_state.receiver_rotation_B,
+            specific_force_B=truth.specific_force_B,
             command=command,
         )
-        wrench = self.data.xfrc_applied[self._at.receiver]
-        wrench[:3], wrench[3:] = force_W, torque_W
+        self._receiver_wrench[:3], self._receiver_wrench[3:] = force_W, torque_W
         self._advance(truth.tick + 1)
         return self.truth
 
@@ -130,20 +146,28 @@ class World:
         mujoco.mj_getState(self.model, self.data, engine, _STATE)
         return WorldState(
             engine=engine,
-            parts=copy.deepcopy((self._tow.reel, self._receiver, self._gusts)),
+            parts=copy.deepcopy((self._tow.reel, self._receiver, self._air)),
             coupling=self._coupling,
             truth=self.truth,
-            gusts_W=self._gusts_W.copy(),
-            specific_force_B=self._specific_force_B.copy(),
+            seen=self._seen,
+            air=self._air_state,
         )
 
     def restore(self, state: WorldState) -> None:
         """Go back to a saved state; what follows is the same to the bit."""
         mujoco.mj_setState(self.model, self.data, state.engine, _STATE)
         mujoco.mj_step1(self.model, self.data)
-        self._tow.reel, self._receiver, self._gusts = copy.deepcopy(state.parts)
-        self._coupling, self.truth = state.coupling, state.truth
-        self._gusts_W, self._specific_force_B = state.gusts_W.copy(), state.specific_force_B.copy()
+        self._tow.reel, self._receiver, self._air = copy.deepcopy(state.parts)
+        self._coupling, self.truth, self._seen, self._air_state = state.coupling, state.truth, state.seen, state.air
+        self._tanker.put(self.truth.time_s)
+
+    def _keep_views(self, at: Addresses, d: mujoco.MjData) -> None:
+        """Views of MuJoCo's own memory, which every tick reads: to ask for them anew takes a tenth of its time."""
+        self._bodies, self._joints = (d.xpos, d.xmat, d.cvel, d.subtree_com), (d.qpos, d.qvel, d.qacc)
+        R = d.xmat[at.tow].reshape(-1, 3, 3)
+        self._tow_places = d.xipos[at.tow], R, d.cvel[at.tow], d.subtree_com[at.tanker]
+        self._tow_wrenches, self._receiver_wrench = d.xfrc_applied[at.tow], d.xfrc_applied[at.receiver]
+        self._hose_joints = d.xpos[at.links], d.xanchor[at.drogue_joint]
 
     def _put_receiver(self, p_WB: Array) -> None:
         """Place the receiver, trimmed and at rest in W."""
@@ -168,111 +192,95 @@ class World:
     def _advance(self, tick: int) -> None:
         """One tick, the receiver's forces being applied already."""
         at, data, before = self._at, self.data, self.truth
-        data.xfrc_applied[at.tow] = self._tow.wrenches(
-            data.xipos[at.tow],
-            data.xmat[at.tow].reshape(-1, 3, 3),
-            data.cvel[at.tow],
-            data.subtree_com[at.tow.start],
-            self._gusts_W[:-1],
-            before.reel_position_m,
+        self._tow_wrenches[:] = self._tow.wrenches(
+            *self._tow_places, self._air_state.tow_W, before.reel_position_m, self._tanker.pod()
         )
+        locked = self._reel_locked is not None and self._reel_locked(before.time_s)
         data.qfrc_applied[at.reel_dof] = self._tow.reel.step(
-            before.root_tension_n, before.reel_position_m, before.reel_rate_m_s
+            before.root_tension_n, before.reel_position_m, before.reel_rate_m_s, locked
         )
-        mujoco.mj_step2(self.model, data)
-        mujoco.mj_rnePostConstraint(self.model, data)
-        self._reactions = self._solved_forces()
+        self._tanker.set_out(self._clock.seconds(tick))
+        self._solve(self._clock.seconds(tick))
         self._decide_coupling()
-        if self._gusts is not None:
-            self._gusts.step()
-        if not (np.abs(data.qacc) < _DIVERGED).all():
-            time_s = self._clock.seconds(tick)
-            raise DockairError("world", expected="a physics step that converges", got=f"diverged at {time_s:.3f} s")
+        if self._air is not None:
+            self._air.step()
+        self._tanker.arrive()
         mujoco.mj_step1(self.model, data)
         self._observe(tick)
 
-    def _solved_forces(self) -> _Reactions:
-        """Forces at the beginning of the tick, which MuJoCo has just solved for."""
+    def _solve(self, time_s: float) -> None:
+        """MuJoCo's second half step, and the forces at its beginning: they must be taken before it integrates."""
         at, data = self._at, self.data
+        mujoco.mj_fwdActuation(self.model, data)
+        mujoco.mj_fwdAcceleration(self.model, data)
+        mujoco.mj_fwdConstraint(self.model, data)
+        mujoco.mj_rnePostConstraint(self.model, data)
         at_exit = at.tow.start + self._tow.link_at_exit(self.truth.reel_position_m)
+        root, drogue, converged = _solved(
+            data.cfrc_int, self._bodies[1], self._joints[2], at_exit, at.drogue, _DIVERGED
+        )
+        if not converged:
+            raise DivergedError("world", expected="a physics step that converges", got=f"diverged at {time_s:.3f} s")
         pull = 0.0
         if self._coupling is CouplingState.LATCHED:  # its three rows come first: it is the only equality
             pull = float(data.efc_force[:3] @ self.truth.R_WD[:, 0])
-        return _Reactions(
-            root_tension_n=_norm(data.cfrc_int[at_exit, 3:]),
-            drogue_tension_n=_norm(data.cfrc_int[at.drogue, 3:]),
-            coupling_force_n=pull,
-            a_WB=data.qacc[at.receiver_dof][:3].copy(),
-            alpha_WB_B=data.qacc[at.receiver_dof][3:].copy(),
-        )
+        self._tensions = root, drogue, pull
+        mujoco.mj_implicit(self.model, data)
 
     def _decide_coupling(self) -> None:
         p = self.parameters.coupling
-        probe = probe_in_coupling(self.truth, self._reactions.coupling_force_n, p)
+        if self._coupling is CouplingState.READY and self._seen[layout.TIP_DISTANCE] > p.capture_distance_m:
+            return  # nothing to decide, and no time to lose
+        probe = probe_in_coupling(self.truth, self._tensions[2], p)
         self._coupling = next_coupling_state(self._coupling, probe, p)
         self.data.eq_active[self._at.latch] = self._coupling is CouplingState.LATCHED
 
     def _observe(self, tick: int) -> None:
-        """Take the truth of the present state, and the gusts where everything is."""
-        at, data, solved = self._at, self.data, self._reactions
-        self._gusts_W = self._gusts_at_bodies()
-        root = data.subtree_com[at.tow.start]
-        w_WD = data.cvel[at.drogue, :3]
-        R_WD = data.xmat[at.drogue].reshape(3, 3).copy()
-        p_WD = data.xpos[at.drogue].copy()
-        R_WB = data.xmat[at.receiver].reshape(3, 3).copy()
-        p_WB, p_BP_W = data.xpos[at.receiver].copy(), R_WB @ self.parameters.mounting.p_BP
-        qvel = data.qvel[at.receiver_dof]
+        """Take the truth of the present state, and the air's motion where everything is."""
+        at, data, tanker = self._at, self.data, self._tanker
+        self._seen = x = observed(
+            self._bodies,
+            self._joints,
+            at.observed,
+            self._tip_in_body,
+            self.parameters.coupling.depth_m,
+            _GRAVITY,
+        )
+        R_WB, p_WB = x[layout.R_WB].reshape(3, 3), x[layout.P_WB]
+        R_WT, p_WT = tanker.R_WT, tanker.p_WT
+        drogue, places = self.parameters.drogue, self._tow_places[0].copy()
+        places[-1] += (drogue.drag_centre_x_m - drogue.centre_of_mass_x_m) * x[layout.R_WD][::3]  # at its canopy
+        air = still_air(len(places)) if self._air is None else self._air.at(places, R_WB, p_WB, R_WT, p_WT)
         probe_touches, receiver_touches = at.contacts(data.contact.geom) if data.ncon else (False, "")
-        self._specific_force_B = R_WB.T @ (solved.a_WB - _GRAVITY)
-        self.truth = Truth(
+        joints = np.empty(places.shape)
+        joints[:-1], joints[-1] = self._hose_joints
+        self._air_state = air
+        self.truth = truth_of(
             tick=tick,
             time_s=self._clock.seconds(tick),
-            R_WB=R_WB,
-            p_WB=p_WB,
-            v_WB=qvel[:3].copy(),
-            w_WB_B=qvel[3:].copy(),
-            alpha_WB_B=solved.alpha_WB_B,
-            a_WB=solved.a_WB,
-            specific_force_B=self._specific_force_B,
-            p_WP=p_WB + p_BP_W,
-            v_WP=qvel[:3] + cross(R_WB @ qvel[3:], p_BP_W),
-            R_WD=R_WD,
-            p_WD=p_WD,
-            v_WD=data.cvel[at.drogue, 3:] + cross(w_WD, p_WD - root),
-            w_WD_D=R_WD.T @ w_WD,
-            p_WH=np.vstack([data.xpos[at.links], data.xanchor[at.drogue_joint]]),
-            R_WT=np.eye(3),
-            p_WT=-np.asarray(self.parameters.tanker.exit_m),
-            reel_position_m=float(data.qpos[at.reel_qpos]),
-            reel_rate_m_s=float(data.qvel[at.reel_dof]),
-            root_tension_n=solved.root_tension_n,
-            drogue_tension_n=solved.drogue_tension_n,
-            gust_B_m_s=self._gusts_W[-1].copy(),
-            gust_D_m_s=self._gusts_W[-2].copy(),
-            airspeed_m_s=self._receiver.airspeed_m_s,
-            angle_of_attack_rad=self._receiver.angle_of_attack_rad,
-            sideslip_rad=self._receiver.sideslip_rad,
-            throttle=self._receiver.throttle,
+            seen=x,
+            joints_W=joints,
+            tanker=tanker,
+            tensions_n=self._tensions,
+            air=air,
+            receiver=self._receiver,
             latched=self._coupling is CouplingState.LATCHED,
-            coupling_force_n=solved.coupling_force_n,
-            probe_touches_drogue=probe_touches,
-            receiver_touches=receiver_touches,
+            touches=(probe_touches, receiver_touches),
         )
 
-    def _gusts_at_bodies(self) -> Array:
-        """(links + 2, 3) gusts at the links' middles, the drogue, the receiver."""
-        at, data = self._at, self.data
-        n = at.tow.stop - at.tow.start
-        if self._gusts is None:
-            return np.zeros((n + 1, 3))
-        x = np.empty(n + 1)
-        x[:-1], x[-1] = data.xipos[at.tow, 0], data.xpos[at.receiver, 0]
-        return self._gusts.velocity(x)
 
-
-def _norm(v: Array) -> float:
-    return float(np.sqrt(v @ v))
+@njit(cache=True)
+def _solved(cfrc_int, xmat, qacc, at_exit, drogue, limit):  # type: ignore[no-untyped-def]
+    """Tensions at the exit and at the drogue, positive where the hose pulls; whether all accelerations are finite."""
+    converged = True
+    for a in qacc:
+        converged = converged and abs(a) < limit  # also when it is not a number
+    tensions = np.empty(2)
+    for i, body in enumerate((at_exit, drogue)):
+        f, R = cfrc_int[body], xmat[body]
+        size = np.sqrt(f[3] * f[3] + f[4] * f[4] + f[5] * f[5])
+        tensions[i] = np.copysign(size, f[3] * R[0] + f[4] * R[3] + f[5] * R[6])
+    return tensions[0], tensions[1], converged
 
 
 def _scene_parameters(parameters: WorldParameters, receiver: Airframe, clock: Clock) -> SceneParameters:
@@ -288,4 +296,5 @@ def _scene_parameters(parameters: WorldParameters, receiver: Airframe, clock: Cl
         receiver_inertia_B=np.asarray(receiver.inertia_B),
         sun_direction_W=p.sun_direction_W,
         step_s=clock.step_s,
+        receiver_outline=p.receiver_outline,
     )

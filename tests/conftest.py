@@ -13,6 +13,8 @@ from dockair.messages import ReceiverCommand
 from dockair.parameters import load_parameters
 from dockair.rotations import Array
 from dockair.sim.air.atmosphere import standard_atmosphere
+from dockair.sim.air.motion import AirMotion
+from dockair.sim.aircraft.tanker import TankerPath, TankerPathParameters
 from dockair.sim.hose.chain import DrogueParameters, HoseParameters
 from dockair.sim.hose.coupling import CouplingParameters
 from dockair.sim.hose.reel import ReelParameters
@@ -51,10 +53,12 @@ class ReceiverOnRails:
         v_WB: Array,
         w_WB_B: Array,
         air_velocity_W: Array,
+        air_rotation_B: Array,
         specific_force_B: Array,
         command: ReceiverCommand,
     ) -> tuple[Array, Array]:
-        self.specific_force_B, self.air_velocity_W = specific_force_B, air_velocity_W
+        self.specific_force_B = specific_force_B
+        self.air_velocity_W, self.air_rotation_B = air_velocity_W, air_rotation_B
         self.force_W = self.mass_kg * (np.array([0.0, 0.0, 9.80665]) + self.gain_1_s * (command.velocity_m_s - v_WB))
         return self.force_W, R_WB @ (self.inertia_B @ (-self.gain_1_s * w_WB_B))
 
@@ -68,6 +72,8 @@ def make_world(
     p_PD_B: tuple[float, float, float] = (4.0, 0.0, 0.0),
     settle_s: float = 0.0,
     rate_hz: int = 1000,
+    reel_locked: Callable[[float], bool] | None = None,
+    tanker_path: Any = None,
     **overrides: dict[str, float],
 ) -> World:
     """A world from the sheets; `overrides` by sheet."""
@@ -80,7 +86,13 @@ def make_world(
         sun_direction_W=np.array([0.0, 0.0, 1.0]),
     )
     start = WorldStart(p_PD_B=np.array(p_PD_B), settle_s=settle_s)
-    return World(parameters, receiver or ReceiverOnRails(), gusts, start, Clock(rate_hz))
+    points_B = np.zeros((1, 3))
+    air = None if gusts is None else AirMotion(gusts, exit_T=sheets["tanker"].exit_m, receiver_points_B=points_B)
+    path = tanker_path
+    if isinstance(tanker_path, TankerPathParameters):
+        path = TankerPath(tanker_path, airspeed_m_s, -sheets["tanker"].exit_m)
+    clock, rails = Clock(rate_hz), receiver or ReceiverOnRails()
+    return World(parameters, rails, air, start, clock, reel_locked, path)
 
 
 @pytest.fixture(name="make_world")

@@ -19,6 +19,11 @@ bias of the receiver's inertial velocity.
 After contact the view says nothing about the way to the tanker: the way pushed in is the integral of what was
 commanded beyond the drogue's mean velocity, itself the slow average of u during the approach.
 
+Where the tanker turns or descends, the receiver's own path does so as announced (`announced_path`), and u stays small.
+What announced and true turn differ by shows as a drift across that grows; u to the left goes into the turn:
+
+    r = r_announced + k_r (u_left + integral of u_left dt / T_r)                                          (3)
+
 Not modelled: the bow wave's push on the drogue.
 """
 
@@ -27,7 +32,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from dockair.messages import ReceiverCommand
+from dockair.messages import ReceiverCommand, TankerAnnouncement
+from dockair.nav.guidance.announced_path import AnnouncedPath
 from dockair.nav.guidance.drogue_motion import DrogueMotion, SwingSettings
 from dockair.nav.guidance.phases import Phase, PhaseLimits, Situation, next_phase
 from dockair.rotations import Array
@@ -50,6 +56,8 @@ class GuidanceSettings:
     velocity_limit_m_s: float = 2.5
     closure_acceleration_m_s2: float = 0.6  # how fast the closure speed is asked for
     mean_velocity_time_s: float = 4.0  # averaging time of the drogue's mean velocity
+    turn_gain_rad_m: float = 1e-3  # k_r: at 180 m/s a drift across goes within 6 s, slow beside the swing and Eq. (1)
+    turn_learning_s: float = 10.0  # T_r: the turn's error is known when the probe is in the basket and sees no drift
     swing: SwingSettings = field(default_factory=SwingSettings)
     limits: PhaseLimits = field(default_factory=PhaseLimits)
 
@@ -76,9 +84,14 @@ class Guidance:
         delay = round(settings.response_time_s * control_rate_hz)
         self._given: deque[Array] = deque([np.zeros(2)] * delay, maxlen=delay)  # commands across that are not flown yet
         self._flown: Array = np.zeros(2)  # y_r now
+        self._path, self._turn_error_m_s = AnnouncedPath(), 0.0
         self._seen = False
         self._mean_along = self._closure = 0.0
         self._in_phase_s = self._steady_s = self._unusable_s = self._pushed_in_m = 0.0
+
+    def announce(self, announcement: TankerAnnouncement) -> None:
+        """Take note of what the tanker is about to do."""
+        self._path.announce(announcement)
 
     def step(self, state: RelativeState) -> ReceiverCommand:
         """Advance by one control tick.
@@ -101,7 +114,14 @@ class Guidance:
         self._u = _limited(self._u + u_dot * self._dt, self._settings.velocity_limit_m_s)
         self._flown = self._flown + self._given[0] * self._dt
         self._given.append(self._u[1:])
-        return ReceiverCommand(velocity_m_s=self._u.copy(), acceleration_m_s2=u_dot)
+        turn, climb = self._path.step(self._dt)
+        if self._path.is_announced:
+            if state.usable and self.phase in (Phase.PRE_CONTACT, Phase.APPROACH):
+                self._turn_error_m_s += float(self._u[1]) * self._dt / self._settings.turn_learning_s
+            turn += self._settings.turn_gain_rad_m * (float(self._u[1]) + self._turn_error_m_s)  # Eq. (3)
+        return ReceiverCommand(
+            velocity_m_s=self._u.copy(), acceleration_m_s2=u_dot, turn_rate_rad_s=turn, climb_rad=climb
+        )
 
     def _count(self, state: RelativeState) -> None:
         settings, limits = self._settings, self._settings.limits

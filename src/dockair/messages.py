@@ -6,6 +6,7 @@
 | ImuSample       | sim/imu    | nav                 | gyro rate       | I     |
 | ReceiverCommand | nav        | sim flight control  | control rate    | B     |
 | NavSolution     | nav        | loop, log, gymnasium| control rate    | B, C  |
+| TankerAnnouncement | sim tanker | nav, if it listens | before a change |    |
 
 A test freezes the fields of the two sensor messages: no LED index, visibility, pose or gust may ever enter them.
 """
@@ -62,6 +63,8 @@ class ReceiverCommand:
 
     velocity_m_s: Array = field(default_factory=lambda: np.zeros(3))  #: (3,) velocity beyond trim
     acceleration_m_s2: Array = field(default_factory=lambda: np.zeros(3))  #: (3,) feed-forward
+    turn_rate_rad_s: float = 0.0  #: of the trim path itself, positive to the left
+    climb_rad: float = 0.0  #: of the trim path itself, against the air
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -87,8 +90,22 @@ class NavSolution:
     led_pixels_px: Array  #: (8, 2) where each LED was seen; NaN where it was not
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TankerAnnouncement:
+    """What the tanker says by radio that it is about to do: from one steady flight to another. Not quite exact."""
+
+    time_stamp_s: float  #: when it was said
+    starts_s: float
+    entry_s: float  #: from its start until the new steady flight
+    turn_rate_rad_s: float  #: of the heading then, positive to the left
+    climb_rad: float  #: of the way through the air then
+
+
 class Navigates(Protocol):
-    """Anything that can stand where `nav.navigator.Navigator` stands; a scenario may name any such class."""
+    """Anything that can stand where `nav.navigator.Navigator` stands; a scenario may name any such class.
+
+    One that has a method `announce(TankerAnnouncement)` is told of the tanker's changes, before the tick's `step`.
+    """
 
     def step(self, imu: Sequence[ImuSample], frame: CameraFrame | None) -> NavSolution:
         """Take what arrived since the last control tick; return what is believed and commanded now."""

@@ -23,6 +23,7 @@ STREAM_NAMES = (
     "dirt",
     "hot_pixels",
     "inertial_velocity",
+    "announcement",
 )
 
 

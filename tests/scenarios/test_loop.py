@@ -1,13 +1,16 @@
 """The closed loop: the first flight, its repeatability, and the step of the physics."""
 
 import hashlib
+import json
 
 import numpy as np
 import pytest
 
 from dockair.messages import ReceiverCommand
 from dockair.scenarios.loop import Flight, fly
+from dockair.scenarios.referee import Outcome
 from dockair.scenarios.schema import load_scenario
+from dockair.sim.world import DivergedError, World
 
 pytestmark = pytest.mark.slow
 
@@ -78,3 +81,45 @@ def test_a_flight_without_contact_ends_at_its_duration():
     result = fly(truth_flight(**{"flight.duration_s": 2.0}))
     assert result.outcome == "timeout" and result.contact is None
     assert result.duration_s == pytest.approx(2.0)
+
+
+def test_receiver_docks_in_the_turn_of_the_racetrack_and_on_the_way_down_the_toboggan():
+    """On the truth, so that it is about the flying: contact within the scenarios' own limits."""
+    for name, bank_deg in (("racetrack", 25.0), ("toboggan", 0.0)):
+        scenario = load_scenario(name, {"navigation.navigator": "truth"})
+        flight = Flight(scenario, 0)
+        while flight.referee.contact is None and (tick := flight.step()).outcome is None:
+            pass
+        contact, truth = flight.referee.contact, tick.truth
+        assert contact is not None, name
+        assert scenario.accept.shortfalls("contact", contact.radial_offset_m, contact.closure_speed_m_s) == []
+        assert np.degrees(np.arctan2(-truth.R_WT[2, 1], truth.R_WT[2, 2])) == pytest.approx(bank_deg, abs=0.1)
+        assert np.linalg.norm(truth.p_WT) > 50.0  # far from where it began
+
+
+def test_simulation_that_diverges_ends_the_flight_with_an_outcome_and_a_log_without_nan():
+    flight = Flight(truth_flight(), 0)
+    for _ in range(20):
+        flight.step()
+    flight.world.data.qvel[flight.world.model.joint("hose_3_y").dofadr[0]] = 1e9
+    with np.errstate(all="ignore"):
+        tick = flight.step()
+    assert tick.outcome is Outcome.DIVERGED
+    for value in (tick.truth.p_WD, tick.truth.v_WD, tick.truth.p_WH, tick.solution.p_PD_B):
+        assert np.isfinite(value).all()
+
+
+def test_flight_that_diverges_is_recorded_to_its_last_sound_tick(tmp_path, monkeypatch):
+    whole = World.step
+
+    def step(world, command):
+        if world.truth.tick >= 300:
+            raise DivergedError("world", expected="a physics step that converges", got="diverged at 0.301 s")
+        return whole(world, command)
+
+    monkeypatch.setattr(World, "step", step)
+    result = fly(truth_flight(), out=tmp_path / "out")
+    assert result.outcome == "diverged" and result.duration_s == pytest.approx(0.3)
+    table = json.loads((tmp_path / "out" / "result.json").read_text())
+    assert table["outcome"] == "diverged"
+    assert (tmp_path / "out" / "flight.parquet").is_file()

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dockair.errors import DockairError, MachineError
-from dockair.messages import NavSolution
+from dockair.messages import NavSolution, TankerAnnouncement
 from dockair.scenarios import message_log
 from dockair.scenarios.exact_json import decode, encode
 from dockair.scenarios.message_log import (
@@ -50,6 +50,16 @@ def test_messages_are_read_back_as_they_were_delivered(hand_made, tmp_path):
     read = list(read_messages(tmp_path))
     assert len(read) == 230
     assert all(_same_messages(delivered, messages) for delivered, messages in zip(ticks, read, strict=True))
+
+
+def test_announcement_is_read_back_in_the_tick_it_was_made_in_and_in_no_other(hand_made, tmp_path):
+    said = TankerAnnouncement(
+        time_stamp_s=0.1 + 0.2, starts_s=12.25, entry_s=10.0, turn_rate_rad_s=0.0254, climb_rad=-0.0
+    )
+    with MessageLog(tmp_path, NavigatorRecipe(class_name="a:B", sheets=hand_made.sheets)) as log:
+        for k, (_, imu, frame, solution) in enumerate(hand_made.ticks(5)):
+            log.append(imu, frame, solution, said if k == 3 else None)
+    assert [messages.announcement for messages in read_messages(tmp_path)] == [None, None, None, said, None]
 
 
 def test_estimates_are_read_back_to_the_last_bit(hand_made, tmp_path):

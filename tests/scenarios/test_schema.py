@@ -28,7 +28,7 @@ SIGMAS = "three numbers, each 0 or more"
 @pytest.mark.parametrize(
     ("text", "key", "expected"),
     [
-        ("speed = 1", "speed", "a known key, got 'speed'; exists: accept, camera, claim,"),
+        ("speed = 1", "speed", "a known key, got 'speed'; exists: accept, bow_wave, camera,"),
         ("flight.airspeed_kt = 1", "flight.airspeed_kt", "a known key, got 'airspeed_kt'; exists: airspeed_m_s,"),
         ('flight.airspeed_m_s = "180"', "flight.airspeed_m_s", f"{SPEED}, got '180'"),
         ("flight.airspeed_m_s = true", "flight.airspeed_m_s", f"{SPEED}, got True"),
@@ -239,3 +239,64 @@ def test_acceptance_names_each_figure_that_was_not_reached():
     assert Accept().shortfalls("miss", None, None) == []
     assert accept.claims_figures
     assert not Accept().claims_figures
+
+
+def test_wake_bow_wave_and_single_gusts_are_off_unless_asked_for(scenario_file):
+    scenario = load_scenario(scenario_file('name = "mine"'))
+    assert (scenario.wake.present, scenario.bow_wave.present, scenario.gusts) == (False, False, ())
+    on = load_scenario(scenario_file('name = "mine"\n[wake]\npresent = true\n[bow_wave]\npresent = true'))
+    assert on.wake.present and on.bow_wave.present
+
+
+def test_single_gusts_are_read_in_order_as_the_world_takes_them(scenario_file):
+    text = "[[gusts]]\nat_s = 5.0\nlength_m = 30.0\nvelocity_m_s = [0.0, 0.0, -4.0]\n"
+    first, second = load_scenario(scenario_file(f'name = "mine"\n{text}{text.replace("5.0", "9.5")}')).gusts
+    assert (first.gust.at_s, second.gust.at_s, first.gust.length_m) == (5.0, 9.5, 30.0)
+    np.testing.assert_array_equal(first.gust.velocity_m_s, [0.0, 0.0, -4.0])
+
+
+@pytest.mark.parametrize(
+    ("text", "key", "expected"),
+    [
+        ("wake = true", "wake", "a table, got True"),
+        ("wake.present = 1", "wake.present", "true or false, got 1"),
+        ("bow_wave.radius_m = 1.0", "bow_wave.radius_m", "a known key, got 'radius_m'; exists: present"),
+        ("gusts = 3", "gusts", "tables [[gusts]], each with at_s, length_m and velocity_m_s, got 3"),
+        (
+            "gusts = [{at_s = -1.0, length_m = 30.0, velocity_m_s = [0.0, 0.0, 1.0]}]",
+            "gusts[0].at_s",
+            "a number from 0.0 to 600.0, got -1.0",
+        ),
+        (
+            "gusts = [{at_s = 1.0, length_m = 0.0, velocity_m_s = [0.0, 0.0, 1.0]}]",
+            "gusts[0].length_m",
+            "a number from 1.0 to 1000.0, got 0.0",
+        ),
+        (
+            "gusts = [{at_s = 1.0, length_m = 30.0, velocity_m_s = [0.0, 0.0, 31.0]}]",
+            "gusts[0].velocity_m_s[2]",
+            "three numbers from -30 to 30, got 31.0",
+        ),
+    ],
+)
+def test_a_wrong_wake_or_gust_is_refused_by_its_key(scenario_file, text, key, expected):
+    path = scenario_file(f'name = "mine"\n{text}')
+    with pytest.raises(DockairError) as caught:
+        load_scenario(path)
+    assert str(caught.value).startswith(f"{path}: {key}: expected {expected}")
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "where"),
+    [
+        ("tanker.manoeuvre", "loop", "tanker.manoeuvre"),
+        ("tanker.bank_deg", "0", "tanker.bank_deg"),
+        ("tanker.descent_deg", "-3", "tanker.descent_deg"),
+        ("tanker.turns", "up", "tanker.turns"),
+        ("parameters.hose.links", "0", "parameters.hose.links"),
+        ("parameters.drogue.mass_kg", "-20", "parameters.drogue.mass_kg"),
+    ],
+)
+def test_tanker_or_hose_that_cannot_be_is_refused_by_its_key(key, value, where):
+    with pytest.raises(DockairError, match=where.replace(".", r"\.")):
+        load_scenario("racetrack", {key: value})
