@@ -11,12 +11,10 @@
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Self
 
-import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
 from dockair.errors import DockairError
 from dockair.scenarios.refusal import Expected
-from dockair.sim.air.discrete_gust import DiscreteGust
 
 
 def _tuple_from_list(value: Any) -> Any:
@@ -68,22 +66,17 @@ class SingleGust(_Table):
         Expected("three numbers from -30 to 30"),
     ]  #: at its peak: forward, left, up
 
-    @property
-    def gust(self) -> DiscreteGust:
-        """What the world is given."""
-        return DiscreteGust(at_s=self.at_s, length_m=self.length_m, velocity_m_s=np.array(self.velocity_m_s))
-
 
 class Wake(_Table):
     """The tanker's wake; sheet `wake`."""
 
-    present: bool = False
+    present: bool = True
 
 
 class BowWave(_Table):
     """The receiver's bow wave; sheet `bow_wave`."""
 
-    present: bool = False
+    present: bool = True
 
 
 Gusts = Annotated[

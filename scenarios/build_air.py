@@ -9,7 +9,7 @@ from dockair.clock import Clock
 from dockair.rotations import Array
 from dockair.scenarios.schema import Scenario
 from dockair.sim.air.bow_wave import BowWaveParameters, bow_wave_coefficients
-from dockair.sim.air.discrete_gust import DiscreteGusts
+from dockair.sim.air.discrete_gust import DiscreteGust, DiscreteGusts
 from dockair.sim.air.motion import AirMotion
 from dockair.sim.air.turbulence import DrydenField, TurbulenceParameters, gust_sigma
 from dockair.sim.air.wake import WakeParameters, wake_coefficients
@@ -90,7 +90,10 @@ def _single_gusts(scenario: Scenario, world: WorldParameters, clock: Clock, sett
     wind_W, air = np.array([-world.airspeed_m_s, 0.0, 0.0]), world.air
     rest = rest_shape(world.hose, world.drogue, wind_W, air.density_kg_m3, air.kinematic_viscosity_m2_s)
     return DiscreteGusts(
-        [table.gust for table in scenario.gusts],
+        [
+            DiscreteGust(at_s=one.at_s, length_m=one.length_m, velocity_m_s=np.array(one.velocity_m_s))
+            for one in scenario.gusts
+        ],
         world.airspeed_m_s,
         clock.step_s,
         met_at_m=float(rest.p_WH[-1, 0]),

@@ -30,7 +30,10 @@ def test_the_navigator_of_ones_own_flies_from_the_folder_one_stands_in_and_repla
     assert replayed.returncode == 0 and replayed.stdout.startswith("identical"), replayed.stderr
 
 
-@pytest.mark.parametrize("page", ["README.md", "docs/environments.md", "docs/heading.md", "docs/navigation.md", "docs/results.md"])
+PAGES = ["README.md", "docs/environments.md", "docs/heading.md", "docs/navigation.md", "docs/results.md"]
+
+
+@pytest.mark.parametrize("page", PAGES)
 def test_code_on_a_page_is_python(page):
     blocks = python_blocks(page)
     assert blocks

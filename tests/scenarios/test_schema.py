@@ -251,8 +251,8 @@ def test_wake_bow_wave_and_single_gusts_are_off_unless_asked_for(scenario_file):
 def test_single_gusts_are_read_in_order_as_the_world_takes_them(scenario_file):
     text = "[[gusts]]\nat_s = 5.0\nlength_m = 30.0\nvelocity_m_s = [0.0, 0.0, -4.0]\n"
     first, second = load_scenario(scenario_file(f'name = "mine"\n{text}{text.replace("5.0", "9.5")}')).gusts
-    assert (first.gust.at_s, second.gust.at_s, first.gust.length_m) == (5.0, 9.5, 30.0)
-    np.testing.assert_array_equal(first.gust.velocity_m_s, [0.0, 0.0, -4.0])
+    assert (first.at_s, second.at_s, first.length_m) == (5.0, 9.5, 30.0)
+    assert first.velocity_m_s == (0.0, 0.0, -4.0)
 
 
 @pytest.mark.parametrize(
