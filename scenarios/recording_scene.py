@@ -1,4 +1,8 @@
-"""The three-dimensional part of an episode: the model's primitives moved by the truth, the belief beside it."""
+"""The three-dimensional part of an episode: the model's shapes moved by the truth, the belief beside it.
+
+Axes of "world": origin in the hose's exit, x level along the tanker's heading, z up. In straight flight that is W; in a
+racetrack W's origin is soon kilometres away, where rerun's single precision would shake what it draws.
+"""
 
 from collections import defaultdict
 from collections.abc import Sequence
@@ -7,10 +11,11 @@ from typing import Any
 import numpy as np
 
 from dockair.calibration import NavigationSheets
-from dockair.rotations import Array, quaternion_from_matrix
+from dockair.rotations import Array, matrix_from_yaw_pitch_roll, quaternion_from_matrix
 from dockair.scenarios.flight_log import FlightLog
 from dockair.scenarios.recording_layout import BELIEF, TRUTH
 from dockair.sim.shapes import Shape
+from dockair.sim.truth import Truth
 
 #: Body of the model -> (rotation, position) in Truth.
 _MOVED_BY = {"tanker": ("R_WT", "p_WT"), "drogue": ("R_WD", "p_WD"), "receiver": ("R_WB", "p_WB")}
@@ -42,19 +47,32 @@ def log_scene(
     _log_bodies(recording, shapes)
     _log_receiver_fittings(recording, sheets)
     times = time_columns(log, ticks)
+    p_TE = -log.truths[0].p_WT  # at the start the exit is W's origin, and T's axes are W's
     truths = [log.truths[k] for k in ticks]
+    axes = [_level_axes(truth, p_TE) for truth in truths]
     for body, (rotation, position) in _MOVED_BY.items():
-        rotations = [getattr(truth, rotation) for truth in truths]
-        translations = [getattr(truth, position) for truth in truths]
+        rotations = [R_EW @ getattr(truth, rotation) for truth, (R_EW, _) in zip(truths, axes, strict=True)]
+        translations = [
+            R_EW @ (getattr(truth, position) - p_WE) for truth, (R_EW, p_WE) in zip(truths, axes, strict=True)
+        ]
         recording.send_columns(f"world/{body}", times, _transforms(translations, rotations))
     recording.log(
         "world/hose", rr.LineStrips3D.from_fields(colors=_HOSE_COLOUR, radii=_hose_radius(shapes)), static=True
     )
-    recording.send_columns("world/hose", times, rr.LineStrips3D.columns(strips=[truth.p_WH for truth in truths]))
+    strips = [(truth.p_WH - p_WE) @ R_EW.T for truth, (R_EW, p_WE) in zip(truths, axes, strict=True)]
+    recording.send_columns("world/hose", times, rr.LineStrips3D.columns(strips=strips))
     _log_belief(recording, log, ticks, sheets, times)
-    path = np.array([truth.p_WP for truth in log.truths])
+    everywhere = ((truth, *_level_axes(truth, p_TE)) for truth in log.truths)
+    path = np.array([R_EW @ (truth.p_WP - p_WE) for truth, R_EW, p_WE in everywhere])
     line = rr.LineStrips3D([path], colors=[*TRUTH, 90], radii=rr.Radius.ui_points(0.8))
     recording.log("world/probe_path", line, static=True)
+
+
+def _level_axes(truth: Truth, p_TE: Array) -> tuple[Array, Array]:
+    """R_EW (3, 3) and p_WE (3,) of the axes in which an episode is drawn."""
+    ahead = truth.R_WT[:, 0]
+    R_EW = matrix_from_yaw_pitch_roll(float(np.arctan2(ahead[1], ahead[0])), 0.0, 0.0).T
+    return R_EW, truth.p_WT + truth.R_WT @ p_TE
 
 
 def _transforms(translations: Sequence[Array], rotations: Sequence[Array]) -> Any:

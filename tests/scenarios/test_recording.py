@@ -10,6 +10,7 @@ import pytest
 from PIL import Image
 
 from dockair.messages import Window
+from dockair.rotations import matrix_from_yaw_pitch_roll
 from dockair.scenarios import picture
 from dockair.scenarios.flight_log import FlightLog
 from dockair.scenarios.message_log import MessageLog, NavigatorRecipe, read_messages
@@ -119,6 +120,25 @@ def test_the_believed_ring_passes_through_the_leds_when_the_belief_is_true(make_
     solution = replace(solution, R_BD=truth.R_WB.T @ truth.R_WD)
     ring = believed_ring_px(solution, flight.sheets, count=48)
     np.testing.assert_allclose(ring[:-1:6], flight.leds_px(truth), atol=1e-9)
+
+
+def test_kilometres_away_and_on_another_heading_the_bodies_are_drawn_where_they_would_be_drawn_here(flown, hand_made):
+    """From the second tick on everything is 9 km off and turned by 70 degrees: the drawn poses are those of before."""
+    folder, log, entries = flown
+    turn, far = matrix_from_yaw_pitch_roll(np.radians(70.0), 0.0, 0.0), np.array([7000.0, -6000.0, 50.0])
+    away = FlightLog()
+    for k, (truth, imu, frame, solution) in enumerate(entries):
+        p_WE = truth.p_WT - truth.R_WT @ entries[0][0].p_WT
+        moved = {name: far + turn @ (getattr(truth, name) - p_WE) for name in ("p_WT", "p_WD", "p_WB", "p_WP")}
+        turned = {name: turn @ getattr(truth, name) for name in ("R_WT", "R_WD", "R_WB")}
+        hose = {"p_WH": far + (truth.p_WH - p_WE) @ turn.T}
+        away.append(replace(truth, **moved, **turned, **hose) if k else truth, imu, frame, solution)
+    here, there = (_columns(_write(folder, each, hand_made.sheets)) for each in (log, away))
+    for name in ("tanker", "drogue", "receiver"):
+        places = [np.array(columns[f"/world/{name}:Transform3D:translation"]) for columns in (here, there)]
+        np.testing.assert_allclose(*places, atol=1e-5)
+    strips = [np.array(columns["/world/hose:LineStrips3D:strips"][-1]) for columns in (here, there)]
+    np.testing.assert_allclose(*strips, atol=1e-5)
 
 
 def test_frames_are_thinned_evenly_until_they_fit():
