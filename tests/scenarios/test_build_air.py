@@ -12,6 +12,7 @@ from dockair.sim.air.turbulence import DrydenField
 
 SETTLE_S = 2.0
 POINTS_B = np.array([[0.0, 0.0, 0.0], [0.0, 4.0, 0.0], [0.0, -4.0, 0.0], [-5.0, 0.0, 0.0]])
+CALM = {"wake.present": False, "bow_wave.present": False}
 DRYDEN = {"turbulence.model": "dryden", "turbulence.sigma_m_s": 1.0}
 GUST = {"at_s": 0.0, "length_m": 30.0, "velocity_m_s": [0.0, 0.0, -4.0]}
 
@@ -24,7 +25,7 @@ def make(make_world):
         def load(sheet, cls):
             return load_parameters(sheet, cls, scenario.parameters.get(sheet))
 
-        scenario = load_scenario("still_air", settings)
+        scenario = load_scenario("still_air", CALM | settings)
         rng = np.random.default_rng(1)
         kwargs = {"receiver_span_m": 9.144, "receiver_points_B": POINTS_B, "settle_s": SETTLE_S}
         return air_motion(scenario, load, parameters, Clock(1000), rng, **kwargs)

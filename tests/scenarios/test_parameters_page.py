@@ -6,11 +6,12 @@ from typing import Any
 import pytest
 
 from dockair.parameters import load_parameters, read_sheet, sheet_names
-from dockair.scenarios import build
+from dockair.scenarios import build, build_receiver
 from dockair.scenarios.parameters_page import parameters_page
 from dockair.scenarios.schema import load_scenario
 from dockair.sim.camera import sheets
 
+UNMANNED = {"flight.altitude_m": 3000.0}
 PAGE = Path(__file__).parents[2] / "docs" / "parameters.md"
 
 
@@ -32,7 +33,7 @@ def test_every_parameter_has_one_row_under_its_sheet_with_its_source() -> None:
 def test_numbers_are_told_as_they_are_and_tables_by_their_span() -> None:
     page = parameters_page()
     assert "| `length_m` | 15 | m | 10 to 23 | published |" in page
-    assert "| `acceleration_limit_m_s2` | 0.8, 1.6, 1.6 | m/s^2 | 0.1 to 5 | assumed |" in page
+    assert "| `acceleration_limit_m_s2` | 0.8, 2, 2 | m/s^2 | 0.1 to 5 | assumed |" in page
     assert "| `damping` | 9 x 12 numbers, -38.3 to 2.91 | 1 | -50 to 50 | published |" in page
 
 
@@ -44,10 +45,16 @@ def test_every_sheet_fills_the_class_that_a_flight_is_built_with(monkeypatch: py
         loaded.setdefault(sheet, set()).add(cls)
         return load_parameters(sheet, cls, overrides)
 
-    monkeypatch.setattr(build, "load_parameters", recording)
+    for module in (build, build_receiver):
+        monkeypatch.setattr(module, "load_parameters", recording)
     monkeypatch.setattr(sheets, "load_parameters", recording)
     monkeypatch.setattr(build, "SETTLE_S", 0.0)
-    for filter_name, imu in (("long_pass", "mti"), ("band_pass", "tactical"), ("long_pass", "consumer")):
-        build.build(load_scenario("default", {"camera.filter": filter_name, "hardware.imu": imu}), 0)
+    choices = (
+        {"camera.filter": "long_pass", "hardware.imu": "mti"},
+        {"camera.filter": "band_pass", "hardware.imu": "tactical"},
+        {"hardware.imu": "consumer", "hardware.airframe": "unmanned", "flight.airspeed_m_s": 120.0, **UNMANNED},
+    )
+    for choice in choices:
+        build.build(load_scenario("default", choice), 0)
     assert sorted(loaded) == sheet_names()
     assert [len(classes) for classes in loaded.values()] == [1] * len(loaded)

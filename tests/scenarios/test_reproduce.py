@@ -87,7 +87,7 @@ def test_the_contact_sheet_shows_in_figures_what_its_titles_say(tmp_path):
     exposures = [shot[case]["exposure_us"] for case in ("30 m", "15 m", "6 m, Sun behind", "2.5 m")]
     assert exposures == sorted(exposures, reverse=True) and exposures[-1] == pytest.approx(14.0)
     assert shot["night"]["background_dn"] <= 3 and shot["night"]["other_blobs"] == 0
-    assert shot["low Sun, gaps in cloud"]["other_blobs"] >= 20  # those as sharp as an LED; wide ones are rejected
+    assert shot["low Sun, gaps in cloud"]["other_blobs"] >= 10  # those as sharp as an LED; wide ones are rejected
     assert shot["LEDs 1 and 2 off, 5 dim"]["leds_found"] <= 6
     assert shot["exposure stuck at 500 µs"]["exposure_us"] == pytest.approx(500.0)
     assert shot["Sun in view"]["background_dn"] > 1.5 * shot["Sun in view, 20 nm band-pass"]["background_dn"]

@@ -241,11 +241,11 @@ def test_acceptance_names_each_figure_that_was_not_reached():
     assert not Accept().claims_figures
 
 
-def test_wake_bow_wave_and_single_gusts_are_off_unless_asked_for(scenario_file):
+def test_wake_and_bow_wave_are_on_and_single_gusts_off_unless_asked_for(scenario_file):
     scenario = load_scenario(scenario_file('name = "mine"'))
-    assert (scenario.wake.present, scenario.bow_wave.present, scenario.gusts) == (False, False, ())
-    on = load_scenario(scenario_file('name = "mine"\n[wake]\npresent = true\n[bow_wave]\npresent = true'))
-    assert on.wake.present and on.bow_wave.present
+    assert (scenario.wake.present, scenario.bow_wave.present, scenario.gusts) == (True, True, ())
+    calm = load_scenario(scenario_file('name = "mine"\n[wake]\npresent = false\n[bow_wave]\npresent = false'))
+    assert not calm.wake.present and not calm.bow_wave.present
 
 
 def test_single_gusts_are_read_in_order_as_the_world_takes_them(scenario_file):
