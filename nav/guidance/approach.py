@@ -24,7 +24,7 @@ What announced and true turn differ by shows as a drift across that grows; u to 
 
     r = r_announced + k_r (u_left + integral of u_left dt / T_r)                                          (3)
 
-Not modelled: the bow wave's push on the drogue.
+While closing, the bow wave's push that is still to come is added to y_D and y_D' (`bow_wave_push`).
 """
 
 from collections import deque
@@ -34,6 +34,7 @@ import numpy as np
 
 from dockair.messages import ReceiverCommand, TankerAnnouncement
 from dockair.nav.guidance.announced_path import AnnouncedPath
+from dockair.nav.guidance.bow_wave_push import BowWavePush
 from dockair.nav.guidance.drogue_motion import DrogueMotion, SwingSettings
 from dockair.nav.guidance.phases import Phase, PhaseLimits, Situation, next_phase
 from dockair.rotations import Array
@@ -59,6 +60,7 @@ class GuidanceSettings:
     turn_gain_rad_m: float = 1e-3  # k_r: at 180 m/s a drift across goes within 6 s, slow beside the swing and Eq. (1)
     turn_learning_s: float = 10.0  # T_r: the turn's error is known when the probe is in the basket and sees no drift
     swing: SwingSettings = field(default_factory=SwingSettings)
+    bow_wave: BowWavePush = field(default_factory=BowWavePush)
     limits: PhaseLimits = field(default_factory=PhaseLimits)
 
 
@@ -174,6 +176,9 @@ class Guidance:
         if not state.usable:
             return self._toward(np.array([self._u[0], *self._motion.drift_m_s]))
         place, velocity, acceleration = self._motion.ahead()
+        if self.phase is Phase.APPROACH:
+            way, rate_change = s.bow_wave.ahead(float(state.p_PD_B[0]), -float(state.rate_PD_B[0]))
+            place, velocity = place + way, velocity + rate_change
         receiver = self._flown + np.sum(self._given, axis=0) * self._dt
         across = velocity + s.lateral_gain_1_s * (place - receiver)
         across_dot = acceleration + s.lateral_gain_1_s * (velocity - self._u[1:])
