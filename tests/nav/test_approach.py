@@ -6,18 +6,23 @@ import numpy as np
 import pytest
 
 from dockair.nav.guidance.approach import Guidance, GuidanceSettings, RelativeState
+from dockair.nav.guidance.bow_wave_push import BowWavePush
 from dockair.nav.guidance.phases import Phase
 
 RATE_HZ = 100
 DEPTH_M = 0.3  # ring plane to coupling
+CALM = GuidanceSettings(bow_wave=BowWavePush(at_contact_m=(0.0, 0.0)))  # as most of these plants are
 DELAY_S = 0.25  # as the flight control answers a command that comes with its rate
 
 
 class Plant:
     """Drogue at rest unless held by the probe; the receiver's velocity has a bias that nobody knows."""
 
-    def __init__(self, offset=(4.0, 0.3, -0.2), bias=(0.0, 0.0, 0.0), drogue=lambda t: np.zeros(3), holds=True):
+    def __init__(
+        self, offset=(4.0, 0.3, -0.2), bias=(0.0, 0.0, 0.0), drogue=lambda t: np.zeros(3), holds=True, push=None
+    ):
         self.p_WP, self.bias, self.drogue, self.holds = np.zeros(3), np.array(bias), drogue, holds
+        self.push = push
         self.p_WD0, self.v, self.t, self.latched, self.take_in = np.array(offset), np.zeros(3), 0.0, False, 0.0
         self.waiting = deque([np.zeros(3)] * round(DELAY_S * RATE_HZ), maxlen=round(DELAY_S * RATE_HZ))
         self.closure_at_contact = self.radial_at_contact = np.nan
@@ -25,7 +30,14 @@ class Plant:
     @property
     def p_WD(self):
         coupling_offset = np.array([DEPTH_M, 0.0, 0.0])
-        return self.p_WP - coupling_offset if self.latched else self.p_WD0 + self.drogue(self.t)
+        return self.p_WP - coupling_offset if self.latched else self.p_WD0 + self.drogue(self.t) + self.pushed
+
+    @property
+    def pushed(self):
+        if self.push is None:
+            return np.zeros(3)
+        x = max(self.p_WD0[0] - self.p_WP[0], 0.0)
+        return np.array([0.0, *self.push.at_contact_m]) / (1.0 + x / self.push.reach_m) ** 2
 
     def step(self, command):
         before, dt = self.p_WD - self.p_WP, 1.0 / RATE_HZ
@@ -47,7 +59,7 @@ class Plant:
 
 
 def fly(plant, seconds=60.0, settings=None):
-    guidance = Guidance(settings or GuidanceSettings(), RATE_HZ)
+    guidance = Guidance(settings or CALM, RATE_HZ)
     phases, take_in = [guidance.phase], []
     state = plant.step(guidance.step(plant.step(_still())))
     for _ in range(int(seconds * RATE_HZ)):
@@ -95,6 +107,16 @@ def test_follows_a_slow_swing_of_the_drogue():
     plant = Plant(drogue=lambda t: 0.2 * np.array([0.0, np.sin(0.3 * t), np.cos(0.3 * t)]))
     fly(plant)
     assert plant.radial_at_contact < 0.05  # of 0.2 m
+
+
+def test_the_push_of_its_own_bow_wave_is_met_where_it_will_be_at_contact():
+    """This plant's drogue gives way at once, and its receiver lags by its delay alone: a shorter lead is right."""
+    missed = []
+    for settings in (CALM, GuidanceSettings(bow_wave=BowWavePush(lead_s=0.2))):
+        plant = Plant(push=BowWavePush())
+        fly(plant, settings=settings)
+        missed.append(plant.radial_at_contact)
+    assert missed[0] > 0.02 and missed[1] < 0.5 * missed[0]
 
 
 def test_breaks_away_when_the_drogue_does_not_come_along():
