@@ -10,9 +10,12 @@ Source: Rozenberg 1966 (air mass at the horizon).
 import math
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from dockair.rotations import Array
+
+Interval = NDArray[np.int64]  # (rows, 2) first column and one past the last
 
 
 def meet_sphere(sine: Array, radius_m: float, height_m: float) -> tuple[NDArray[np.bool_], Array, Array]:
@@ -40,3 +43,39 @@ def unit(directions: Array) -> Array:
     d = np.asarray(directions, dtype=float)
     length = np.sqrt(d[:, 0] * d[:, 0] + d[:, 1] * d[:, 1] + d[:, 2] * d[:, 2])
     return np.asarray(d / length[:, None])
+
+
+@njit(cache=True)
+def columns_below(R: Array, x: Array, y: Array, sine: float, out: Interval) -> None:
+    """Fill (rows, 2) the columns whose rays point down by more than an angle; there they are one after the other.
+
+    Args:
+        R: attitude of the camera.
+        x: (columns,) rising tangents to the right.
+        y: (rows,) tangents below the axis.
+        sine: of the angle, positive.
+        out: first column and one past the last of each row.
+    """
+    k2 = sine * sine
+    for i in range(len(y)):
+        a, b = R[2, 0] - y[i] * R[2, 2], R[2, 1]  # the ray's z is a - x b
+        square, half, rest = b * b - k2, a * b, a * a - k2 * (1.0 + y[i] * y[i])
+        square = square if abs(square) > 1e-12 else 1e-12
+        disc = half * half - square * rest
+        low, high = 1.0, 0.0
+        if disc <= 0.0:
+            if square > 0.0 and a < 0.0:
+                low, high = -np.inf, np.inf
+        else:
+            root = np.sqrt(disc)
+            one, other = (half - root) / square, (half + root) / square
+            first, last = min(one, other), max(one, other)
+            if square < 0.0:
+                if a - 0.5 * (first + last) * b < 0.0:
+                    low, high = first, last
+            elif b > 0.0:
+                low, high = last, np.inf
+            else:
+                low, high = -np.inf, first
+        out[i, 0] = np.searchsorted(x, low)
+        out[i, 1] = max(np.searchsorted(x, high), out[i, 0]) if low <= high else out[i, 0]

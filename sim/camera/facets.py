@@ -1,8 +1,9 @@
 """Which of the scene's facets may mirror the Sun into the lens; most do not, and working out a lobe takes its time.
 
-A facet that is turned away from Sun or lens does not. Of the others the facet that [lobes, eq 1] asks for stands
-steeper by |m|, m of [lobes, eq 2] in the middle, and by no less than |m| - b elsewhere, b being the most by which slope
-and half vector turn over the facet. With V the variance of slopes, the Sun's disc included, its radiance is at most
+A facet that is turned away from Sun or lens does not, nor is one seen that lies behind the lens. Of the others the
+facet that [lobes, eq 1] asks for stands steeper by |m|, m of [lobes, eq 2] in the middle, and by no less than |m| - b
+elsewhere, b being the most by which slope and half vector turn over the facet. With V the variance of slopes, the Sun's
+disc included, its radiance is at most
 
     4 R(i)/(8 (h.n)^4 (v.n - b) sigma^2) exp(-(|m| - b)^2/(2 V))                                                  (1)
 
@@ -27,7 +28,13 @@ _STEEPEST = 0.5  # h.n of `lobes`
 
 @njit(cache=True)
 def facets_that_may_shine(
-    facets: Facets, poses: tuple[Array, Array], sun: tuple[Vector, float], eye: Vector, finishes: Array, faintest: float
+    facets: Facets,
+    poses: tuple[Array, Array],
+    sun: tuple[Vector, float],
+    eye: Vector,
+    ahead: Vector,
+    finishes: Array,
+    faintest: float,
 ) -> NDArray[np.int64]:
     """Return their numbers, in order.
 
@@ -36,6 +43,7 @@ def facets_that_may_shine(
         poses: (ngeom, 3) places and (ngeom, 9) attitudes of the geoms.
         sun: unit vector toward it, a^2/4 of [lobes, eq 3].
         eye: the lens [m].
+        ahead: unit vector along its axis, to leave out what lies wholly behind it; zeros for all around.
         finishes: of `mirrors.finishes`.
         faintest: radiance below which none counts.
     """
@@ -44,9 +52,12 @@ def facets_that_may_shine(
     for g, start, stop in facets.runs:
         s = _into(xmat[g], sun[0])
         e = _into(xmat[g], (eye[0] - xpos[g, 0], eye[1] - xpos[g, 1], eye[2] - xpos[g, 2]))
-        facing, first = _facing(facets.planes, start, stop, s, e, out[count:]), count
+        facing, first, axis = _facing(facets.planes, start, stop, s, e, out[count:]), count, _into(xmat[g], ahead)
         for i in out[first : first + facing]:
             frame, half, finish = facets.frame[i], facets.half[i], finishes[facets.material[i]]
+            depth = axis[0] * (frame[0, 0] - e[0]) + axis[1] * (frame[0, 1] - e[1]) + axis[2] * (frame[0, 2] - e[2])
+            if depth < -(half[0] + half[1]) * (1.0 + facets.bend[i]):
+                continue
             v, d = _unit((e[0] - frame[0, 0], e[1] - frame[0, 1], e[2] - frame[0, 2]))
             h, twice = _unit((v[0] + s[0], v[1] + s[1], v[2] + s[2]))
             hn = frame[1, 0] * h[0] + frame[1, 1] * h[1] + frame[1, 2] * h[2]

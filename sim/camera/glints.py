@@ -138,7 +138,8 @@ def glint_rows(
     rows = np.empty((_MOST, ROW))
     count = spot_rows(spots[:n], sun, 0.0, variance, eye, finish, limits, rows, 0)
     poses, facets, s = (xpos, xmat), mirrors.facets, vector(s_W)
-    which = facets_that_may_shine(facets, poses, (s, variance), eye, finish, surfaces.faintest_radiance)
+    ahead = (0.0, 0.0, 0.0) if ahead_W is None else vector(ahead_W)
+    which = facets_that_may_shine(facets, poses, (s, variance), eye, ahead, finish, surfaces.faintest_radiance)
     count = facet_rows(facets, which, poses, (s, 0.0, variance), eye, finish, limits, rows, count)
     rows = rows[:count]
     return rows if ahead_W is None else rows[(rows[:, :3] - p_WC) @ ahead_W > 0.0]

@@ -11,12 +11,14 @@ A table is of one place, its key, and serves all places around; from the key, D 
 
 with h' the key's height, o' the level way from there; the horizon is near enough for two terms. Keys stand on a grid, a
 third of the layer's depth apart, so that the picture is a function of the place alone. A feature stays where it is as
-the camera moves and turns; what it fades into changes with the key by less than the eye sees. Rays that skim past the
-layer are taken to the farthest it reaches.
+the camera moves and turns; what it fades into changes with the key by less than the eye sees. On the way to a change of
+key the next one's tiles are made bit by bit, so that no frame has to wait for them. Rays that skim past the layer are
+taken to the farthest it reaches.
 
 Source: Praun & Hoppe 2003 (octahedral maps), as `sky_table`.
 """
 
+import math
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -25,16 +27,18 @@ from numba import njit
 from numpy.typing import NDArray
 
 from dockair.rotations import Array
-from dockair.sim.camera.sky_table import directions_from_nodes
+from dockair.sim.camera.earth import Interval
+from dockair.sim.camera.layer_tiles import SIDE, TILE, LayerTiles
 
-_TILE, _SHIFT = 64, 6  # nodes a side, and its power of 2
+_TILE, _SIDE, _SHIFT = TILE, SIDE, 6  # as of `layer_tiles`; the power of 2
 _STEEPEST = 2.74  # as of `sky_table`
-_SIDE = _TILE + 1  # of what is kept of a tile: with the next ones' first nodes, so that it is read alone
 _STRETCH = 2.0  # most by which Eq. (2) widens the way between two directions
 _KEYS_PER_DEPTH = 3.0
+_FROM, _UNTIL = 0.05, 0.45  # way from a key, in keys' distances, over which the next one's tiles are made
+_LOOK_AGAIN = 16  # frames from one look at what the next key lacks to another
 
 Geometry = tuple[float, float, float, float, float, float]  # e, 2 h - h^2/r, h', 1/a, D_x, D_y
-Interval = NDArray[np.int64]
+View = tuple[Array, Array, Array, Interval]  # R_WC, tangents x and y, columns that see the layer
 
 
 class Nodes(NamedTuple):
@@ -59,11 +63,10 @@ class LayerTable:
     def __init__(
         self, function: Callable[[Array, Array], Array], tiles: int, channels: int, height_m: float, radius_m: float
     ) -> None:
-        self._function, self._tiles = function, tiles
-        self._height_m, self._radius_m = height_m, radius_m
-        self._values: NDArray[np.float32] = np.zeros(((tiles * _SIDE) ** 2, channels), dtype=np.float32)
-        self._is_known = np.zeros((tiles, tiles), dtype=np.bool_)
-        self._key = np.zeros(3)
+        self._height_m, self._radius_m, self._tiles = height_m, radius_m, tiles
+        self._own, self._next = (LayerTiles(function, tiles, channels) for _ in range(2))
+        self._count = 0
+        self._last_m: Array = np.zeros(3)
 
     def nodes(self, place_m: Array, R_WC: Array, x: Array, y: Array, below: Interval) -> Nodes:
         """Return the table for a place, known wherever a picture looks.
@@ -75,74 +78,59 @@ class LayerTable:
             y: (rows,) tangents below the axis.
             below: (rows, 2) first column and one past the last that see the layer.
         """
-        step_m = self._height_m / _KEYS_PER_DEPTH
-        key = np.round(np.asarray(place_m, dtype=float) / step_m) * step_m
-        if not np.array_equal(key, self._key):
-            self._key = key
-            self._is_known[:] = False
-        geometry, side = self._geometry(place_m), self._tiles * _TILE
-        missing, R = np.zeros_like(self._is_known), np.ascontiguousarray(R_WC, dtype=float)
-        step = max(_step(x), _step(y), 1e-9)
-        stride = max(1, int((_TILE - 1) / (0.5 * (side - 2) * _STEEPEST * _STRETCH * step)))
-        if _mark(R, x, y, below, stride, side, geometry, self._is_known, missing):
-            for row, column in np.argwhere(missing):
-                self._compute(int(row), int(column))
-        return Nodes(self._values.ravel(), side, geometry)
+        step_m, place = self._height_m / _KEYS_PER_DEPTH, np.asarray(place_m, dtype=float)
+        key = np.round(place / step_m) * step_m
+        if not np.array_equal(key, self._own.key):
+            self._own, self._next = self._next, self._own
+            if not np.array_equal(key, self._own.key):
+                self._own.restart(key)
+        view = np.ascontiguousarray(R_WC, dtype=float), x, y, below
+        self._own.complete(self._missing(self._own, place, view))
+        self._prepare(place, key, step_m, view)
+        return Nodes(self._own.values.ravel(), self._tiles * _TILE, self._geometry(place, key))
 
-    def _geometry(self, place_m: Array) -> Geometry:
+    def _prepare(self, place_m: Array, key: Array, step_m: float, view: View) -> None:
+        """Make a share of the tiles of the key that comes next if the way goes on: along the axis left first."""
+        moved, self._last_m = place_m - self._last_m, place_m.copy()
+        axis, frames = 0, math.inf
+        for k in range(3):
+            ahead = 0.5 * step_m - math.copysign(1.0, moved[k]) * (place_m[k] - key[k])
+            if moved[k] != 0.0 and ahead / abs(moved[k]) < frames:
+                axis, frames = k, ahead / abs(moved[k])
+        sign = math.copysign(1.0, moved[axis])
+        share = (sign * (place_m[axis] - key[axis]) / step_m - _FROM) / (_UNTIL - _FROM)
+        if share <= 0.0 or math.isinf(frames):
+            return
+        coming = key.copy()
+        coming[axis] = (np.round(place_m[axis] / step_m) + sign) * step_m
+        self._count += 1
+        if not np.array_equal(coming, self._next.key):
+            self._next.restart(coming)
+        elif not (self._next.lacks_work and self._count >= _LOOK_AGAIN):
+            self._next.prepare(share)
+            return
+        self._count = 0
+        self._next.plan(self._missing(self._next, place_m, view))
+        self._next.prepare(share)
+
+    def _missing(self, tiles: LayerTiles, place_m: Array, view: View) -> list[tuple[int, int]]:
+        """Which tiles a picture looks at that are not known."""
+        (R, x, y, below), side = view, self._tiles * _TILE
+        missing, step = np.zeros_like(tiles.is_known), max(_step(x), _step(y), 1e-9)
+        stride = max(1, int((_TILE - 1) / (0.5 * (side - 2) * _STEEPEST * _STRETCH * step)))
+        if not _mark(R, x, y, below, stride, side, self._geometry(place_m, tiles.key), tiles.is_known, missing):
+            return []
+        return [(int(row), int(column)) for row, column in np.argwhere(missing)]
+
+    def _geometry(self, place_m: Array, key: Array) -> Geometry:
         height, a = self._height_m + float(place_m[2]), self._radius_m
         twice = 2.0 * height - height * height / (a + height)
-        aside = place_m - self._key
-        key_height = self._height_m + float(self._key[2])
-        return twice / (a + height), twice, key_height, 1.0 / a, float(aside[0]), float(aside[1])
-
-    def _compute(self, row: int, column: int) -> None:
-        """Tabulate a tile."""
-        own, first = np.arange(_SIDE), (row * self._tiles + column) * _SIDE * _SIDE
-        i, j = np.meshgrid(own + row * _TILE, own + column * _TILE, indexing="ij")
-        directions = directions_from_nodes(i.ravel(), j.ravel(), self._tiles * _TILE)
-        self._values[first : first + _SIDE * _SIDE] = self._function(directions, self._key)
-        self._is_known[row, column] = True
+        aside = place_m - key
+        return twice / (a + height), twice, self._height_m + float(key[2]), 1.0 / a, float(aside[0]), float(aside[1])
 
 
 def _step(x: Array) -> float:
     return abs(float(x[-1] - x[0])) / (len(x) - 1) if len(x) > 1 else 0.0
-
-
-@njit(cache=True)
-def columns_below(R: Array, x: Array, y: Array, sine: float, out: Interval) -> None:
-    """Fill (rows, 2) the columns whose rays point down by more than an angle; there they are one after the other.
-
-    Args:
-        R: attitude of the camera.
-        x: (columns,) rising tangents to the right.
-        y: (rows,) tangents below the axis.
-        sine: of the angle, positive.
-        out: first column and one past the last of each row.
-    """
-    k2 = sine * sine
-    for i in range(len(y)):
-        a, b = R[2, 0] - y[i] * R[2, 2], R[2, 1]  # the ray's z is a - x b
-        square, half, rest = b * b - k2, a * b, a * a - k2 * (1.0 + y[i] * y[i])
-        square = square if abs(square) > 1e-12 else 1e-12
-        disc = half * half - square * rest
-        low, high = 1.0, 0.0
-        if disc <= 0.0:
-            if square > 0.0 and a < 0.0:
-                low, high = -np.inf, np.inf
-        else:
-            root = np.sqrt(disc)
-            one, other = (half - root) / square, (half + root) / square
-            first, last = min(one, other), max(one, other)
-            if square < 0.0:
-                if a - 0.5 * (first + last) * b < 0.0:
-                    low, high = first, last
-            elif b > 0.0:
-                low, high = last, np.inf
-            else:
-                low, high = -np.inf, first
-        out[i, 0] = np.searchsorted(x, low)
-        out[i, 1] = max(np.searchsorted(x, high), out[i, 0]) if low <= high else out[i, 0]
 
 
 @njit(cache=True, error_model="numpy")
@@ -171,8 +159,8 @@ def _toward(
 ) -> tuple[np.float32, np.float32, np.float32]:
     """Eqs. (1) and (2)."""
     e, twice, key_height, a, aside_x, aside_y = g
-    square = dz * dz - (dx * dx + dy * dy + dz * dz) * e
-    k = twice / (np.sqrt(max(square, np.float32(0.0))) - min(dz, np.float32(0.0)))
+    square, zero = dz * dz - (dx * dx + dy * dy + dz * dz) * e, np.float32(0.0)
+    k = twice / (np.sqrt(square if square > zero else zero) - (dz if dz < zero else zero))
     ox, oy = k * dx + aside_x, k * dy + aside_y
     level = ox * ox + oy * oy
     sag = level * a  # times half, and the next term of the root's series; a is the sphere's inverse radius
@@ -206,18 +194,20 @@ def _place(
     """Fill, for a row of blocks, the node before each and the parts of the way to the next ones."""
     corner, down, right = places
     last, half, tiles = np.int32(nodes.side - 3), np.float32(0.5 * (nodes.side - 2)), np.int32(nodes.side // _TILE)
-    width, rest, shift = np.int32(_SIDE), np.int32(_TILE - 1), np.int32(_SHIFT)
+    width, rest, shift, zero = np.int32(_SIDE), np.int32(_TILE - 1), np.int32(_SHIFT), np.int32(0)
     a_x, b_x = np.float32(R[0, 0] - y_i * R[0, 2]), np.float32(R[0, 1])
     a_y, b_y = np.float32(R[1, 0] - y_i * R[1, 2]), np.float32(R[1, 1])
     a_z, b_z = np.float32(R[2, 0] - y_i * R[2, 2]), np.float32(R[2, 1])
     g = _single(nodes.geometry)
     for j in range(len(x)):
         to_x, to_y, to_z = _toward(a_x - x[j] * b_x, a_y - x[j] * b_y, a_z - x[j] * b_z, g)
-        v, u = _node(to_x, to_y, to_z, half)
-        row, column = max(min(np.int32(v), last), np.int32(0)), max(min(np.int32(u), last), np.int32(0))
-        tile = (row >> shift) * tiles + (column >> shift)
-        corner[j] = (tile * width + (row & rest)) * width + (column & rest)
-        down[j], right[j] = v - np.float32(row), u - np.float32(column)
+        down[j], right[j] = _node(to_x, to_y, to_z, half)
+    for j in range(len(x)):  # on its own, in whole numbers of 32 bits: the compiler takes several at once
+        row, column = np.int32(down[j]), np.int32(right[j])
+        row, column = max(min(row, last), zero), max(min(column, last), zero)
+        tile = np.int32(np.int32(row >> shift) * tiles + np.int32(column >> shift))
+        corner[j] = np.int32(np.int32(tile * width + (row & rest)) * width + (column & rest))
+        down[j], right[j] = down[j] - np.float32(row), right[j] - np.float32(column)
 
 
 @njit(cache=True)

@@ -32,8 +32,8 @@ from scipy.special import ndtri
 
 from dockair.rotations import Array
 from dockair.sim.camera.clouds import Droplets, Texture, optical_depth
-from dockair.sim.camera.earth import air_mass, dip_sine, meet_sphere, unit
-from dockair.sim.camera.layer_table import LayerTable, columns_below, lay_under
+from dockair.sim.camera.earth import air_mass, columns_below, dip_sine, meet_sphere, unit
+from dockair.sim.camera.layer_table import LayerTable, lay_under
 from dockair.sim.camera.radiometry import extinction_1_m
 from dockair.sim.camera.sheets import SkyParameters
 from dockair.sim.camera.sky_table import DirectionTable
@@ -41,7 +41,7 @@ from dockair.sim.camera.weather import Weather
 
 __all__ = ["Sky", "Weather"]
 
-_TILES = 48  # of the table, a side
+_TILES, _SMOOTH_TILES = 48, 24  # of the table, a side; without clouds
 _NODE_RAD = 2.0 / (64 * _TILES)
 _LAYER_TILES = 32  # of the tables of deck and ground
 _LAYER_NODE_RAD = 2.0 / (64 * _LAYER_TILES)
@@ -86,7 +86,8 @@ class Sky:
         excess = extinction_1_m(weather.visibility_m) - extinction_1_m(p.clear_visibility_m)
         self._haze_depth = max(excess, 0.0) * p.haze_depth_m
         self._shade()
-        self._table = DirectionTable(self._upward, _TILES)
+        tiles = _TILES if weather.cloud_cover > 0.0 else _SMOOTH_TILES
+        self._table = DirectionTable(self._upward, tiles, smooth=tiles == _SMOOTH_TILES)
         top_m = self._top_m = p.deck_top_m if self._has_deck else 0.0  # of what is met first from above
         self._ground_table = LayerTable(self._below, _LAYER_TILES, 1, altitude_m, p.earth_radius_m)
         self._deck_table = LayerTable(self._over, _LAYER_TILES, 2, altitude_m - top_m, p.earth_radius_m + top_m)
@@ -132,8 +133,7 @@ class Sky:
         """Return the relative radiance of endless haze toward a direction (3,): what far objects fade into."""
         if self._weather.night:
             return self._p.night
-        d = unit(np.asarray(direction_W, dtype=float)[None])
-        return float(self._haze(d @ self._sun)[0])
+        return float(self._haze(unit(np.asarray(direction_W, dtype=float)[None]) @ self._sun)[0])
 
     @property
     def diffuse_share(self) -> float:

@@ -8,9 +8,13 @@ Nodes stand on an even grid of p, 2/n rad apart straight ahead and up to 2.3 tim
 p_y = 0 and p_z = 0, where the map has a kink; between them the value is bilinear. Tiles of nodes are computed when a
 picture first needs them, and their values do not depend on when.
 
+A function that is smooth over some milliradians is read where the tangents x and y are whole multiples of 1/256 and
+1/512 alone, and bilinear in between.
+
 A block's value is a function of R and its own x and y alone. Source: Praun & Hoppe 2003 (octahedral maps).
 """
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -23,24 +27,37 @@ _TILE = 64  # nodes a side
 _ROWS_HELD = 3  # of places, of which the first is read when the last is known
 _NODES_TOUCHED = 14  # blocks that surely are no farther apart than the 16 nodes of a line of cache
 _STEEPEST = 2.74  # |dp| <= (1 + sqrt 3) |d direction|, Eq. (1)
+_PER_X, _PER_Y = 256.0, 512.0  # where a smooth function is read: powers of 2, so that these places are exact
 
 
 class DirectionTable:
     """Values (n, n) at the nodes; row 0 up, column 0 left, straight ahead in the middle."""
 
-    def __init__(self, function: Callable[[Array], Array], tiles: int) -> None:
+    def __init__(self, function: Callable[[Array], Array], tiles: int, smooth: bool = False) -> None:
         """Set up an empty table.
 
         Args:
             function: (m, 3) unit vectors, W axes -> (m,) values.
             tiles: a side, each of 64 x 64 nodes.
+            smooth: whether the function is smooth over 1/256 rad: then `fill` takes a fraction of the work.
         """
-        self._function, self._tiles = function, tiles
+        self._function, self._tiles, self._is_smooth = function, tiles, smooth
         self._values: NDArray[np.float32] = np.zeros((tiles * _TILE, tiles * _TILE), dtype=np.float32)
         self._is_known = np.zeros((tiles, tiles), dtype=np.bool_)
 
     def fill(self, out: NDArray[np.float32], R_WC: Array, x: Array, y: Array) -> None:
         """Write the value toward (1, -x_j, -y_i), C axes, into out (rows, columns); x and y are evenly spaced."""
+        if not self._is_smooth:
+            self._read(out, R_WC, x, y)
+            return
+        first_x, columns = _places_around(x, _PER_X)
+        first_y, rows = _places_around(y, _PER_Y)
+        few = np.empty((len(rows), len(columns)), dtype=np.float32)
+        self._read(few, R_WC, columns, rows)
+        _spread(few, first_x, first_y, np.asarray(x, dtype=float), np.asarray(y, dtype=float), out)
+
+    def _read(self, out: NDArray[np.float32], R_WC: Array, x: Array, y: Array) -> None:
+        """Bilinear between the nodes, which are made where they lack."""
         step = max(_step(x), _step(y), 1e-9)
         cells = self._values.shape[0] - 2  # even, so that the middle is a node; the last row and column serve nothing
         stride = max(1, int((_TILE - 1) / (0.5 * cells * _STEEPEST * step)))
@@ -73,6 +90,38 @@ def directions_from_nodes(i: NDArray[np.int64], j: NDArray[np.int64], n: int) ->
 
 def _step(x: Array) -> float:
     return abs(float(x[-1] - x[0])) / (len(x) - 1) if len(x) > 1 else 0.0
+
+
+def _places_around(x: Array, per_tangent: float) -> tuple[int, Array]:
+    """Number of the first of the even places that evenly spaced tangents lie between, and all of them."""
+    low, high = sorted((float(x[0]), float(x[-1])))
+    first, last = math.floor(low * per_tangent), math.floor(high * per_tangent) + 1
+    return first, np.arange(first, last + 1) / per_tangent
+
+
+@njit(cache=True)
+def _spread(few: NDArray[np.float32], first_x: int, first_y: int, x: Array, y: Array, out: NDArray[np.float32]) -> None:
+    """Interpolate between values at even places: those of a row of them along x once, then along y."""
+    n, held = len(x), -1
+    before, part, lines = np.empty(n, np.uint32), np.empty(n, np.float32), np.empty((2, n), np.float32)
+    for j in range(n):
+        whole = math.floor(x[j] * _PER_X)
+        before[j], part[j] = whole - first_x, x[j] * _PER_X - whole
+    for i in range(len(y)):
+        whole = math.floor(y[i] * _PER_Y)
+        at, down, row = int(whole) - first_y, np.float32(y[i] * _PER_Y - whole), out[i]
+        if at != held:
+            for node in range(at, at + 2):
+                if node == held + 1 and held >= 0:
+                    continue
+                nodes, line = few[node], lines[node % 2]
+                for j in range(n):
+                    k = before[j]
+                    line[j] = nodes[k] + part[j] * (nodes[k + np.uint32(1)] - nodes[k])
+            held = at
+        a, b = lines[at % 2], lines[(at + 1) % 2]
+        for j in range(n):
+            row[j] = a[j] + down * (b[j] - a[j])
 
 
 @njit(cache=True, error_model="numpy")

@@ -31,7 +31,8 @@ _ZERO, _ONE = _F(0.0), _F(1.0)
 _FAINTEST = _F(80.0)  # exponent beyond which nothing is seen through the haze
 _SHALLOW_M = 1e-3  # depth that tangents are worked out for at least
 _ROUNDING = 1e-9  # of a triangle's turn
-_LANES = 8  # rays that are taken at once
+_SLACK = 0.01  # blocks by which a triangle's rows and columns may be off: far more than rounding
+_LANES = 4  # rays that are taken at once
 _LOG2_E = _F(1.44269504)
 #: 2^-f on [0, 1] to 2e-9, but for rounding; highest power first, 1 at f = 0 to the bit.
 _POWER = tuple(_F(a) for a in (1.0902322e-4, -1.2747482e-3, 9.5791798e-3, -5.5490758e-2, 0.24022436, -0.69314706, 1.0))
@@ -41,6 +42,7 @@ Frame = tuple[Array, Array]  # R_WC and p_WC of the camera
 Poses = tuple[Array, Array]  # places (ngeom, 3) and attitudes (ngeom, 9) of the model's geoms
 Vector = tuple[float, float, float]
 Side = tuple[float, float, float, float]
+Even = tuple[float, float, int]  # evenly spaced tangents: the first, how many there are in 1, their number
 Line = tuple[np.float32, np.float32]  # value at x = 0 and slope
 #: Extinction, airlight, 1 + y^2, depth of the near plane.
 Air = tuple[np.float32, np.float32, np.float32, np.float32]
@@ -73,37 +75,39 @@ def trace_meshes(
         light: ambient, direct, extinction, airlight.
         near: depth of the near plane.
     """
-    tangents, xpos, xmat = x.astype(np.float32), poses[0], poses[1]
+    (xpos, xmat), tangents, columns, rows = poses, x.astype(np.float32), _even(x), _even(y)
     places, lit = np.empty((meshes.corners_m.shape[0], 5)), np.empty(meshes.corners_m.shape[0])
     for k in range(meshes.geoms.shape[0]):
         g, first, stop = meshes.geoms[k], meshes.first_corner[k], meshes.first_corner[k + 1]
-        c, M, m = (
-            _into_camera(camera, xpos[g, 0], xpos[g, 1], xpos[g, 2]),
-            _turn(camera[0], xmat[g]),
-            meshes.centres_m[k],
-        )
-        middle = (
-            c[0] + M[0, 0] * m[0] + M[0, 1] * m[1] + M[0, 2] * m[2],
-            c[1] + M[1, 0] * m[0] + M[1, 1] * m[1] + M[1, 2] * m[2],
-            c[2] + M[2, 0] * m[0] + M[2, 1] * m[1] + M[2, 2] * m[2],
-        )
+        (R, lens), at = camera, xpos[g]
+        c, M = _into(R, at[0] - lens[0], at[1] - lens[1], at[2] - lens[2]), _turn(R, xmat[g])
+        middle = _moved(c, M, meshes.centres_m[k])
         if _is_beside(middle, meshes.radii_m[k], x, y, near):
             continue
         _light_corners(meshes, first, stop, c, M, sun_C, places, lit)
         for i in range(first, stop):
             lit[i] = meshes.reflectances[k] * (light[0] + light[1] * max(lit[i], 0.0))
         for i in range(meshes.first_triangle[k], meshes.first_triangle[k + 1]):
-            _draw_triangle(meshes.triangles[i], places, lit, out, nearest, tangents, x, y, light, near)
+            corners = meshes.triangles[i, 0], meshes.triangles[i, 1], meshes.triangles[i, 2]
+            _draw_triangle(corners, places, lit, out, nearest, tangents, columns, rows, y, light, near)
 
 
 @njit(cache=True)
-def _into_camera(camera: Frame, x: float, y: float, z: float) -> Vector:
-    R, lens = camera
-    a, b, c = x - lens[0], y - lens[1], z - lens[2]
+def _into(R: Array, a: float, b: float, c: float) -> Vector:
+    """R' times a vector."""
     return (
         R[0, 0] * a + R[1, 0] * b + R[2, 0] * c,
         R[0, 1] * a + R[1, 1] * b + R[2, 1] * c,
         R[0, 2] * a + R[1, 2] * b + R[2, 2] * c,
+    )
+
+
+@njit(cache=True)
+def _moved(c: Vector, M: Array, v: Array) -> Vector:
+    return (
+        c[0] + M[0, 0] * v[0] + M[0, 1] * v[1] + M[0, 2] * v[2],
+        c[1] + M[1, 0] * v[0] + M[1, 1] * v[1] + M[1, 2] * v[2],
+        c[2] + M[2, 0] * v[0] + M[2, 1] * v[1] + M[2, 2] * v[2],
     )
 
 
@@ -135,119 +139,122 @@ def _light_corners(
     meshes: Meshes, first: int, stop: int, c: Vector, M: Array, sun_C: Array, places: Array, lit: Array
 ) -> None:
     """Fill places in C, tangents (of those ahead) and cosines of the Sun's incidence of a patch's corners."""
-    s_x = M[0, 0] * sun_C[0] + M[1, 0] * sun_C[1] + M[2, 0] * sun_C[2]
-    s_y = M[0, 1] * sun_C[0] + M[1, 1] * sun_C[1] + M[2, 1] * sun_C[2]
-    s_z = M[0, 2] * sun_C[0] + M[1, 2] * sun_C[1] + M[2, 2] * sun_C[2]
+    s_x, s_y, s_z = _into(M, sun_C[0], sun_C[1], sun_C[2])
     for i in range(first, stop):
-        v, n = meshes.corners_m[i], meshes.normals[i]
-        for k in range(3):
-            places[i, k] = c[k] + M[k, 0] * v[0] + M[k, 1] * v[1] + M[k, 2] * v[2]
+        places[i, 0], places[i, 1], places[i, 2] = _moved(c, M, meshes.corners_m[i])
         depth = max(places[i, 0], _SHALLOW_M)
         places[i, 3], places[i, 4] = -places[i, 1] / depth, -places[i, 2] / depth
+        n = meshes.normals[i]
         lit[i] = n[0] * s_x + n[1] * s_y + n[2] * s_z
 
 
 @njit(cache=True)
-def _cross(a: Array, b: Array) -> Vector:
+def _cross(a: Vector, b: Vector) -> Vector:
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 @njit(cache=True)
+def _mixed(e: tuple[Vector, Vector, Vector], a: float, b: float, c: float) -> Vector:
+    """Sum of a e_a, b e_b and c e_c."""
+    p, q, r = e
+    return a * p[0] + b * q[0] + c * r[0], a * p[1] + b * q[1] + c * r[1], a * p[2] + b * q[2] + c * r[2]
+
+
+@njit(cache=True)
 def _draw_triangle(
-    corners: NDArray[np.int64],
+    corners: tuple[int, int, int],
     places: Array,
     lit: Array,
     out: NDArray[np.float32],
     nearest: NDArray[np.float32],
     tangents: Row,
-    x: Array,
-    y: Array,
+    x: Even,
+    y: Even,
+    heights: Array,
     light: tuple[float, float, float, float],
     near: float,
 ) -> None:
     i, j, k = corners
-    a, b, c = places[i], places[j], places[k]
-    if _is_averted_or_beside(a, b, c, x, y, near):
+    a, b, c = _place(places, i), _place(places, j), _place(places, k)
+    t_x, t_y = (places[i, 3], places[j, 3], places[k, 3]), (places[i, 4], places[j, 4], places[k, 4])
+    is_cut = min(a[0], b[0], c[0]) < near
+    if max(a[0], b[0], c[0]) < near or (not is_cut and _is_averted_or_beside(t_x, t_y, x, y)):
         return
-    e_a, e_b, e_c = _cross(c, b), _cross(a, c), _cross(b, a)
-    volume = a[0] * e_a[0] + a[1] * e_a[1] + a[2] * e_a[2]  # -a.(b x c)
+    e = _cross(c, b), _cross(a, c), _cross(b, a)
+    volume = a[0] * e[0][0] + a[1] * e[0][1] + a[2] * e[0][2]  # -a.(b x c)
     if not volume > 0.0:
         return
-    row, stop = _rows(a, b, c, y, near)
-    if row == stop:
-        return
-    total = e_a[0] + e_b[0] + e_c[0], e_a[1] + e_b[1] + e_c[1], e_a[2] + e_b[2] + e_c[2]
-    l_a, l_b, l_c = lit[i], lit[j], lit[k]
-    bright = (
-        e_a[0] * l_a + e_b[0] * l_b + e_c[0] * l_c,
-        e_a[1] * l_a + e_b[1] * l_b + e_c[1] * l_c,
-        e_a[2] * l_a + e_b[2] * l_b + e_c[2] * l_c,
-    )
-    per_column = (x.shape[0] - 1) / (x[-1] - x[0]) if x.shape[0] > 1 else 1.0
-    sides = _side(e_a), _side(e_b), _side(e_c)
+    low, high = _clipped(a, b, c, near) if is_cut else (min(t_y), max(t_y))
+    row, stop = _within((low - y[0]) * y[1], (high - y[0]) * y[1], y[2])
+    total, bright = _mixed(e, 1.0, 1.0, 1.0), _mixed(e, lit[i], lit[j], lit[k])
+    sides = _side(e[0], x), _side(e[1], x), _side(e[2], x)
+    extinction, airlight, closest, solid = _F(light[2]), _F(light[3]), _F(near), _F(volume)
     for line in range(row, stop):
-        at = y[line]
-        low, high = _span(sides, at)
-        first, last = (low - x[0]) * per_column - 1.0, (high - x[0]) * per_column + 2.0
-        if not (first <= last) or last < 0.0 or first > x.shape[0]:
+        at = heights[line]
+        left, right = _within(
+            max(sides[0][0] + at * sides[0][1], sides[1][0] + at * sides[1][1], sides[2][0] + at * sides[2][1]),
+            min(sides[0][2] + at * sides[0][3], sides[1][2] + at * sides[1][3], sides[2][2] + at * sides[2][3]),
+            x[2],
+        )
+        if left >= right:
             continue
-        left, right = int(max(first, 0.0)), int(min(last, float(x.shape[0] - 1))) + 1
-        right = min(left + (right - left + _LANES - 1) // _LANES * _LANES, x.shape[0])
-        air = _F(light[2]), _F(light[3]), _F(1.0 + at * at), _F(near)
-        edges = _line(e_a, at), _line(e_b, at), _line(e_c, at)
+        air = extinction, airlight, _F(1.0 + at * at), closest
+        edges = _line(e[0], at), _line(e[1], at), _line(e[2], at)
+        right = min(left + (right - left + _LANES - 1) // _LANES * _LANES, x[2])
         part, picture, depths = tangents[left:right], out[line, left:right], nearest[line, left:right]
-        _draw_row(edges, _line(total, at), _line(bright, at), _F(volume), air, part, picture, depths)
+        _draw_row(edges, _line(total, at), _line(bright, at), solid, air, part, picture, depths)
 
 
 @njit(cache=True)
-def _is_averted_or_beside(a: Array, b: Array, c: Array, x: Array, y: Array, near: float) -> bool:
-    """Whether a triangle surely shows nothing: all of what is ahead of the near plane told by its tangents."""
-    if max(a[0], b[0], c[0]) < near:
-        return True
-    if min(a[0], b[0], c[0]) < near:
-        return False
-    turn = (b[3] - a[3]) * (c[4] - a[4]) - (b[4] - a[4]) * (c[3] - a[3])
-    if turn > _ROUNDING * (abs(b[3] - a[3]) + abs(c[3] - a[3])) * (abs(b[4] - a[4]) + abs(c[4] - a[4])):
-        return True
-    wide, high = 2.0 * (x[1] - x[0]) if len(x) > 1 else 1.0, 2.0 * (y[1] - y[0]) if len(y) > 1 else 1.0
-    return (
-        max(a[3], b[3], c[3]) < x[0] - wide
-        or min(a[3], b[3], c[3]) > x[-1] + wide
-        or max(a[4], b[4], c[4]) < y[0] - high
-        or min(a[4], b[4], c[4]) > y[-1] + high
-    )
+def _place(places: Array, i: int) -> Vector:
+    return places[i, 0], places[i, 1], places[i, 2]
 
 
 @njit(cache=True)
-def _rows(a: Array, b: Array, c: Array, y: Array, near: float) -> tuple[int, int]:
-    """Range of the rows that a triangle may be seen in; all of one that reaches behind the near plane."""
-    n = y.shape[0]
-    if min(a[0], b[0], c[0]) < near or n < 2:
-        return 0, n
-    at_a, at_b, at_c = -a[2] / a[0], -b[2] / b[0], -c[2] / c[0]
-    per_row = (n - 1) / (y[-1] - y[0])
-    first, last = (min(at_a, at_b, at_c) - y[0]) * per_row - 1.0, (max(at_a, at_b, at_c) - y[0]) * per_row + 2.0
-    if last < 0.0 or first > n:
+def _is_averted_or_beside(t_x: Vector, t_y: Vector, x: Even, y: Even) -> bool:
+    """Whether a triangle surely shows nothing, by its corners' tangents; all are ahead of the near plane."""
+    b_x, b_y, c_x, c_y = t_x[1] - t_x[0], t_y[1] - t_y[0], t_x[2] - t_x[0], t_y[2] - t_y[0]
+    if b_x * c_y - b_y * c_x > _ROUNDING * (abs(b_x) + abs(c_x)) * (abs(b_y) + abs(c_y)):
+        return True
+    left, right = _within((min(t_x) - x[0]) * x[1], (max(t_x) - x[0]) * x[1], x[2])
+    top, bottom = _within((min(t_y) - y[0]) * y[1], (max(t_y) - y[0]) * y[1], y[2])
+    return left >= right or top >= bottom
+
+
+@njit(cache=True)
+def _clipped(a: Vector, b: Vector, c: Vector, near: float) -> tuple[float, float]:
+    """Range of y of what of a triangle is ahead of the near plane."""
+    low, high = math.inf, -math.inf
+    for p, q in ((a, b), (b, c), (c, a)):
+        if p[0] >= near:
+            low, high = min(low, -p[2] / p[0]), max(high, -p[2] / p[0])
+        if (p[0] >= near) != (q[0] >= near):
+            at = -(p[2] + (near - p[0]) / (q[0] - p[0]) * (q[2] - p[2])) / near
+            low, high = min(low, at), max(high, at)
+    return low, high
+
+
+@njit(cache=True)
+def _even(tangents: Array) -> Even:
+    n = tangents.shape[0]
+    return tangents[0], (n - 1) / (tangents[-1] - tangents[0]) if n > 1 else 1.0, n
+
+
+@njit(cache=True)
+def _within(low: float, high: float, n: int) -> tuple[int, int]:
+    """Range of the blocks, of n, from `low` to `high`."""
+    if not (low <= high + 2.0 * _SLACK) or high < -_SLACK or low > n - 1 + _SLACK:
         return 0, 0
-    return int(max(first, 0.0)), min(int(last) + 1, n)
+    return int(math.ceil(max(low - _SLACK, 0.0))), int(min(high + _SLACK, n - 1.0)) + 1
 
 
 @njit(cache=True)
-def _side(edge: Vector) -> Side:
-    """Where e is not negative: x >= 1st + 2nd y, x <= 3rd + 4th y; an edge along the row is left to Eq. (1)."""
-    if edge[1] < 0.0:
-        return edge[0] / edge[1], -edge[2] / edge[1], math.inf, 0.0
-    if edge[1] > 0.0:
-        return -math.inf, 0.0, edge[0] / edge[1], -edge[2] / edge[1]
-    return -math.inf, 0.0, math.inf, 0.0
-
-
-@njit(cache=True)
-def _span(sides: tuple[Side, Side, Side], y: float) -> tuple[float, float]:
-    """Range of x where no e is negative."""
-    a, b, c = sides
-    low = max(a[0] + y * a[1], b[0] + y * b[1], c[0] + y * c[1])
-    return low, min(a[2] + y * a[3], b[2] + y * b[3], c[2] + y * c[3])
+def _side(edge: Vector, x: Even) -> Side:
+    """Where e is not negative: column >= 1st + 2nd y, <= 3rd + 4th y; an edge along the row is left to Eq. (1)."""
+    if edge[1] == 0.0:
+        return -math.inf, 0.0, math.inf, 0.0
+    at, slope = (edge[0] / edge[1] - x[0]) * x[1], -edge[2] / edge[1] * x[1]
+    return (at, slope, math.inf, 0.0) if edge[1] < 0.0 else (-math.inf, 0.0, at, slope)
 
 
 @njit(cache=True)

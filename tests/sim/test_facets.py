@@ -44,12 +44,34 @@ def test_facets_that_are_spared_send_nothing_to_the_lens(make_world: Callable[..
         eye = data.body("drogue").xpos + rng.normal(0.0, 6.0, 3)
         toward = np.flatnonzero((n @ sun > 0.0) & (((eye - p) * n).sum(axis=1) > 0.0))
         light, limit = (vector(sun), VARIANCE), SURFACES.faintest_radiance
-        which = facets_that_may_shine(facets, poses, light, vector(eye), finishes(SURFACES), limit)
+        which = facets_that_may_shine(facets, poses, light, vector(eye), (0.0, 0.0, 0.0), finishes(SURFACES), limit)
         assert np.isin(which, toward).all() and np.all(np.diff(which) > 0)
         every = _rows(mirrors, toward, data, sun, eye)
         assert np.array_equal(_rows(mirrors, which, data, sun, eye), every)
         found, spared = found + len(every), spared + len(toward) - len(which)
     assert found > 500 and spared > 10000
+
+
+def test_facets_behind_the_lens_are_spared_and_no_other(make_world: Callable[..., Any]) -> None:
+    """Two hundred Suns, eyes and axes: of the rows ahead not one is missing, of those well behind few are left."""
+    world, rng = make_world(), np.random.default_rng(2)
+    mirrors, data = Mirrors.of(world.model), world.data
+    poses, ahead_rows, spared = (data.geom_xpos, data.geom_xmat), 0, 0
+    for _ in range(200):
+        sun, axis = exp(rng.normal(0.0, 1.0, 3))[:, 0], exp(rng.normal(0.0, 1.0, 3))[:, 0]
+        eye = data.body("drogue").xpos + rng.normal(0.0, 6.0, 3)
+        light, limit = (vector(sun), VARIANCE), SURFACES.faintest_radiance
+        every, ahead = (
+            facets_that_may_shine(mirrors.facets, poses, light, vector(eye), to, finishes(SURFACES), limit)
+            for to in ((0.0, 0.0, 0.0), vector(axis))
+        )
+        all_rows, rows = (_rows(mirrors, which, data, sun, eye) for which in (every, ahead))
+        assert np.array_equal(*(r[(r[:, :3] - eye) @ axis > 0.0] for r in (all_rows, rows)))
+        ahead_rows, spared = (
+            ahead_rows + int(((rows[:, :3] - eye) @ axis > 0.0).sum()),
+            spared + len(every) - len(ahead),
+        )
+    assert ahead_rows > 100 and spared > 1000
 
 
 @pytest.mark.parametrize("point", [0.0, 1.0])

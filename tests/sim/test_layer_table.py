@@ -8,8 +8,8 @@ import pytest
 
 from dockair.parameters import load_parameters
 from dockair.rotations import exp, matrix_from_yaw_pitch_roll
-from dockair.sim.camera.earth import dip_sine, meet_sphere
-from dockair.sim.camera.layer_table import LayerTable, columns_below, lay_under
+from dockair.sim.camera.earth import columns_below, dip_sine, meet_sphere
+from dockair.sim.camera.layer_table import LayerTable, lay_under
 from dockair.sim.camera.sheets import SkyParameters
 from dockair.sim.camera.sky import Sky, Weather
 
@@ -169,6 +169,37 @@ def test_a_window_far_from_the_start_is_the_full_pictures_bit_for_bit() -> None:
         part = np.empty((len(Y[rows]), len(X[columns])), dtype=np.float32)
         _sky().fill(part, R, X[columns], Y[rows], place)
         assert np.array_equal(part, whole[rows, columns])
+
+
+@pytest.mark.parametrize("heading_m", [(20.0, 0.0, 0.0), (-4.0, 20.0, 0.0)])
+def test_the_next_key_is_made_bit_by_bit_and_right(heading_m: tuple[float, float, float]) -> None:
+    """Across a change of key, 20 m a frame: none makes more than a twentieth of the first frame's nodes.
+
+    Each picture is that of a table which was never anywhere else, bit for bit.
+    """
+    made: list[int] = []
+
+    def counted(d: np.ndarray, key_m: np.ndarray) -> np.ndarray:
+        made.append(len(d))
+        return _waves(d, key_m)
+
+    R, below = matrix_from_yaw_pitch_roll(0.0, 0.2, 0.0), np.empty((len(Y), 2), dtype=np.int64)
+    columns_below(R, X, Y, dip_sine(RADIUS_M, ALTITUDE_M), below)
+    flown, of_frame = LayerTable(counted, 32, 2, ALTITUDE_M, RADIUS_M), []
+    for step in range(100):
+        made.clear()
+        nodes = flown.nodes(step * np.array(heading_m), R, X, Y, below)
+        of_frame.append(sum(made))
+        if step % 20 == 10:
+            at = step * np.array(heading_m)
+            pictures = []
+            for table in (nodes, _table(2).nodes(at, R, X, Y, below)):
+                out = np.zeros((len(Y), len(X)), dtype=np.float32)
+                lay_under(out, R, X, Y, below, _table(1).nodes(at, R, X, Y, below), table, True)
+                pictures.append(out)
+            assert np.array_equal(*pictures)
+    assert max(of_frame[1:]) < of_frame[0] / 20
+    assert sum(of_frame[1:]) > 0.9 * of_frame[0]
 
 
 def test_a_new_key_changes_no_more_than_what_is_between_nodes() -> None:

@@ -88,6 +88,35 @@ def test_opengl_and_rays_agree_but_for_edges(world: Any, near: float) -> None:
     assert apart < 1e-3
 
 
+@pytest.mark.parametrize("aside", [(0.35, 0.1), (-0.2, -0.3), (0.05, 0.5)])
+@pytest.mark.parametrize("turn", [(0.0, 0.0, 0.0), (0.4, 0.1, -0.3)])
+def test_a_mesh_that_reaches_past_the_lens_is_seen_as_far_as_the_near_plane(
+    aside: tuple[float, float], turn: tuple[float, float, float]
+) -> None:
+    """A rod of twelve triangles from 5 m behind to 5 m ahead shows in the blocks that a box of its size shows in."""
+    half = np.array([0.1, 0.07, 5.0])
+    quat = quaternion_from_matrix(exp(np.array([0.03, np.pi / 2 + 0.02, -0.02])))
+    corners = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)]) * half
+    quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    pictures = []
+    for kind in (mujoco.mjtGeom.mjGEOM_BOX, mujoco.mjtGeom.mjGEOM_MESH):
+        spec = mujoco.MjSpec()
+        spec.stat.extent, spec.visual.map.znear, spec.visual.map.zfar = 20.0, 0.005, 100.0
+        spec.add_mesh(
+            name="rod",
+            uservert=corners.ravel().tolist(),
+            userface=[corner for a, b, c, d in quads for corner in (a, b, c, a, c, d)],
+        )
+        shape = {"size": half} if kind == mujoco.mjtGeom.mjGEOM_BOX else {"meshname": "rod"}
+        spec.worldbody.add_geom(type=kind, pos=[0.0, *aside], quat=quat, rgba=[1.0, 1.0, 1.0, 1.0], **shape)
+        model = spec.compile()
+        data = mujoco.MjData(model)
+        mujoco.mj_forward(model, data)
+        pictures.append(_draw(TracedSolids(model, SUNLIT), data, (exp(np.array(turn)), np.zeros(3))) != SKY)
+    assert pictures[0].sum() > 500
+    assert (pictures[0] != pictures[1]).sum() <= 3
+
+
 def test_blocks_show_a_mesh_where_mujocos_rays_meet_it(world: Any) -> None:
     """A block in 23; the skins are closed, so that the first face met looks at the lens."""
     name, model, data = world

@@ -32,13 +32,14 @@ LOOKS = [
 ]
 
 
+@pytest.mark.parametrize("smooth", [False, True])
 @pytest.mark.parametrize("R", LOOKS)
 @pytest.mark.parametrize("step", [1e-3, 2e-2])
-def test_a_smooth_function_comes_back_from_every_side(R: np.ndarray, step: float) -> None:
+def test_a_smooth_function_comes_back_from_every_side(R: np.ndarray, step: float, smooth: bool) -> None:
     """To a quarter of the step between nodes, where a fold of the map crosses a cell; a tile left out is off by 1."""
     x, y = _axes(60, 90, step)
     out = np.full((60, 90), np.nan, dtype=np.float32)
-    DirectionTable(_smooth, TILES).fill(out, R, x, y)
+    DirectionTable(_smooth, TILES, smooth=smooth).fill(out, R, x, y)
     assert np.abs(out - _wanted(R, x, y)).max() < 4e-3
 
 
@@ -79,18 +80,40 @@ def test_only_what_is_looked_at_is_computed() -> None:
     assert len(asked) == first
 
 
+@pytest.mark.parametrize("smooth", [False, True])
 @pytest.mark.parametrize("start", range(0, 33, 3))
-def test_a_window_is_the_full_pictures_bit_for_bit(start: int) -> None:
+def test_a_window_is_the_full_pictures_bit_for_bit(start: int, smooth: bool) -> None:
     """Every width from 1 to 40, from a table that no other picture has touched."""
     R = Rotation.from_euler("zyx", (10, 4, 15), degrees=True).as_matrix()
     x, y = _axes(50, 80, 2e-3)
     full = np.empty((50, 80), dtype=np.float32)
-    DirectionTable(_smooth, TILES).fill(full, R, x, y)
-    fresh = DirectionTable(_smooth, TILES)
+    DirectionTable(_smooth, TILES, smooth=smooth).fill(full, R, x, y)
+    fresh = DirectionTable(_smooth, TILES, smooth=smooth)
     for width in range(1, 41):
         part = np.empty((7, width), dtype=np.float32)
         fresh.fill(part, R, x[start : start + width], y[start : start + 7])
         assert np.array_equal(part, full[start : start + 7, start : start + width])
+
+
+@pytest.mark.parametrize("angles", [(0, 0, 0), (10, 4, 15), (-30, 15, -40)])
+def test_between_the_coarse_places_a_smooth_function_is_that_of_the_nodes(angles: tuple[float, float, float]) -> None:
+    """Clear of the map's folds, from the same nodes: 1 % of what the function changes over half a coarse step."""
+    R = Rotation.from_euler("zyx", angles, degrees=True).as_matrix()
+    x, y = _axes(60, 90, 7e-4)
+    plain, smooth = (np.empty((60, 90), dtype=np.float32) for _ in range(2))
+    DirectionTable(_smooth, 24).fill(plain, R, x, y)
+    DirectionTable(_smooth, 24, smooth=True).fill(smooth, R, x, y)
+    assert np.abs(plain - smooth).max() < 2e-5
+
+
+def test_places_a_multiple_of_the_coarse_step_apart_read_the_table_itself() -> None:
+    """Tangents that are multiples of 1/256 to the right and 1/512 down: nothing is interpolated there."""
+    R = Rotation.from_euler("zyx", (10, 4, 15), degrees=True).as_matrix()
+    x, y = np.arange(-20, 21) / 256.0, np.arange(-30, 31) / 512.0
+    plain, smooth = (np.empty((61, 41), dtype=np.float32) for _ in range(2))
+    DirectionTable(_smooth, TILES).fill(plain, R, x, y)
+    DirectionTable(_smooth, TILES, smooth=True).fill(smooth, R, x, y)
+    assert np.array_equal(plain, smooth)
 
 
 def test_directions_of_nodes_are_unit_vectors_in_their_place() -> None:
