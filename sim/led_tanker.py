@@ -43,36 +43,18 @@ class LedTanker:
         self._push = data.qfrc_applied[at.tanker_dof]
         self._mass_rate = model.body_mass[at.tanker] / step_s
         self._inertia_rate = model.body_inertia[at.tanker, 0] / step_s
+        self._straight = path.is_straight
         self.put(0.0)
-
-    @property
-    def R_WT(self) -> Array:
-        """(3, 3) attitude."""
-        return self.state[R].reshape(3, 3)
-
-    @property
-    def p_WT(self) -> Array:
-        """(3,) place [m]."""
-        return self.state[P]
-
-    @property
-    def v_WT(self) -> Array:
-        """(3,) velocity in W [m/s]."""
-        return self.state[V]
-
-    @property
-    def w_WT_T(self) -> Array:
-        """(3,) angular velocity in T [rad/s]."""
-        return self.state[OMEGA]
 
     def put(self, time_s: float) -> None:
         """Put it where it is at a time."""
         self._following = self._path.vector(time_s)
-        self.arrive()
+        self._land(self._following)
+        self._held = self._qpos.copy(), self._qvel.copy()
 
     def set_out(self, time_s: float) -> None:
         """Push it so that it arrives at its velocities of the tick's end, Eq. (1)."""
-        if self._path.is_straight:
+        if self._straight:
             return
         self._following = self._path.vector(time_s)
         self._push[:3] = self._mass_rate * (self._following[V] - self.state[V])
@@ -80,16 +62,23 @@ class LedTanker:
 
     def arrive(self) -> None:
         """Put it where its path has it at the tick's end."""
-        self.state = self._following
-        self._qpos[:3], self._qvel[:3], self._qvel[3:] = self.state[P], self.state[V], self.state[OMEGA]
-        if self._path.is_straight:
-            self._qpos[3:] = 1.0, 0.0, 0.0, 0.0
+        if self._straight:
+            self._qpos[:], self._qvel[:] = self._held
         else:
-            mujoco.mju_mat2Quat(self._qpos[3:], self.state[R])
+            self._land(self._following)
+
+    def _land(self, state: Array) -> None:
+        self.state = state  #: laid out as `tanker_motion` says
+        self.R_WT, self.p_WT = state[R].reshape(3, 3), state[P]  #: (3, 3) attitude, (3,) place [m]
+        self._qpos[:3], self._qvel[:3], self._qvel[3:] = state[P], state[V], state[OMEGA]
+        self._qpos[3:] = 1.0, 0.0, 0.0, 0.0
+        if not self._straight:
+            mujoco.mju_mat2Quat(self._qpos[3:], state[R])
 
     def pod(self) -> PodMotion | None:
         """Where the hose's exit is and how it moves; None while it rests in the origin of W."""
-        if self._path.is_straight:
+        if self._straight:
             return None
-        arm_W, w_WT = self.R_WT @ self._exit_T, self.R_WT @ self.w_WT_T
-        return PodMotion(R_WT=self.R_WT, p_WO=self.p_WT + arm_W, v_WO=self.v_WT + cross(w_WT, arm_W), w_WT=w_WT)
+        arm_W, w_WT = self.R_WT @ self._exit_T, self.R_WT @ self.state[OMEGA]
+        v_WO = self.state[V] + cross(w_WT, arm_W)
+        return PodMotion(R_WT=self.R_WT, p_WO=self.p_WT + arm_W, v_WO=v_WO, w_WT=w_WT)

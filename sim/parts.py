@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cache
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -70,6 +70,15 @@ class Airframe(Protocol):
         ...
 
 
+@runtime_checkable
+class FlyingAirframe(Airframe, Protocol):
+    """One that has to be trimmed in the air it flies in; others are held up by something else."""
+
+    def trim_in(self, downwash_m_s: float, pitching_air_rad_s: float) -> None:
+        """Begin anew, trimmed in air that sinks and turns about the left axis so fast; `trim_R_WB` is the attitude."""
+        ...
+
+
 class AirAround(Protocol):
     """What the world needs of the air's motion: `dockair.sim.air.motion.AirMotion`."""
 
@@ -79,6 +88,10 @@ class AirAround(Protocol):
 
     def at(self, tow_places_W: Array, R_WB: Array, p_WB: Array, R_WT: Array, p_WT: Array) -> AirState:
         """The air's motion at the tow's bodies and about the receiver, beyond the undisturbed wind."""
+        ...
+
+    def steady(self) -> "AirAround":
+        """Its part that stays: the wake."""
         ...
 
 

@@ -1,22 +1,25 @@
 """The complete state of the world at one tick. It goes to the log and to the referee, never to `nav`.
 
-`observed` reads it out of MuJoCo's arrays. With r the place of a point from the tree's centre of mass c,
+`observe` reads it out of MuJoCo's arrays. With r the place of a point from the tree's centre of mass c,
 
     v(point) = v(c) + w x r                                                                               (1)
 
 where (w, v(c)) is what MuJoCo calls a body's `cvel`.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 from dockair.rotations import Array
+from dockair.sim.air.motion import AirState
+from dockair.sim.aircraft import tanker_motion
 
-#: Layout of `observed`'s vector: attitudes and vectors of the receiver, the probe's tip and the drogue, then scalars.
+#: Layout of `observe`'s vector: attitudes and vectors of the receiver, the probe's tip and the drogue, then scalars.
 R_WB, P_WB, V_WB, W_WB_B, A_WB, ALPHA_WB_B, SPECIFIC_FORCE_B = (
     slice(0, 9), slice(9, 12), slice(12, 15), slice(15, 18), slice(18, 21), slice(21, 24), slice(24, 27)
 )  # fmt: skip
@@ -77,119 +80,139 @@ class Truth:
         return self.R_WD.T @ (self.p_WP - self.p_WD)
 
 
-class _Tanker(Protocol):
-    @property
-    def R_WT(self) -> Array: ...
-    @property
-    def p_WT(self) -> Array: ...
-    @property
-    def v_WT(self) -> Array: ...
-    @property
-    def w_WT_T(self) -> Array: ...
+class Seen(NamedTuple):
+    """What a Truth is cut out of; arrays are nobody else's."""
+
+    tick: int
+    time_s: float
+    x: Array  #: of `observe`
+    hose: Array  #: likewise
+    tanker: Array  #: state of `tanker_motion`
+    tensions_n: tuple[float, float, float]  #: at the exit, at the drogue, and the coupling's pull
+    air: AirState
+    flow: tuple[float, float, float, float]  #: receiver's airspeed, angle of attack, sideslip, and its throttle
+    latched: bool
+    touches: tuple[bool, str]  #: whether the probe touches the drogue; what the receiver touches
 
 
-class _Air(Protocol):
-    @property
-    def tow_W(self) -> Array: ...
-    @property
-    def receiver_W(self) -> Array: ...
+class _TruthWhenRead(Truth):
+    """A Truth that cuts a field out when it is first read: at most ticks few are."""
+
+    __slots__ = ("_seen",)
+
+    def __getattr__(self, name: str) -> Any:
+        """Make a field that has not been read yet."""
+        if name not in _CUT:
+            raise AttributeError(name)
+        value = _CUT[name](self._seen)
+        object.__setattr__(self, name, value)
+        return value
 
 
-class _Receiver(Protocol):
-    @property
-    def airspeed_m_s(self) -> float: ...
-    @property
-    def angle_of_attack_rad(self) -> float: ...
-    @property
-    def sideslip_rad(self) -> float: ...
-    @property
-    def throttle(self) -> float: ...
+def truth_of(seen: Seen) -> Truth:
+    """Return the truth of what was seen."""
+    truth = object.__new__(_TruthWhenRead)
+    object.__setattr__(truth, "_seen", seen)
+    return truth
 
 
-def truth_of(
-    *,
-    tick: int,
-    time_s: float,
-    seen: Array,
-    joints_W: Array,
-    tanker: _Tanker,
-    tensions_n: tuple[float, float, float],
-    air: _Air,
-    receiver: _Receiver,
-    latched: bool,
-    touches: tuple[bool, str],
-) -> Truth:
-    """Put a Truth together.
+def _matrix(where: slice) -> Callable[[Seen], Array]:
+    return lambda seen: seen.x[where].reshape(3, 3)
 
-    Args:
-        tick: now.
-        time_s: now.
-        seen: of `observed`; the Truth keeps it.
-        joints_W: (links + 1, 3) hose joints; likewise.
-        tanker: where it is.
-        tensions_n: at the exit, at the drogue, and the coupling's pull.
-        air: its motion.
-        receiver: what it knows of its flow.
-        latched: the coupling holds the probe.
-        touches: whether the probe touches the drogue; what the receiver touches.
-    """
-    x, f = seen, float
-    return Truth(
-        tick=tick, time_s=time_s,
-        R_WB=x[R_WB].reshape(3, 3), p_WB=x[P_WB], v_WB=x[V_WB], w_WB_B=x[W_WB_B], alpha_WB_B=x[ALPHA_WB_B],
-        a_WB=x[A_WB], specific_force_B=x[SPECIFIC_FORCE_B], p_WP=x[P_WP], v_WP=x[V_WP],
-        R_WD=x[R_WD].reshape(3, 3), p_WD=x[P_WD], v_WD=x[V_WD], w_WD_D=x[W_WD_D], p_WH=joints_W,
-        R_WT=tanker.R_WT, p_WT=tanker.p_WT, v_WT=tanker.v_WT, w_WT_T=tanker.w_WT_T,
-        reel_position_m=f(x[REEL_POSITION]), reel_rate_m_s=f(x[REEL_RATE]),
-        root_tension_n=tensions_n[0], drogue_tension_n=tensions_n[1], coupling_force_n=tensions_n[2],
-        gust_B_m_s=air.receiver_W, gust_D_m_s=air.tow_W[-1], airspeed_m_s=receiver.airspeed_m_s,
-        angle_of_attack_rad=receiver.angle_of_attack_rad, sideslip_rad=receiver.sideslip_rad,
-        throttle=receiver.throttle, latched=latched, probe_touches_drogue=touches[0], receiver_touches=touches[1],
-    )  # fmt: skip
+
+def _vector(where: slice) -> Callable[[Seen], Array]:
+    return lambda seen: seen.x[where]
+
+
+_CUT: dict[str, Callable[[Seen], Any]] = {
+    "tick": lambda seen: seen.tick,
+    "time_s": lambda seen: seen.time_s,
+    "R_WB": _matrix(R_WB), "p_WB": _vector(P_WB), "v_WB": _vector(V_WB), "w_WB_B": _vector(W_WB_B),
+    "alpha_WB_B": _vector(ALPHA_WB_B), "a_WB": _vector(A_WB), "specific_force_B": _vector(SPECIFIC_FORCE_B),
+    "p_WP": _vector(P_WP), "v_WP": _vector(V_WP),
+    "R_WD": _matrix(R_WD), "p_WD": _vector(P_WD), "v_WD": _vector(V_WD), "w_WD_D": _vector(W_WD_D),
+    "p_WH": lambda seen: seen.hose[0],
+    "R_WT": lambda seen: seen.tanker[tanker_motion.R].reshape(3, 3),
+    "p_WT": lambda seen: seen.tanker[tanker_motion.P],
+    "v_WT": lambda seen: seen.tanker[tanker_motion.V],
+    "w_WT_T": lambda seen: seen.tanker[tanker_motion.OMEGA],
+    "reel_position_m": lambda seen: float(seen.x[REEL_POSITION]),
+    "reel_rate_m_s": lambda seen: float(seen.x[REEL_RATE]),
+    "root_tension_n": lambda seen: seen.tensions_n[0],
+    "drogue_tension_n": lambda seen: seen.tensions_n[1],
+    "coupling_force_n": lambda seen: seen.tensions_n[2],
+    "gust_B_m_s": lambda seen: seen.air.receiver_W,
+    "gust_D_m_s": lambda seen: seen.air.tow_W[-1],
+    "airspeed_m_s": lambda seen: seen.flow[0],
+    "angle_of_attack_rad": lambda seen: seen.flow[1],
+    "sideslip_rad": lambda seen: seen.flow[2],
+    "throttle": lambda seen: seen.flow[3],
+    "latched": lambda seen: seen.latched,
+    "probe_touches_drogue": lambda seen: seen.touches[0],
+    "receiver_touches": lambda seen: seen.touches[1],
+}  # fmt: skip
 
 
 @njit(cache=True)
-def observed(
-    bodies: tuple[Array, Array, Array, Array],
-    joints: tuple[Array, Array, Array],
-    where: NDArray[np.int64],
-    p_BP: Array,
-    depth_m: float,
-    gravity_W: Array,
-) -> Array:
-    """(54,) what MuJoCo's arrays say about receiver, probe's tip, drogue and reel, a new array laid out as above.
+def observe(
+    xpos: Array, xmat: Array, cvel: Array, subtree_com: Array, xipos: Array, xanchor: Array,
+    qpos: Array, qvel: Array, qacc: Array, where: NDArray[np.int64], constants: Array, out: Array, hose: Array,
+) -> None:  # fmt: skip
+    """Read receiver, probe's tip, drogue, reel and hose out of MuJoCo's arrays.
 
     Args:
-        bodies: xpos, xmat, cvel, subtree_com.
-        joints: qpos, qvel, qacc.
-        where: of `Addresses.observed`.
-        p_BP: (3,) probe's tip in the receiver's axes [m].
-        depth_m: coupling point ahead of the ring's centre.
-        gravity_W: (3,) [m/s^2].
+        xpos: of MuJoCo, as all down to qacc.
+        xmat: rotation matrices.
+        cvel: angular velocities, and velocities at the tree's centre of mass.
+        subtree_com: that centre.
+        xipos: centres of mass.
+        xanchor: joints.
+        qpos: positions.
+        qvel: rates.
+        qacc: accelerations.
+        where: (8,) bodies: receiver, drogue, tanker; dof of the first; reel's qpos and dof; first link, drogue's joint.
+        constants: (8,) probe's tip in the receiver's axes [m]; coupling point ahead of the ring's centre [m]; gravity
+            [m/s^2]; the canopy's centre ahead of the drogue's centre of mass [m].
+        out: (54,) written, laid out as above.
+        hose: (2, links + 1, 3) written: joints from the reel to the drogue; where the air acts on links and drogue.
     """
-    (xpos, xmat, cvel, subtree_com), (qpos, qvel, qacc) = bodies, joints
-    receiver, drogue, tree, dof, reel_qpos, reel_dof = where[0], where[1], where[2], where[3], where[4], where[5]
-    out = np.empty(OBSERVED)
-    B, D, w = xmat[receiver], xmat[drogue], cvel[drogue]
+    drogue = where[1]
+    out[REEL_POSITION], out[REEL_RATE] = qpos[where[4]], qvel[where[5]]
+    _observe_bodies(xpos, xmat, cvel[drogue], subtree_com[where[2]], qvel, qacc, where, constants, out)
+    _observe_hose(xpos, xipos, xanchor[where[7]], where[6], xmat[drogue], constants[7], hose)
+
+
+@njit(cache=True)
+def _observe_bodies(xpos, xmat, w, centre, qvel, qacc, where, constants, out):  # type: ignore[no-untyped-def]
+    receiver, drogue, dof = where[0], where[1], where[3]
+    B, D = xmat[receiver], xmat[drogue]
     turn, arm, r = np.empty(3), np.empty(3), np.empty(3)
-    for i in range(9):
-        out[i], out[33 + i] = B[i], D[i]
+    out[:9], out[33:42] = B, D
     for i in range(3):
         out[9 + i], out[12 + i], out[15 + i] = xpos[receiver, i], qvel[dof + i], qvel[dof + 3 + i]
         out[18 + i], out[21 + i], out[42 + i] = qacc[dof + i], qacc[dof + 3 + i], xpos[drogue, i]
         turn[i] = B[3 * i] * qvel[dof + 3] + B[3 * i + 1] * qvel[dof + 4] + B[3 * i + 2] * qvel[dof + 5]
-        arm[i] = B[3 * i] * p_BP[0] + B[3 * i + 1] * p_BP[1] + B[3 * i + 2] * p_BP[2]
-        r[i] = xpos[drogue, i] - subtree_com[tree, i]
+        arm[i] = B[3 * i] * constants[0] + B[3 * i + 1] * constants[1] + B[3 * i + 2] * constants[2]
+        r[i] = xpos[drogue, i] - centre[i]
     tip2 = 0.0
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
         out[24 + i] = 0.0
         for m in range(3):
-            out[24 + i] += B[3 * m + i] * (qacc[dof + m] - gravity_W[m])
+            out[24 + i] += B[3 * m + i] * (qacc[dof + m] - constants[4 + m])
         out[27 + i] = out[9 + i] + arm[i]
         out[30 + i] = out[12 + i] + (turn[j] * arm[k] - turn[k] * arm[j])
         out[45 + i] = w[3 + i] + (w[j] * r[k] - w[k] * r[j])  # Eq. (1)
         out[48 + i] = D[i] * w[0] + D[3 + i] * w[1] + D[6 + i] * w[2]
-        tip2 += (out[27 + i] - out[42 + i] - depth_m * D[3 * i]) ** 2
-    out[REEL_POSITION], out[REEL_RATE], out[TIP_DISTANCE] = qpos[reel_qpos], qvel[reel_dof], np.sqrt(tip2)
-    return out
+        tip2 += (out[27 + i] - out[42 + i] - constants[3] * D[3 * i]) ** 2
+    out[TIP_DISTANCE] = np.sqrt(tip2)
+
+
+@njit(cache=True)
+def _observe_hose(xpos, xipos, end, first, D, canopy, hose):  # type: ignore[no-untyped-def]
+    links = hose.shape[1] - 1
+    for axis in range(3):
+        for i in range(links):
+            hose[0, i, axis], hose[1, i, axis] = xpos[first + i, axis], xipos[first + i, axis]
+        hose[0, links, axis] = end[axis]
+        hose[1, links, axis] = xipos[first + links, axis] + canopy * D[3 * axis]

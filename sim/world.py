@@ -12,8 +12,8 @@ in W; one that turns or descends is led along its path, and takes the hose with 
 difference of the path's velocities, so that hose and drogue feel every inertial load.
 
 At construction the hose starts from its shape at rest and settles in the gusts, the tanker flying straight, while the
-receiver waits far behind; then the receiver is put, trimmed and at rest in W, where the probe's tip stands to the
-drogue's *mean* place over the second half of that time as asked.
+receiver waits far behind; then the receiver is put, at rest in W and trimmed in the wake's downwash there, where the
+probe's tip stands to the drogue's *mean* place over the second half of that time as asked.
 
 Not modelled: fuel flow; what hose and receiver do to the tanker.
 """
@@ -40,17 +40,17 @@ from dockair.sim.hose.reel import Reel
 from dockair.sim.hose.rest import hinge_angles
 from dockair.sim.hose.tow import Tow
 from dockair.sim.led_tanker import LedTanker
-from dockair.sim.parts import AirAround, Airframe, WorldParameters, WorldStart, still_air
+from dockair.sim.parts import AirAround, Airframe, FlyingAirframe, WorldParameters, WorldStart, still_air
 from dockair.sim.scene import SceneParameters, build_scene
 from dockair.sim.step_limit import check_step
-from dockair.sim.truth import Truth, observed, truth_of
+from dockair.sim.truth import Seen, Truth, observe, truth_of
 
 __all__ = ["World", "DivergedError", "WorldParameters", "WorldStart", "WorldState"]
 
 _WAITING_PLACE_M = (-300.0, 0.0, -20.0)  # of the receiver while the hose settles: out of everybody's way
+_TRIMS = 3  # attitude changes the place, the place the wake, the wake the attitude: a tenth as much each time
 _STATE = mujoco.mjtState.mjSTATE_INTEGRATION
 _DIVERGED = 1e10  # acceleration at which MuJoCo calls a step unstable [m/s^2 or rad/s^2]
-_GRAVITY = np.array([0.0, 0.0, -STANDARD_GRAVITY_M_S2])
 
 
 class DivergedError(DockairError):
@@ -109,7 +109,7 @@ class World:
         p = parameters
         self._tow = Tow(p.hose, p.drogue, p.reel, p.air, self._wind_W, clock.step_s)
         self._coupling = CouplingState.READY
-        self._tip_in_body, exit_T = np.array(p.mounting.p_BP), np.array(p.tanker.exit_m, dtype=float)
+        exit_T = np.array(p.tanker.exit_m, dtype=float)
         path = tanker_path or TankerPath(TankerPathParameters(), p.airspeed_m_s, -exit_T)
         self._tanker = LedTanker(path, self.model, self.data, self._at, exit_T, clock.step_s)
         self.rest = rest = self._tow.rest
@@ -119,25 +119,23 @@ class World:
         self._tensions = rest.root_tension_n, rest.drogue_tension_n, 0.0
         self._observe(0)
         p_WD_mean = self._settle(round(start.settle_s / clock.step_s))
-        R_WB = np.asarray(receiver.trim_R_WB)
-        self._put_receiver(p_WD_mean - R_WB @ (start.p_PD_B + p.mounting.p_BP))
+        self._put_behind(p_WD_mean, start.p_PD_B)
         self.data.qacc[self._at.receiver_dof] = 0.0
         self._observe(0)
 
     def step(self, command: ReceiverCommand) -> Truth:
         """Advance by one physics tick under a command; return the new truth."""
-        truth = self.truth
-        force_W, torque_W = self._receiver.step(
-            R_WB=truth.R_WB,
-            v_WB=truth.v_WB,
-            w_WB_B=truth.w_WB_B,
-            air_velocity_W=self._wind_W + self._air_state.receiver_W,
-            air_rotation_B=self._air_state.receiver_rotation_B,
-            specific_force_B=truth.specific_force_B,
+        x, air = self._seen, self._air_state
+        self._force_W[:], self._torque_W[:] = self._receiver.step(
+            R_WB=self._R_WB,
+            v_WB=x[layout.V_WB],
+            w_WB_B=x[layout.W_WB_B],
+            air_velocity_W=self._wind_W + air.receiver_W,
+            air_rotation_B=air.receiver_rotation_B,
+            specific_force_B=x[layout.SPECIFIC_FORCE_B],
             command=command,
         )
-        self._receiver_wrench[:3], self._receiver_wrench[3:] = force_W, torque_W
-        self._advance(truth.tick + 1)
+        self._advance(self._tick + 1)
         return self.truth
 
     def save(self) -> WorldState:
@@ -159,15 +157,36 @@ class World:
         mujoco.mj_step1(self.model, self.data)
         self._tow.reel, self._receiver, self._air = copy.deepcopy(state.parts)
         self._coupling, self.truth, self._seen, self._air_state = state.coupling, state.truth, state.seen, state.air
-        self._tanker.put(self.truth.time_s)
+        now, self._tick = self.truth, state.truth.tick
+        self._R_WB, self._tensions = now.R_WB, (now.root_tension_n, now.drogue_tension_n, now.coupling_force_n)
+        self._tanker.put(now.time_s)
 
     def _keep_views(self, at: Addresses, d: mujoco.MjData) -> None:
         """Views of MuJoCo's own memory, which every tick reads: to ask for them anew takes a tenth of its time."""
-        self._bodies, self._joints = (d.xpos, d.xmat, d.cvel, d.subtree_com), (d.qpos, d.qvel, d.qacc)
+        self._kinematics = d.xpos, d.xmat, d.cvel, d.subtree_com, d.xipos, d.xanchor, d.qpos, d.qvel, d.qacc
+        self._where = np.append(at.observed, [at.tow.start, at.drogue_joint])
         R = d.xmat[at.tow].reshape(-1, 3, 3)
         self._tow_places = d.xipos[at.tow], R, d.cvel[at.tow], d.subtree_com[at.tanker]
-        self._tow_wrenches, self._receiver_wrench = d.xfrc_applied[at.tow], d.xfrc_applied[at.receiver]
-        self._hose_joints = d.xpos[at.links], d.xanchor[at.drogue_joint]
+        self._tow_wrenches, self._reel_force = d.xfrc_applied[at.tow], d.qfrc_applied[at.reel_dof : at.reel_dof + 1]
+        self._force_W, self._torque_W = d.xfrc_applied[at.receiver, :3], d.xfrc_applied[at.receiver, 3:]
+        self._reactions = d.cfrc_int, d.xmat, d.qacc
+        drogue = self.parameters.drogue
+        canopy, gravity = drogue.drag_centre_x_m - drogue.centre_of_mass_x_m, [0.0, 0.0, -STANDARD_GRAVITY_M_S2]
+        tip, depth = self.parameters.mounting.p_BP, self.parameters.coupling.depth_m
+        self._constants = np.array([*tip, depth, *gravity, canopy])
+
+    def _put_behind(self, p_WD: Array, p_PD_B: Array) -> None:
+        """Put the receiver behind the drogue at p_WD, trimmed in the wake that blows where it then is."""
+        receiver, from_tip_B = self._receiver, p_PD_B + self.parameters.mounting.p_BP
+        for _ in range(_TRIMS):
+            if self._air is None or not isinstance(receiver, FlyingAirframe):
+                break
+            R_WB = np.ascontiguousarray(receiver.trim_R_WB)
+            where = (p_WD[np.newaxis], R_WB, p_WD - R_WB @ from_tip_B, self._tanker.R_WT, self._tanker.p_WT)
+            wake = self._air.steady().at(*where)
+            if wake.receiver_W.any():
+                receiver.trim_in(-float(wake.receiver_W[2]), float(wake.receiver_rotation_B[1]))
+        self._put_receiver(p_WD - np.asarray(receiver.trim_R_WB) @ from_tip_B)
 
     def _put_receiver(self, p_WB: Array) -> None:
         """Place the receiver, trimmed and at rest in W."""
@@ -191,41 +210,36 @@ class World:
 
     def _advance(self, tick: int) -> None:
         """One tick, the receiver's forces being applied already."""
-        at, data, before = self._at, self.data, self.truth
+        x, time_s = self._seen, self._clock.seconds(tick)
+        position, rate = float(x[layout.REEL_POSITION]), float(x[layout.REEL_RATE])
         self._tow_wrenches[:] = self._tow.wrenches(
-            *self._tow_places, self._air_state.tow_W, before.reel_position_m, self._tanker.pod()
+            *self._tow_places, self._air_state.tow_W, position, self._tanker.pod()
         )
-        locked = self._reel_locked is not None and self._reel_locked(before.time_s)
-        data.qfrc_applied[at.reel_dof] = self._tow.reel.step(
-            before.root_tension_n, before.reel_position_m, before.reel_rate_m_s, locked
-        )
-        self._tanker.set_out(self._clock.seconds(tick))
-        self._solve(self._clock.seconds(tick))
+        locked = self._reel_locked is not None and self._reel_locked(self._clock.seconds(self._tick))
+        self._reel_force[0] = self._tow.reel.step(self._tensions[0], position, rate, locked)
+        self._tanker.set_out(time_s)
+        self._solve(time_s, self._at.tow.start + self._tow.link_at_exit(position))
         self._decide_coupling()
         if self._air is not None:
             self._air.step()
         self._tanker.arrive()
-        mujoco.mj_step1(self.model, data)
+        mujoco.mj_step1(self.model, self.data)
         self._observe(tick)
 
-    def _solve(self, time_s: float) -> None:
-        """MuJoCo's second half step, and the forces at its beginning: they must be taken before it integrates."""
-        at, data = self._at, self.data
-        mujoco.mj_fwdActuation(self.model, data)
-        mujoco.mj_fwdAcceleration(self.model, data)
-        mujoco.mj_fwdConstraint(self.model, data)
-        mujoco.mj_rnePostConstraint(self.model, data)
-        at_exit = at.tow.start + self._tow.link_at_exit(self.truth.reel_position_m)
-        root, drogue, converged = _solved(
-            data.cfrc_int, self._bodies[1], self._joints[2], at_exit, at.drogue, _DIVERGED
-        )
+    def _solve(self, time_s: float, at_exit: int) -> None:
+        """MuJoCo's second half step, without actuators, and the forces that must be taken before it integrates."""
+        model, data = self.model, self.data
+        mujoco.mj_fwdAcceleration(model, data)
+        mujoco.mj_fwdConstraint(model, data)
+        mujoco.mj_rnePostConstraint(model, data)
+        root, drogue, converged = _solved(*self._reactions, at_exit, self._at.drogue, _DIVERGED)
         if not converged:
             raise DivergedError("world", expected="a physics step that converges", got=f"diverged at {time_s:.3f} s")
         pull = 0.0
         if self._coupling is CouplingState.LATCHED:  # its three rows come first: it is the only equality
             pull = float(data.efc_force[:3] @ self.truth.R_WD[:, 0])
         self._tensions = root, drogue, pull
-        mujoco.mj_implicit(self.model, data)
+        mujoco.mj_implicit(model, data)
 
     def _decide_coupling(self) -> None:
         p = self.parameters.coupling
@@ -237,36 +251,19 @@ class World:
 
     def _observe(self, tick: int) -> None:
         """Take the truth of the present state, and the air's motion where everything is."""
-        at, data, tanker = self._at, self.data, self._tanker
-        self._seen = x = observed(
-            self._bodies,
-            self._joints,
-            at.observed,
-            self._tip_in_body,
-            self.parameters.coupling.depth_m,
-            _GRAVITY,
-        )
-        R_WB, p_WB = x[layout.R_WB].reshape(3, 3), x[layout.P_WB]
-        R_WT, p_WT = tanker.R_WT, tanker.p_WT
-        drogue, places = self.parameters.drogue, self._tow_places[0].copy()
-        places[-1] += (drogue.drag_centre_x_m - drogue.centre_of_mass_x_m) * x[layout.R_WD][::3]  # at its canopy
-        air = still_air(len(places)) if self._air is None else self._air.at(places, R_WB, p_WB, R_WT, p_WT)
-        probe_touches, receiver_touches = at.contacts(data.contact.geom) if data.ncon else (False, "")
-        joints = np.empty(places.shape)
-        joints[:-1], joints[-1] = self._hose_joints
-        self._air_state = air
-        self.truth = truth_of(
-            tick=tick,
-            time_s=self._clock.seconds(tick),
-            seen=x,
-            joints_W=joints,
-            tanker=tanker,
-            tensions_n=self._tensions,
-            air=air,
-            receiver=self._receiver,
-            latched=self._coupling is CouplingState.LATCHED,
-            touches=(probe_touches, receiver_touches),
-        )
+        data, tanker, bodies = self.data, self._tanker, len(self._tow_wrenches)
+        x, hose = np.empty(layout.OBSERVED), np.empty((2, bodies, 3))
+        observe(*self._kinematics, self._where, self._constants, x, hose)
+        self._tick, self._seen, self._R_WB = tick, x, x[layout.R_WB].reshape(3, 3)
+        if self._air is None:
+            air = still_air(bodies)
+        else:
+            air = self._air.at(hose[1], self._R_WB, x[layout.P_WB], tanker.R_WT, tanker.p_WT)
+        touches = self._at.contacts(data.contact.geom) if data.ncon else (False, "")
+        own, self._air_state = self._receiver, air
+        flow = own.airspeed_m_s, own.angle_of_attack_rad, own.sideslip_rad, own.throttle
+        latched, time_s = self._coupling is CouplingState.LATCHED, self._clock.seconds(tick)
+        self.truth = truth_of(Seen(tick, time_s, x, hose, tanker.state, self._tensions, air, flow, latched, touches))
 
 
 @njit(cache=True)

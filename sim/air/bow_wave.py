@@ -59,10 +59,16 @@ def bow_wave_coefficients(parameters: BowWaveParameters, p_BP: Array, airspeed_m
 @njit(cache=True)
 def bow_wave_velocity(points_B: Array, k: Array) -> Array:
     """(n, 3) velocity of the air that the receiver's nose causes at points_B (n, 3) [m], axes B [m/s], Eq. (1)."""
-    out = np.empty((points_B.shape[0], 3))
+    out = np.empty(points_B.shape)
+    write_bow_wave_velocity(points_B, k, out)
+    return out
+
+
+@njit(cache=True)
+def write_bow_wave_velocity(points_B: Array, k: Array, out: Array) -> None:
+    """`bow_wave_velocity` into an array that is there already (n, 3)."""
     for i in range(points_B.shape[0]):
         x, y, z = points_B[i, 0] - k[0], points_B[i, 1] - k[1], points_B[i, 2] - k[2]
         r = max(np.sqrt(x * x + y * y + z * z), k[4])
         scale = k[3] / (r * r * r)
         out[i, 0], out[i, 1], out[i, 2] = scale * x, scale * y, scale * z
-    return out

@@ -73,12 +73,13 @@ class DiscreteGusts:
     def velocity(self, x: Array) -> Array:
         """(n, 3) gust velocity [m/s] at the places x (n,) [m], Eq. (1)."""
         time_s = self._start_s + self._ticks * self._step_s
-        return _gusts_at(self._gusts, time_s, self._airspeed_m_s, self._met_at_m, np.asarray(x, dtype=float))
+        gusts: Array = np.zeros((len(x), 3))
+        _add_gusts(self._gusts, time_s, self._airspeed_m_s, self._met_at_m, np.asarray(x, dtype=float), gusts)
+        return gusts
 
 
 @njit(cache=True)
-def _gusts_at(gusts, time_s, airspeed_m_s, met_at_m, x):  # type: ignore[no-untyped-def]
-    out = np.zeros((x.shape[0], 3))
+def _add_gusts(gusts, time_s, airspeed_m_s, met_at_m, x, out):  # type: ignore[no-untyped-def]
     for g in range(gusts.shape[0]):
         at_s, length_m = gusts[g, 0], gusts[g, 1]
         for i in range(x.shape[0]):
@@ -87,4 +88,3 @@ def _gusts_at(gusts, time_s, airspeed_m_s, met_at_m, x):  # type: ignore[no-unty
                 share = 0.5 * (1.0 - np.cos(np.pi * s / length_m))
                 for axis in range(3):
                     out[i, axis] += share * gusts[g, 2 + axis]
-    return out

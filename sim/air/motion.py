@@ -18,16 +18,15 @@ The wake's circulation follows the tanker's lift, L/(m g) = cos(climb)/cos(bank)
 Not modelled: gradients along the vertical; the wake's effect on the gusts; the receiver's on the tanker.
 """
 
-from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numba import njit
 
 from dockair.errors import DockairError
 from dockair.rotations import Array
-from dockair.sim.air.bow_wave import bow_wave_velocity
-from dockair.sim.air.wake import wake_velocity
+from dockair.sim.air.bow_wave import write_bow_wave_velocity
+from dockair.sim.air.wake import write_wake_velocity
 
 _FLAT = 1e-6  # of the largest singular value: below it the sample points are taken to lie in one plane
 
@@ -52,8 +51,7 @@ class GustField(FrozenGusts, Protocol):
         ...
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class AirState:
+class AirState(NamedTuple):
     """What the bodies feel of the air's motion, beyond the undisturbed wind."""
 
     tow_W: Array  #: (n, 3) at the links and the drogue, W axes [m/s]
@@ -94,7 +92,7 @@ class AirMotion:
         self._exit_T, self._points_B = np.array(exit_T, dtype=float), points
         design = np.column_stack([np.ones(len(points)), points])
         self._fit = np.ascontiguousarray(np.linalg.pinv(design, rcond=_FLAT))  # Eq. (1)
-        self._nothing: Array = np.zeros((0, 3))  # what sources that are off give
+        self._room: tuple[Array, ...] = (np.zeros((0, 3)),)  # for the places; written anew whenever they are asked for
         self._still = gusts is None and discrete is None and wake is None and bow_wave is None
 
     def step(self) -> None:
@@ -116,33 +114,38 @@ class AirMotion:
         n = len(tow_places_W)
         if self._still:
             return AirState(tow_W=np.zeros((n, 3)), receiver_W=np.zeros(3), receiver_rotation_B=np.zeros(3))
-        x_F, places_T, tow_B = _places(tow_places_W, self._points_B, R_WB, p_WB, R_WT, p_WT, self._exit_T)
-        if len(self._nothing) != len(places_T):
-            self._nothing = np.zeros(places_T.shape)
-        gust_F, rolling = self._gusts_at(x_F)
-        wake_T = bow_B = self._nothing
-        if self._wake is not None:
-            wake_T = wake_velocity(places_T, self._wake)
-        if self._bow_wave is not None:
-            bow_B = bow_wave_velocity(tow_B, self._bow_wave)
-        air = _joined(gust_F, wake_T, bow_B, R_WB, R_WT, self._fit, rolling)
-        return AirState(tow_W=air[:n], receiver_W=air[n], receiver_rotation_B=air[n + 1])
-
-    def _gusts_at(self, x_F: Array) -> tuple[Array, float]:
-        """Gusts at places along F, and the rolling gust at the last of them."""
-        x, gust_F, rolling = x_F[:-1], self._nothing, 0.0
+        if len(self._room[0]) != n:
+            self._make_room(n)
+        tow_B, bow_B, places_T, wake_T, nothing, x_F = self._room
+        scene = (R_WB, p_WB, R_WT, p_WT)
+        x = _places(tow_places_W, self._points_B, *scene, self._exit_T, x_F, places_T, tow_B)
+        gust_F, rolling = nothing, 0.0
         if self._gusts is not None:
-            gust_F, rolling = self._gusts.velocity(x), self._gusts.rolling(float(x_F[-1]))
+            gust_F, rolling = self._gusts.velocity(x_F), self._gusts.rolling(x)
         if self._discrete is not None:
-            gust_F = gust_F + self._discrete.velocity(x)
-        return gust_F, rolling
+            gust_F = gust_F + self._discrete.velocity(x_F)
+        if self._wake is not None:
+            write_wake_velocity(places_T, self._wake, wake_T)
+        if self._bow_wave is not None:
+            write_bow_wave_velocity(tow_B, self._bow_wave, bow_B)
+        air = np.empty((n + 2, 3))
+        _join(gust_F, wake_T, bow_B, R_WB, R_WT, self._fit, rolling, air)
+        return AirState(air[:n], air[n], air[n + 1])
+
+    def steady(self) -> "AirMotion":
+        """The wake alone: what of the air's motion stays while gusts pass, about a receiver that keeps its place."""
+        return AirMotion(wake=self._wake, exit_T=self._exit_T, receiver_points_B=self._points_B)
+
+    def _make_room(self, n: int) -> None:
+        """Room for the tow's places in B and the bow wave there; all places in T, wake and nothing there, x along F."""
+        m = n + len(self._points_B)
+        self._room = (*np.zeros((2, n, 3)), *np.zeros((3, m, 3)), np.zeros(m))
 
 
 @njit(cache=True)
-def _places(tow_W, points_B, R_WB, p_WB, R_WT, p_WT, exit_T):  # type: ignore[no-untyped-def]
-    """Places of tow and sample points: x along F, the centre of gravity's last; all in T; the tow's in B."""
+def _places(tow_W, points_B, R_WB, p_WB, R_WT, p_WT, exit_T, x_F, places_T, tow_B):  # type: ignore[no-untyped-def]
+    """Write places of tow and sample points: x along F; all in T; the tow's in B. Return the receiver's x."""
     n, m = tow_W.shape[0], points_B.shape[0]
-    x_F, places_T, tow_B = np.empty(n + m + 1), np.empty((n + m, 3)), np.empty((n, 3))
     level = np.sqrt(R_WT[0, 0] ** 2 + R_WT[1, 0] ** 2)
     ahead_x, ahead_y = R_WT[0, 0] / level, R_WT[1, 0] / level
     exit_x = p_WT[0] + R_WT[0, 0] * exit_T[0] + R_WT[0, 1] * exit_T[1] + R_WT[0, 2] * exit_T[2]
@@ -163,19 +166,19 @@ def _places(tow_W, points_B, R_WB, p_WB, R_WT, p_WT, exit_T):  # type: ignore[no
             x, y, z = p[0] - p_WB[0], p[1] - p_WB[1], p[2] - p_WB[2]
             for axis in range(3):
                 tow_B[i, axis] = R_WB[0, axis] * x + R_WB[1, axis] * y + R_WB[2, axis] * z
-    x_F[n + m] = ahead_x * (p_WB[0] - exit_x) + ahead_y * (p_WB[1] - exit_y)
-    return x_F, places_T, tow_B
+    return ahead_x * (p_WB[0] - exit_x) + ahead_y * (p_WB[1] - exit_y)
 
 
 @njit(cache=True)
-def _joined(gust_F, wake_T, bow_B, R_WB, R_WT, fit, rolling):  # type: ignore[no-untyped-def]
-    """(n + 2, 3): air at the tow and at the receiver's centre of gravity in W, its turning about the receiver in B."""
+def _join(gust_F, wake_T, bow_B, R_WB, R_WT, fit, rolling, out):  # type: ignore[no-untyped-def]
+    """Write air at the tow (n, 3) and at the receiver's centre of gravity in W, its turning about the receiver in B."""
     m = fit.shape[1]
     n = gust_F.shape[0] - m
     level = np.sqrt(R_WT[0, 0] ** 2 + R_WT[1, 0] ** 2)
     ahead_x, ahead_y = R_WT[0, 0] / level, R_WT[1, 0] / level
     load = level * level / R_WT[2, 2]  # cos(climb)/cos(bank)
-    out, linear, v = np.zeros((n + 2, 3)), np.zeros((4, 3)), np.empty(3)
+    linear, v = np.zeros((4, 3)), np.empty(3)
+    out[n:] = 0.0
     for i in range(n + m):
         v[0] = ahead_x * gust_F[i, 0] - ahead_y * gust_F[i, 1]
         v[1] = ahead_y * gust_F[i, 0] + ahead_x * gust_F[i, 1]
@@ -197,4 +200,3 @@ def _joined(gust_F, wake_T, bow_B, R_WB, R_WT, fit, rolling):  # type: ignore[no
         out[n + 1, 1] -= R_WB[axis, 2] * linear[1, axis]
         out[n + 1, 2] += R_WB[axis, 1] * linear[1, axis]
     out[n + 1, 0] += rolling
-    return out

@@ -86,7 +86,7 @@ def gust_sigma(intensity: str, altitude_m: float) -> float:
 def rolling_sigma(sigma_m_s: float, length_scale_m: float, span_m: float) -> float:
     """Standard deviation of the rolling gust over a span [rad/s], Eq. (3)."""
     b, L = span_m, length_scale_m
-    return sigma_m_s * sqrt(0.1 * pi**2 / (L * b)) * (pi * L / (4.0 * b)) ** (1.0 / 6.0)
+    return float(sigma_m_s * sqrt(0.1 * pi**2 / (L * b)) * (pi * L / (4.0 * b)) ** (1.0 / 6.0))
 
 
 class DrydenField:
@@ -131,8 +131,9 @@ class DrydenField:
 
     def velocity(self, x: Array) -> Array:
         """(n, 3) gust velocity [m/s] at the places x (n,) [m]."""
-        places = np.asarray(x, dtype=float)
-        return _gusts_at(self._knots, self._passed_m, self._back_m, self._front_m, self._spacing_m, places)
+        gusts: Array = np.empty((len(x), 3))
+        _gusts_at(self._knots, self._passed_m, self._back_m, self._front_m, self._spacing_m, x, gusts)
+        return gusts
 
     def rolling(self, x: float) -> float:
         """Rolling gust [rad/s] at the place x [m]; 0 without a span."""
@@ -198,14 +199,12 @@ def _between(x, passed_m, back_m, front_m, spacing_m):  # type: ignore[no-untype
 
 
 @njit(cache=True)
-def _gusts_at(knots, passed_m, back_m, front_m, spacing_m, x):  # type: ignore[no-untyped-def]
-    out = np.empty((x.shape[0], 3))
+def _gusts_at(knots, passed_m, back_m, front_m, spacing_m, x, out):  # type: ignore[no-untyped-def]
     for i in range(x.shape[0]):
         knot, part = _between(x[i], passed_m, back_m, front_m, spacing_m)
         a, b = knot % knots.shape[0], (knot + 1) % knots.shape[0]
         for axis in range(3):
             out[i, axis] = (1.0 - part) * knots[a, axis] + part * knots[b, axis]
-    return out
 
 
 @njit(cache=True)

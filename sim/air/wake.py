@@ -107,7 +107,15 @@ def _sheet_centroids(count: int) -> Array:
 @njit(cache=True)
 def wake_velocity(points_T: Array, k: Array) -> Array:
     """(n, 3) velocity [m/s] that the horseshoes of table k induce at points_T (n, 3) [m], axes T, Eq. (2)."""
-    out = np.zeros((points_T.shape[0], 3))
+    out = np.empty(points_T.shape)
+    write_wake_velocity(points_T, k, out)
+    return out
+
+
+@njit(cache=True)
+def write_wake_velocity(points_T: Array, k: Array, out: Array) -> None:
+    """`wake_velocity` into an array that is there already (n, 3)."""
+    out[:] = 0.0
     for i in range(points_T.shape[0]):
         for j in range(k.shape[0]):
             x, y, z = points_T[i, 0] - k[j, 0], points_T[i, 1] - k[j, 1], points_T[i, 2] - k[j, 2]
@@ -127,4 +135,3 @@ def wake_velocity(points_T: Array, k: Array) -> Array:
             leg = strength / (right * right + z * z + grown) * (1.0 - x / right_end)  # runs aft
             out[i, 1] += leg * z
             out[i, 2] -= leg * right
-    return out

@@ -32,15 +32,14 @@ class Actuators:
         self._quick_share = -float(np.expm1(-step_s / parameters.engine_time_constant_s))
         self._engine, self._step_s = parameters, step_s
         self._range = trim.thrust_range
-        self.surfaces_rad: Array = trim.surfaces_rad  #: (3,) elevator, aileron, rudder
+        self.surfaces_rad: Array = trim.surfaces_rad  #: (3,) elevator, aileron, rudder; moved in place
         self.thrust_n = trim.thrust_n
         self.throttle = trim.thrust_range.throttle(trim.thrust_n)  #: as commanded, after its limits
 
     def step(self, surfaces_command_rad: Array, thrust_command_n: float) -> None:
         """Advance by one tick toward the commands (3,) [rad] and [N]."""
-        self.surfaces_rad = _follow(
-            self.surfaces_rad, surfaces_command_rad, self._limits_rad, self._largest_step_rad, self._surface_share
-        )
+        limits = (self._limits_rad, self._largest_step_rad)
+        _follow(self.surfaces_rad, surfaces_command_rad, *limits, self._surface_share)
         command_n = min(max(thrust_command_n, self._range.idle_n), self._range.military_n)
         self.throttle = self._range.throttle(command_n)
         rise = self.throttle - self._range.throttle(self.thrust_n)
@@ -52,9 +51,7 @@ class Actuators:
 
 @njit(cache=True)
 def _follow(surfaces, commands, limits, largest_step, share):  # type: ignore[no-untyped-def]
-    out = np.empty(3)
     for i in range(3):
         command = min(max(commands[i], -limits[i]), limits[i])
         move = share * (command - surfaces[i])
-        out[i] = surfaces[i] + min(max(move, -largest_step[i]), largest_step[i])
-    return out
+        surfaces[i] += min(max(move, -largest_step[i]), largest_step[i])

@@ -104,8 +104,9 @@ class TabulatedAerodynamics:
         self, v_B: Array, w_B: Array, surfaces_rad: Array, air_rotation_B: Array = NO_ROTATION
     ) -> tuple[Array, Array]:
         """See `airframe.Aerodynamics`."""
-        force, moment = _force_and_moment(self.tables, self.constants, v_B, w_B, surfaces_rad, air_rotation_B)
-        return force, moment
+        wrench = np.empty(6)
+        _force_and_moment(self.tables, self.constants, v_B, w_B, surfaces_rad, air_rotation_B, wrench)
+        return wrench[:3], wrench[3:]
 
     def coefficients(self, alpha_rad: float, beta_rad: float, rates: Array, surfaces_rad: Array) -> Array:
         """(6,) CX, CY, CZ, Cl, Cm, Cn of Eqs. (2) to (7).
@@ -124,6 +125,16 @@ def flow_angles(v_B: Array) -> tuple[float, float, float]:
 
     Positive angle of attack: air from below. Positive sideslip: air from the right.
     """
+    airspeed, alpha, beta = _flow_angles(v_B)
+    return airspeed, alpha, beta
+
+
+@njit(cache=True)
+def flow_about(R_WB: Array, v_WB: Array, air_velocity_W: Array, v_B: Array) -> tuple[float, float, float]:
+    """Write the velocity relative to the air (3,), body axes, of a body that moves with v_WB; return `flow_angles`."""
+    x, y, z = v_WB[0] - air_velocity_W[0], v_WB[1] - air_velocity_W[1], v_WB[2] - air_velocity_W[2]
+    for i in range(3):
+        v_B[i] = R_WB[0, i] * x + R_WB[1, i] * y + R_WB[2, i] * z
     airspeed, alpha, beta = _flow_angles(v_B)
     return airspeed, alpha, beta
 
@@ -195,7 +206,7 @@ def _coefficients(tables, k, alpha, beta, rates, surfaces):  # type: ignore[no-u
 
 
 @njit(cache=True)
-def _force_and_moment(tables, k, v_B, w_B, surfaces, air_rotation_B):  # type: ignore[no-untyped-def]
+def _force_and_moment(tables, k, v_B, w_B, surfaces, air_rotation_B, wrench):  # type: ignore[no-untyped-def]
     airspeed, alpha, beta = _flow_angles(v_B)
     S, b, c = k[1], k[2], k[3]
     per_rate = 0.5 / max(airspeed, 1e-3)
@@ -203,8 +214,6 @@ def _force_and_moment(tables, k, v_B, w_B, surfaces, air_rotation_B):  # type: i
     rates = (_FLIP[0] * P * b * per_rate, _FLIP[1] * Q * c * per_rate, _FLIP[2] * R * b * per_rate)
     C = _coefficients(tables, k, alpha, beta, rates, surfaces)
     qbar_S = 0.5 * k[0] * airspeed * airspeed * S  # Eqs. (1) and (8)
-    force, moment = np.empty(3), np.empty(3)
     for i in range(3):
-        force[i] = _FLIP[i] * qbar_S * C[i]
-        moment[i] = _FLIP[i] * qbar_S * (c if i == 1 else b) * C[3 + i]
-    return force, moment
+        wrench[i] = _FLIP[i] * qbar_S * C[i]
+        wrench[3 + i] = _FLIP[i] * qbar_S * (c if i == 1 else b) * C[3 + i]

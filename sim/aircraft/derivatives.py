@@ -65,12 +65,13 @@ class DerivativeAerodynamics:
         self, v_B: Array, w_B: Array, surfaces_rad: Array, air_rotation_B: Array = NO_ROTATION
     ) -> tuple[Array, Array]:
         """See `airframe.Aerodynamics`."""
-        force, moment = _force_and_moment(self.constants, self.lateral, v_B, w_B, surfaces_rad, air_rotation_B)
-        return force, moment
+        wrench = np.empty(6)
+        _force_and_moment(self.constants, self.lateral, v_B, w_B, surfaces_rad, air_rotation_B, wrench)
+        return wrench[:3], wrench[3:]
 
 
 @njit(cache=True)
-def _force_and_moment(k, lateral, v_B, w_B, surfaces, air_rotation_B):  # type: ignore[no-untyped-def]
+def _force_and_moment(k, lateral, v_B, w_B, surfaces, air_rotation_B, wrench):  # type: ignore[no-untyped-def]
     U, V, W = _FLIP[0] * v_B[0], _FLIP[1] * v_B[1], _FLIP[2] * v_B[2]
     airspeed = max(np.sqrt(U * U + V * V + W * W), 1e-3)
     direction = np.arctan2(W, U)
@@ -91,11 +92,9 @@ def _force_and_moment(k, lateral, v_B, w_B, surfaces, air_rotation_B):  # type: 
         Cl += lateral[1, j] * z[j]
         Cn += lateral[2, j] * z[j]
     qbar_S = 0.5 * k[0] * airspeed * airspeed * S
-    force, moment = np.empty(3), np.empty(3)
-    force[0] = _FLIP[0] * qbar_S * (CL * sine - CD * cosine)  # Eq. (2)
-    force[1] = _FLIP[1] * qbar_S * CY
-    force[2] = _FLIP[2] * qbar_S * (-CL * cosine - CD * sine)
-    moment[0] = _FLIP[0] * qbar_S * b * (Cl * cosine - Cn * sine)
-    moment[1] = _FLIP[1] * qbar_S * c * Cm
-    moment[2] = _FLIP[2] * qbar_S * b * (Cn * cosine + Cl * sine)
-    return force, moment
+    wrench[0] = _FLIP[0] * qbar_S * (CL * sine - CD * cosine)  # Eq. (2)
+    wrench[1] = _FLIP[1] * qbar_S * CY
+    wrench[2] = _FLIP[2] * qbar_S * (-CL * cosine - CD * sine)
+    wrench[3] = _FLIP[0] * qbar_S * b * (Cl * cosine - Cn * sine)
+    wrench[4] = _FLIP[1] * qbar_S * c * Cm
+    wrench[5] = _FLIP[2] * qbar_S * b * (Cn * cosine + Cl * sine)

@@ -14,8 +14,9 @@ x is the measured state beyond the path's trim; x_m moves against a trim that mo
 its limit. g is the gust: what the accelerometers feel across the body beyond what the on-board model of the airframe
 predicts for still air, and the airspeed beyond that of the inertial velocity, through a first-order low pass. A pull
 of the hose looks like a gust and is countered like one. At its first step the control engages without a bump: x_m
-starts from the aircraft's velocity, g from its measurement. What keeps the model inside the actuators' limits are those
-of the reference; beyond them the aircraft falls behind its model, and comes back.
+starts from the aircraft's velocity, g from its measurement, and z, in a trim of air that sinks, from what holds it.
+What keeps the model inside the actuators' limits are those of the reference; beyond them the aircraft falls behind its
+model, and comes back.
 
 Valid while the aircraft stays near the path's trim (attitude within some 20 degrees, airspeed within some 10 m/s).
 Not modelled: structural modes, quantisation, delay of computing beyond a tick; its model of the airframe is exact.
@@ -31,14 +32,16 @@ from dockair.sim.aircraft.airframe import AirframeData
 from dockair.sim.aircraft.flight_control_parameters import FlightControlParameters
 from dockair.sim.aircraft.flight_path import FlightPath
 from dockair.sim.aircraft.gain_schedule import THRUST_0, Design, GainSchedule
-from dockair.sim.aircraft.linear_model import STATES
+from dockair.sim.aircraft.linear_model import STATES, SURFACES, THRUST
 from dockair.sim.aircraft.reference import Reference
 from dockair.sim.aircraft.regulator import FOLLOWED
 from dockair.sim.aircraft.trim import Trim
 
 __all__ = ["FlightControl", "FlightControlParameters"]
 
-_N = STATES
+# Layouts that the kernels know: a trim of now is attitude, rates, surfaces, thrust per mass, slope of the path
+_SLOPE, _TRIM = 10, 11
+_AIRSPEED, _MASS, _GUST_SHARE, _FORCE_SHARE = 1, 2, 3, 4  # in `_constants`, the step first
 
 
 class FlightControl:
@@ -73,10 +76,10 @@ class FlightControl:
         self.schedule = GainSchedule(airframe, air, trim, wanted)
         self.path = FlightPath(parameters.path, trim.airspeed_m_s, step_s)
         self.reference = Reference(parameters.reference_limits, step_s)
-        self._aerodynamics, self._mass_kg, self._step_s = trim.aerodynamics, airframe.mass_kg, step_s
-        self._airspeed_m_s = trim.airspeed_m_s
-        self._gust_share = -float(np.expm1(-parameters.gust_bandwidth_rad_s * step_s))
-        self._force_share = -float(np.expm1(-step_s / parameters.inertial_lag_s)) if parameters.inertial_lag_s else 1.0
+        self._aerodynamics, self._mass_kg = trim.aerodynamics, airframe.mass_kg
+        gust_share = -float(np.expm1(-parameters.gust_bandwidth_rad_s * step_s))
+        force_share = -float(np.expm1(-step_s / parameters.inertial_lag_s)) if parameters.inertial_lag_s else 1.0
+        self._constants = np.array([step_s, trim.airspeed_m_s, airframe.mass_kg, gust_share, force_share])
         limits_rad, thrust = np.asarray(airframe.surface_limits_rad), trim.thrust_range
         self._limits = np.vstack(
             [
@@ -85,18 +88,32 @@ class FlightControl:
                 np.append(np.full(3, airframe.actuator_bandwidth_rad_s), 1.0 / airframe.engine_time_constant_s),
             ]
         )
-        self._trim: Array = np.empty(10)  # of the last tick: attitude, rates, surfaces, thrust
+        self._trim: Array = np.empty(_TRIM)  # of the last tick
         self._x_m: Array = np.zeros(FOLLOWED)
         self._z: Array = np.zeros(3)
         self._gust: Array = np.zeros(3)
         self._force_B: Array = np.zeros(3)
-        self._slope = 0.0
+        self._room = np.empty((3, 3)), np.empty(3), np.empty(_TRIM), np.empty(STATES), np.empty(3)  # of one step
         self._engaged = False
 
     @property
     def gust_W(self) -> Array:
         """(3,) the gust it believes in [m/s]."""
         return np.asarray(self.path.axes() @ self._gust)
+
+    def start_in(self, trim: Trim) -> None:
+        """Set z to what holds another trim of the same path: with the gust that it then believes in, Eq. (2) is it."""
+        row, x, R_FB, v_B = self.schedule.at(0.0), np.empty(STATES), np.empty((3, 3)), np.empty(3)
+        attitude, at = (np.eye(3), trim.R_WB, trim.velocity_W), (trim.w_WB_B, trim.surfaces_rad)
+        _state(*attitude, *at, trim.thrust_n, 0.0, row.trim, self._constants, R_FB, v_B, np.empty(_TRIM), x)
+        force_B, _ = self._aerodynamics.force_and_moment(v_B, *at)
+        residual = trim.R_WB[2] * STANDARD_GRAVITY_M_S2 - force_B / self._mass_kg
+        residual[0] = np.linalg.norm(v_B) - np.linalg.norm(trim.velocity_W - trim.air_velocity_W)
+        known = np.concatenate([x, np.zeros(3), row.gust_from_residual @ residual])
+        missing = np.append(x[SURFACES], x[THRUST]) + row.K @ known
+        weights = np.append(self._limits[1, :3], STANDARD_GRAVITY_M_S2)  # radians and m/s^2, made comparable
+        K_z = row.K[:, STATES : STATES + 3]
+        self._z = -np.linalg.lstsq(K_z / weights[:, np.newaxis], missing / weights, rcond=None)[0]
 
     def step(
         self,
@@ -110,7 +127,7 @@ class FlightControl:
         thrust_n: float,
         command: ReceiverCommand,
     ) -> tuple[Array, float]:
-        """Commands to the surfaces (3,) [rad] and to the engine [N].
+        """Commands to the surfaces (3,) [rad], overwritten by the next step, and to the engine [N].
 
         Args:
             R_WB: (3, 3) attitude against level and the heading of the path at the start.
@@ -122,107 +139,139 @@ class FlightControl:
             thrust_n: thrust.
             command: increment on the path, and what the path does.
         """
-        path, thrust = self.path, thrust_n / self._mass_kg
+        path = self.path
         path.step(command.turn_rate_rad_s, command.climb_rad)
-        row, R_FW = self.schedule.at(path.turn_rate_rad_s), path.axes().T
-        R_FB, velocity_F = R_FW @ R_WB, R_FW @ velocity_W
-        trim = row.trim.copy()
-        trim[THRUST_0] += STANDARD_GRAVITY_M_S2 * np.sin(path.climb_rad)
-        x = _state(R_FB, w_WB_B, velocity_F, self._airspeed_m_s, surfaces_rad, thrust, trim)
-        residual = self._residual(R_WB.T @ velocity_W, w_WB_B, surfaces_rad, airspeed_m_s, specific_force_B)
-        gust = row.gust_from_residual @ residual
+        row, (R_FB, v_B, trim, x, surfaces_command) = self.schedule.at(path.turn_rate_rad_s), self._room
+        attitude = (path.axes(), R_WB, velocity_W)
+        _state(*attitude, w_WB_B, surfaces_rad, thrust_n, path.climb_rad, row.trim, self._constants, R_FB, v_B, trim, x)
+        force_B, _ = self._aerodynamics.force_and_moment(v_B, w_WB_B, surfaces_rad)
         if not self._engaged:
-            self._engage(x, row.C @ x, R_FB, trim, command, gust)
-        _move(self._x_m, self._trim, trim, path.climb_rad - self._slope, self._airspeed_m_s)
-        self._trim, self._slope = trim, path.climb_rad
-        self._gust += self._gust_share * (gust - self._gust)
+            self.reference.start(row.C @ x, R_FB, command)
         chain = self.reference.step(R_FB, command)
-        matrices = (row.A, row.C, row.K, row.K_followed, row.K_command)
-        u = _command(*matrices, trim[6:], x, self._x_m, self._z, self._gust, chain, self._limits, self._step_s)
-        return u[:3], self._mass_kg * float(u[3])
-
-    def _engage(
-        self, x: Array, velocity: Array, R_FB: Array, trim: Array, command: ReceiverCommand, gust: Array
-    ) -> None:
-        """Start from where the aircraft is."""
-        self._x_m[:3] = x[:3]
-        self.reference.start(velocity, R_FB, command)
-        self._gust, self._trim, self._slope, self._engaged = gust.copy(), trim, self.path.climb_rad, True
-
-    def _residual(
-        self, v_B: Array, w_B: Array, surfaces_rad: Array, airspeed_m_s: float, specific_force_B: Array
-    ) -> Array:
-        """(3,) airspeed and specific forces across the body beyond those of still air."""
-        force_B = self._aerodynamics.force_and_moment(v_B, w_B, surfaces_rad)[0] / self._mass_kg
-        if not self._engaged:
-            self._force_B = force_B
-        self._force_B = self._force_B + self._force_share * (force_B - self._force_B)  # as late as the accelerometers
-        residual = specific_force_B - self._force_B
-        residual[0] = np.sqrt(v_B @ v_B) - airspeed_m_s
-        return np.asarray(residual)
+        measured = (x, v_B, force_B, specific_force_B, airspeed_m_s, trim, chain)
+        gains = (row.A, row.C, row.K, row.K_followed, row.K_command, row.gust_from_residual)
+        memory = (self._x_m, self._z, self._gust, self._force_B, self._trim)
+        limits = (self._engaged, self._limits, self._constants)
+        thrust_command_n = _command(*measured, *gains, *memory, *limits, surfaces_command)
+        self._engaged = True
+        return surfaces_command, thrust_command_n
 
 
 @njit(cache=True)
-def _state(R_FB, w, velocity_F, airspeed, surfaces, thrust, trim):  # type: ignore[no-untyped-def]
-    """(13,) x beyond the path's trim."""
-    x = np.empty(13)
-    x[:3] = velocity_F
-    x[0] -= airspeed
-    x[3:6] = _rotation_vector(R_FB @ _attitude(trim[:3]).T)
-    x[6:9] = w - trim[3:6]
-    x[9:12] = surfaces - trim[6:9]
-    x[12] = thrust - trim[9]
-    return x
+def _state(R_WF, R_WB, velocity_W, w, surfaces, thrust, slope, level, k, R_FB, v_B, trim, x):  # type: ignore[no-untyped-def]
+    """Write attitude against the path, velocity along the body, the path's trim, and x beyond it."""
+    for i in range(3):
+        v_B[i] = R_WB[0, i] * velocity_W[0] + R_WB[1, i] * velocity_W[1] + R_WB[2, i] * velocity_W[2]
+        x[i] = R_WF[0, i] * velocity_W[0] + R_WF[1, i] * velocity_W[1] + R_WF[2, i] * velocity_W[2]
+        for j in range(3):
+            R_FB[i, j] = R_WF[0, i] * R_WB[0, j] + R_WF[1, i] * R_WB[1, j] + R_WF[2, i] * R_WB[2, j]
+    x[0] -= k[_AIRSPEED]
+    trim[:10], trim[_SLOPE] = level, slope
+    trim[THRUST_0] += STANDARD_GRAVITY_M_S2 * np.sin(slope)
+    _rotation_between(R_FB, _attitude(trim), x[3:6])
+    for i in range(3):
+        x[6 + i], x[9 + i] = w[i] - trim[3 + i], surfaces[i] - trim[6 + i]
+    x[12] = thrust / k[_MASS] - trim[THRUST_0]
 
 
 @njit(cache=True)
-def _move(x_m, before, trim, inclined, airspeed):  # type: ignore[no-untyped-def]
+def _estimate(x, v_B, force, felt, airspeed, trim, gust_from_residual, x_m, gust, force_m, before, engaged, k):  # type: ignore[no-untyped-def]
+    """Advance the gust g, and write x_m against the trim of now; both begin where the aircraft is."""
+    residual = np.empty(3)  # airspeed and specific forces across the body beyond those of still air
+    for i in range(3):
+        if not engaged:
+            force_m[i], x_m[i] = force[i] / k[_MASS], x[i]
+        force_m[i] += k[_FORCE_SHARE] * (force[i] / k[_MASS] - force_m[i])  # as late as the accelerometers
+        residual[i] = felt[i] - force_m[i]
+    residual[0] = np.sqrt(v_B[0] * v_B[0] + v_B[1] * v_B[1] + v_B[2] * v_B[2]) - airspeed
+    for i in range(3):
+        now = 0.0
+        for j in range(3):
+            now += gust_from_residual[i, j] * residual[j]
+        gust[i] = gust[i] + k[_GUST_SHARE] * (now - gust[i]) if engaged else now
+    if engaged:
+        _move(x_m, before, trim, k[_AIRSPEED])
+    before[:] = trim
+
+
+@njit(cache=True)
+def _move(x_m, before, trim, airspeed):  # type: ignore[no-untyped-def]
     """Write x_m against a trim that has moved, in axes that have been inclined."""
+    inclined = trim[_SLOPE] - before[_SLOPE]
     if inclined != 0.0:
         x_m[2] -= inclined * airspeed
         x_m[4] += inclined
-    if not np.array_equal(before, trim):
-        x_m[3:6] -= _rotation_vector(_attitude(trim[:3]) @ _attitude(before[:3]).T)
-        x_m[6:13] -= trim[3:] - before[3:]
+    if not np.array_equal(before[:10], trim[:10]):
+        moved, R = np.empty(3), _attitude(trim)
+        _rotation_between(np.array(R).reshape(3, 3), _attitude(before), moved)
+        x_m[3:6] -= moved
+        x_m[6:13] -= trim[3:10] - before[3:10]
 
 
 @njit(cache=True)
-def _command(A, C, K, K_m, K_c, u_0, x, x_m, z, gust, chain, limits, step):  # type: ignore[no-untyped-def]
-    """(4,) commands of Eq. (2); advances model and integral. Limits: lowest, highest; lags."""
-    n = len(x)
-    low, high = limits[0] - u_0, limits[1] - u_0
-    u_m = -np.dot(K_m, x_m) - np.dot(K_c, chain[:2].copy().reshape(6))
-    error = np.empty(n + 6)
+def _command(  # type: ignore[no-untyped-def]
+    x, v_B, force, felt, airspeed, trim, chain, A, C, K, K_m, K_c, gust_from_residual, x_m, z, gust, force_m, before,
+    engaged, limits, k, surfaces,
+):  # fmt: skip
+    """Eq. (2): write surfaces, return thrust [N]; advance gust, model, integral. Limits: lowest, highest; lags."""
+    _estimate(x, v_B, force, felt, airspeed, trim, gust_from_residual, x_m, gust, force_m, before, engaged, k)
+    n, step = len(x), k[0]
+    error, u_m, rate, off = np.empty(n + 6), np.zeros(4), np.zeros(n), np.zeros(3)
     error[:n], error[n : n + 3], error[n + 3 :] = x - x_m[:n], z, gust
-    wanted = u_m - np.dot(K, error)
-    u = np.minimum(np.maximum(wanted, low), high)
-    if np.array_equal(u, wanted):
-        z += step * np.dot(C, error[:n])
-    rate = np.dot(A, x_m[:n])
-    rate[n - 4 :] += limits[2] * u_m
-    x_m[n:] += step * (np.dot(C, x_m[:n]) - chain[0])
+    _add(-1.0, K_m, x_m, u_m)
+    _add(-1.0, K_c, chain[:2].reshape(6), u_m)
+    u = u_m.copy()
+    _add(-1.0, K, error, u)
+    free = True
+    for i in range(4):
+        low, high = limits[0, i] - trim[6 + i], limits[1, i] - trim[6 + i]
+        wanted, u[i] = u[i], min(max(u[i], low), high)
+        free = free and u[i] == wanted
+        u[i] += trim[6 + i]
+    surfaces[:] = u[:3]
+    if free:
+        _add(step, C, error, z)
+    _add(1.0, C, x_m, off)
+    _add(1.0, A, x_m, rate)
+    for i in range(4):
+        rate[n - 4 + i] += limits[2, i] * u_m[i]
+    for i in range(3):
+        x_m[n + i] += step * (off[i] - chain[0, i])
     x_m[:n] += step * rate
-    return u + u_0
+    return u[3] * k[_MASS]
+
+
+@njit(cache=True)
+def _add(factor, M, x, out):  # type: ignore[no-untyped-def]
+    """Add factor M x to out, as many of x as M has columns."""
+    for i in range(M.shape[0]):
+        total = 0.0
+        for j in range(M.shape[1]):
+            total += M[i, j] * x[j]
+        out[i] += factor * total
 
 
 @njit(cache=True)
 def _attitude(angles):  # type: ignore[no-untyped-def]
-    """(3, 3) R_z R_y R_x of angles about x, y, z."""
+    """R_z R_y R_x, row by row, of angles about x, y, z."""
     cx, sx, cy, sy = np.cos(angles[0]), np.sin(angles[0]), np.cos(angles[1]), np.sin(angles[1])
     cz, sz = np.cos(angles[2]), np.sin(angles[2])
-    return np.array(
-        [
-            [cz * cy, cz * sy * sx - sz * cx, cz * sy * cx + sz * sx],
-            [sz * cy, sz * sy * sx + cz * cx, sz * sy * cx - cz * sx],
-            [-sy, cy * sx, cy * cx],
-        ]
-    )
+    return (
+        cz * cy, cz * sy * sx - sz * cx, cz * sy * cx + sz * sx,
+        sz * cy, sz * sy * sx + cz * cx, sz * sy * cx - cz * sx,
+        -sy, cy * sx, cy * cx,
+    )  # fmt: skip
 
 
 @njit(cache=True)
-def _rotation_vector(R):  # type: ignore[no-untyped-def]
-    """(3,) rotation vector phi of R = exp(phi), for |phi| < pi."""
-    s = 0.5 * np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
-    sine = np.sqrt(s[0] * s[0] + s[1] * s[1] + s[2] * s[2])
-    cosine = 0.5 * (R[0, 0] + R[1, 1] + R[2, 2] - 1.0)
-    return s if sine < 1e-12 else s * (np.arctan2(sine, cosine) / sine)
+def _rotation_between(R, S, phi):  # type: ignore[no-untyped-def]
+    """Write the rotation vector phi (3,) of R S' = exp(phi), for |phi| < pi; S row by row."""
+    M = np.empty((3, 3))
+    for i in range(3):
+        for j in range(3):
+            M[i, j] = R[i, 0] * S[3 * j] + R[i, 1] * S[3 * j + 1] + R[i, 2] * S[3 * j + 2]
+    phi[0], phi[1], phi[2] = 0.5 * (M[2, 1] - M[1, 2]), 0.5 * (M[0, 2] - M[2, 0]), 0.5 * (M[1, 0] - M[0, 1])
+    sine = np.sqrt(phi[0] * phi[0] + phi[1] * phi[1] + phi[2] * phi[2])
+    if sine >= 1e-12:
+        cosine = 0.5 * (M[0, 0] + M[1, 1] + M[2, 2] - 1.0)
+        phi *= np.arctan2(sine, cosine) / sine

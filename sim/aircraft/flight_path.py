@@ -12,6 +12,7 @@ Not modelled: wind; the path is one in the air mass.
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 
 from dockair.rotations import Array
 from dockair.sim.air.atmosphere import STANDARD_GRAVITY_M_S2
@@ -40,45 +41,52 @@ class FlightPath:
     """
 
     def __init__(self, parameters: FlightPathParameters, airspeed_m_s: float, step_s: float) -> None:
-        self._parameters, self._step_s = parameters, step_s
-        self._r_per_tan = STANDARD_GRAVITY_M_S2 / airspeed_m_s
-        self._turn, self._slope = [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]  # value, its rate, what is not yet made up
+        p, r_per_tan = parameters, STANDARD_GRAVITY_M_S2 / airspeed_m_s
+        highest = r_per_tan * float(np.tan(p.bank_limit_rad))
+        self._constants = np.array(
+            [step_s, p.bandwidth_rad_s, p.damping, p.catching_up, r_per_tan, p.roll_rate_limit_rad_s, highest]
+            + [p.climb_rate_limit_rad_s, p.climb_limit_rad]
+        )
+        self._state: Array = np.zeros((2, 3))  # turn rate, slope: value, its rate, what is not yet made up
+        self._axes: Array = np.eye(3)
         self.heading_rad = 0.0
-
-    @property
-    def turn_rate_rad_s(self) -> float:
-        """Positive to the left."""
-        return self._turn[0]
-
-    @property
-    def climb_rad(self) -> float:
-        """Slope against the air."""
-        return self._slope[0]
+        self.turn_rate_rad_s = 0.0  #: positive to the left
+        self.climb_rad = 0.0  #: slope against the air
 
     def step(self, turn_rate_rad_s: float, climb_rad: float) -> None:
         """Advance by one tick toward the commanded turn rate and slope."""
-        p = self._parameters
-        highest = self._r_per_tan * float(np.tan(p.bank_limit_rad))
-        tangent = self._turn[0] / self._r_per_tan
-        fastest = p.roll_rate_limit_rad_s * self._r_per_tan * (1.0 + tangent * tangent)
-        self._follow(self._turn, min(max(turn_rate_rad_s, -highest), highest), fastest)
-        climb = min(max(climb_rad, -p.climb_limit_rad), p.climb_limit_rad)
-        self._follow(self._slope, climb, p.climb_rate_limit_rad_s)
-        self.heading_rad += self._turn[0] * self._step_s
-
-    def _follow(self, state: list[float], command: float, fastest: float) -> None:
-        p, h = self._parameters, self._step_s
-        value, rate, behind = state
-        if value == command and rate == 0.0 and behind == 0.0:
-            return
-        w = p.bandwidth_rad_s
-        rate += h * (w * w * (command - value) - 2.0 * p.damping * w * rate + p.catching_up * w**3 * behind)
-        rate = min(max(rate, -fastest), fastest)
-        value += h * rate
-        state[:] = value, rate, behind + h * (command - value)
+        self.heading_rad, self.turn_rate_rad_s, self.climb_rad = _advance(
+            self._state, self._axes, self._constants, self.heading_rad, float(turn_rate_rad_s), float(climb_rad)
+        )
 
     def axes(self) -> Array:
-        """(3, 3) R_WF: F has x along the path and y level to the left."""
-        c, s = np.cos(self.heading_rad), np.sin(self.heading_rad)
-        cg, sg = np.cos(self._slope[0]), np.sin(self._slope[0])
-        return np.array([[c * cg, -s, -c * sg], [s * cg, c, -s * sg], [sg, 0.0, cg]])
+        """(3, 3) R_WF: F has x along the path and y level to the left; not a copy."""
+        return self._axes
+
+
+@njit(cache=True)
+def _advance(state, axes, k, heading, turn, climb):  # type: ignore[no-untyped-def]
+    """Eq. (1) over one tick and the axes then; returns heading, turn rate and slope."""
+    step, r_per_tan, highest, steepest = k[0], k[4], k[6], k[8]
+    tangent = state[0, 0] / r_per_tan
+    fastest = k[5] * r_per_tan * (1.0 + tangent * tangent)
+    _follow(state[0], min(max(turn, -highest), highest), fastest, k)
+    _follow(state[1], min(max(climb, -steepest), steepest), k[7], k)
+    heading += state[0, 0] * step
+    c, s, cg, sg = np.cos(heading), np.sin(heading), np.cos(state[1, 0]), np.sin(state[1, 0])
+    axes[0, 0], axes[0, 1], axes[0, 2] = c * cg, -s, -c * sg
+    axes[1, 0], axes[1, 1], axes[1, 2] = s * cg, c, -s * sg
+    axes[2, 0], axes[2, 1], axes[2, 2] = sg, 0.0, cg
+    return heading, state[0, 0], state[1, 0]
+
+
+@njit(cache=True)
+def _follow(state, command, fastest, k):  # type: ignore[no-untyped-def]
+    h, w, zeta, kappa = k[0], k[1], k[2], k[3]
+    value, rate, behind = state
+    if value == command and rate == 0.0 and behind == 0.0:
+        return
+    rate += h * (w * w * (command - value) - 2.0 * zeta * w * rate + kappa * w**3 * behind)
+    rate = min(max(rate, -fastest), fastest)
+    value += h * rate
+    state[0], state[1], state[2] = value, rate, behind + h * (command - value)

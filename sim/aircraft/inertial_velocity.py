@@ -9,6 +9,7 @@ Not modelled: Schuler oscillation, noise of the accelerometers, correlation betw
 """
 
 import numpy as np
+from numba import njit
 
 from dockair.rotations import Array
 
@@ -23,26 +24,47 @@ class InertialVelocity:
         correlation_time_s: T.
         step_s: length of a tick.
         rng: the stream "inertial_velocity".
+        frame_velocity_m_s: (3,) over the ground, of the frame in which velocities are handed in; at rest by default.
     """
 
-    def __init__(self, sigma_m_s: float, correlation_time_s: float, step_s: float, rng: np.random.Generator) -> None:
+    def __init__(
+        self,
+        sigma_m_s: float,
+        correlation_time_s: float,
+        step_s: float,
+        rng: np.random.Generator,
+        frame_velocity_m_s: Array | None = None,
+    ) -> None:
         self._rng = rng
+        self._frame_m_s: Array = np.zeros(3) if frame_velocity_m_s is None else frame_velocity_m_s
         self._decay = float(np.exp(-KNOT_S / correlation_time_s))
         self._kick_m_s = sigma_m_s * float(np.sqrt(-np.expm1(-2.0 * KNOT_S / correlation_time_s)))
         self._step_s, self._time_s, self._knot = step_s, 0.0, 0
         self._before: Array = sigma_m_s * rng.standard_normal(3)
         self._after: Array = self._drawn(self._before)
         self.drift_m_s: Array = self._before.copy()
+        self._measured: Array = np.empty(3)
 
     def step(self, velocity_m_s: Array) -> Array:
-        """(3,) measured velocity [m/s] of a true one (3,), in the same axes; advances the drift by one tick."""
+        """(3,) measured velocity over the ground [m/s] of a true one (3,), same axes; advances by one tick.
+
+        The array is overwritten by the next step.
+        """
         self._time_s += self._step_s
         while self._time_s >= (self._knot + 1) * KNOT_S:
             self._knot += 1
             self._before, self._after = self._after, self._drawn(self._after)
-        share = self._time_s / KNOT_S - self._knot
-        self.drift_m_s = (1.0 - share) * self._before + share * self._after
-        return np.asarray(velocity_m_s + self.drift_m_s)
+        velocities = (velocity_m_s, self._frame_m_s, self.drift_m_s, self._measured)
+        _measure(self._before, self._after, self._time_s / KNOT_S - self._knot, *velocities)
+        return self._measured
 
     def _drawn(self, knot_m_s: Array) -> Array:
         return np.asarray(self._decay * knot_m_s + self._kick_m_s * self._rng.standard_normal(3))
+
+
+@njit(cache=True)
+def _measure(before, after, share, velocity, frame, drift, measured):  # type: ignore[no-untyped-def]
+    """Write the drift between two knots, and the velocity with it."""
+    for i in range(3):
+        drift[i] = (1.0 - share) * before[i] + share * after[i]
+        measured[i] = velocity[i] + frame[i] + drift[i]

@@ -51,20 +51,24 @@ class OwnSensors:
         self._lag_s = parameters.inertial_lag_s
         self._shares = np.array([_share(self._lag_s, step_s)] * 6 + [_share(parameters.air_data_lag_s, step_s)])
         self._lagged = np.full(7, np.nan)  # rates, specific force, airspeed
+        self._measured = np.empty((3, 3)), np.empty(3), np.empty(3), np.empty(3)
         self._noise, self._ticks, self._drawn = np.zeros(13), 0, -1
 
     def step(
         self, R_WB: Array, w_WB_B: Array, specific_force_B: Array, velocity_W: Array, airspeed_m_s: float
     ) -> tuple[Array, Array, Array, Array, float]:
-        """All five as measured, in the order and the axes of the arguments; advances by one tick."""
+        """All five as measured, in the order and the axes of the arguments; advances by one tick.
+
+        The arrays are overwritten by the next step.
+        """
         sample = int(self._ticks * self._step_s / SAMPLE_S + 1e-6)
         if sample > self._drawn:
             self._noise, self._drawn = self._sigmas * self._rng.standard_normal(13), sample
         self._ticks += 1
-        R, rest = _measure(
-            self._lagged, self._shares, self._noise, self._lag_s, R_WB, w_WB_B, specific_force_B, airspeed_m_s
-        )
-        return R, rest[:3], rest[3:6], velocity_W + self._noise[9:12], float(rest[6])
+        true = (R_WB, w_WB_B, specific_force_B, velocity_W, airspeed_m_s)
+        R, w, f, v = self._measured
+        airspeed = _measure(self._lagged, self._shares, self._noise, self._lag_s, *true, R, w, f, v)
+        return R, w, f, v, airspeed
 
 
 def _share(lag_s: float, step_s: float) -> float:
@@ -72,22 +76,35 @@ def _share(lag_s: float, step_s: float) -> float:
 
 
 @njit(cache=True)
-def _measure(lagged, shares, noise, lag, R_WB, w, f, airspeed):  # type: ignore[no-untyped-def]
-    now, out = np.empty(7), np.empty(7)
-    now[:3], now[3:6], now[6] = w, f, airspeed
-    if np.isnan(lagged[6]):  # the first sample has settled
-        lagged[:] = now
+def _measure(  # type: ignore[no-untyped-def]
+    lagged, shares, noise, lag, R_WB, w, f, v, airspeed, R_out, w_out, f_out, v_out
+):  # fmt: skip
+    """Write what is measured; return the airspeed."""
+    settled = not np.isnan(lagged[6])
     for i in range(7):
-        lagged[i] += shares[i] * (now[i] - lagged[i])
-    out[:6], out[6] = lagged[:6] + noise[3:9], lagged[6] + noise[12]
-    return R_WB @ _exp(noise[:3] - lag * w), out
+        now = w[i] if i < 3 else f[i - 3] if i < 6 else airspeed
+        if not settled:  # the first sample has settled
+            lagged[i] = now
+        lagged[i] += shares[i] * (now - lagged[i])
+    for i in range(3):
+        w_out[i], f_out[i] = lagged[i] + noise[3 + i], lagged[3 + i] + noise[6 + i]
+        v_out[i] = v[i] + noise[9 + i]
+    turn = _exp(noise[0] - lag * w[0], noise[1] - lag * w[1], noise[2] - lag * w[2])
+    for i in range(3):
+        for j in range(3):
+            R_out[i, j] = R_WB[i, 0] * turn[j] + R_WB[i, 1] * turn[3 + j] + R_WB[i, 2] * turn[6 + j]
+    return lagged[6] + noise[12]
 
 
 @njit(cache=True)
-def _exp(phi):  # type: ignore[no-untyped-def]
-    """(3, 3) rotation matrix of a rotation vector (Rodrigues)."""
-    t = np.sqrt(phi[0] * phi[0] + phi[1] * phi[1] + phi[2] * phi[2])
-    a, b = (1.0, 0.5) if t < 1e-8 else (np.sin(t) / t, (1.0 - np.cos(t)) / (t * t))
-    x, y, z = phi
-    W = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.eye(3) + a * W + b * (W @ W)
+def _exp(x, y, z):  # type: ignore[no-untyped-def]
+    """Rotation matrix, row by row, of a rotation vector (Rodrigues)."""
+    t2 = x * x + y * y + z * z
+    t = np.sqrt(t2)
+    a, b = (1.0, 0.5) if t < 1e-8 else (np.sin(t) / t, (1.0 - np.cos(t)) / t2)
+    c = 1.0 - b * t2
+    return (
+        c + b * x * x, b * x * y - a * z, b * x * z + a * y,
+        b * x * y + a * z, c + b * y * y, b * y * z - a * x,
+        b * x * z - a * y, b * y * z + a * x, c + b * z * z,
+    )  # fmt: skip

@@ -6,18 +6,18 @@ with the drift of an inertial navigation and gets no position, and everything th
 """
 
 import numpy as np
+from numba import njit
 
 from dockair.messages import ReceiverCommand
 from dockair.rotations import Array
 from dockair.sim.air.atmosphere import Air
 from dockair.sim.aircraft.actuators import Actuators
-from dockair.sim.aircraft.aerodynamics import flow_angles
+from dockair.sim.aircraft.aerodynamics import flow_about
 from dockair.sim.aircraft.airframe import NO_ROTATION, AirframeData
-from dockair.sim.aircraft.engine import rotor_moment
 from dockair.sim.aircraft.flight_control import FlightControl, FlightControlParameters
 from dockair.sim.aircraft.inertial_velocity import InertialVelocity
 from dockair.sim.aircraft.own_sensors import OwnSensors
-from dockair.sim.aircraft.trim import level_trim
+from dockair.sim.aircraft.trim import level_trim, steady_trim
 
 
 class Receiver:
@@ -56,19 +56,38 @@ class Receiver:
         )
         self.actuators = Actuators(airframe, self.trim, step_s)
         self.inertial_velocity = InertialVelocity(
-            flight_control.inertial_velocity_sigma_m_s, flight_control.inertial_velocity_time_s, step_s, rng
+            flight_control.inertial_velocity_sigma_m_s,
+            flight_control.inertial_velocity_time_s,
+            step_s,
+            rng,
+            frame_velocity_m_s=np.array([airspeed_m_s, 0.0, 0.0]),
         )
         self.own_sensors = OwnSensors(flight_control.own_sensors, step_s, rng.spawn(1)[0])
-        self._airframe = airframe
-        self._trim_velocity_W = np.array([airspeed_m_s, 0.0, 0.0])
+        self._airframe, self._air, self._step_s = airframe, air, step_s
+        self._rotor_momentum = airframe.rotor_momentum_kg_m2_s
+        self._v_air_B, self._wrench = np.empty(3), (np.empty(3), np.empty(3))  # of one step
         self.airspeed_m_s = airspeed_m_s
         self.angle_of_attack_rad = self.trim.alpha_rad
         self.sideslip_rad = 0.0
+        self.throttle = self.actuators.throttle  #: commanded fraction of the thrust range
 
-    @property
-    def throttle(self) -> float:
-        """Commanded fraction of the thrust range."""
-        return self.actuators.throttle
+    def trim_in(self, downwash_m_s: float, pitching_air_rad_s: float) -> None:
+        """Begin anew, trimmed in air that sinks and turns about the left axis; the flight control is that of still air.
+
+        Raises:
+            DockairError: no such flight.
+        """
+        self.trim = steady_trim(
+            self._airframe,
+            self.trim.airspeed_m_s,
+            self._air,
+            downwash_m_s=downwash_m_s,
+            pitching_air_rad_s=pitching_air_rad_s,
+        )
+        self.trim_R_WB, self.angle_of_attack_rad = self.trim.R_WB, self.trim.alpha_rad
+        self.actuators = Actuators(self._airframe, self.trim, self._step_s)
+        self.throttle = self.actuators.throttle
+        self.flight_control.start_in(self.trim)
 
     def step(
         self,
@@ -83,6 +102,8 @@ class Receiver:
     ) -> tuple[Array, Array]:
         """Force [N] and torque [N m] of air and engine about the centre of gravity, (3,) each, W axes, without gravity.
 
+        The arrays are overwritten by the next step.
+
         Args:
             R_WB: (3, 3) attitude.
             v_WB: (3,) velocity in W [m/s].
@@ -92,29 +113,34 @@ class Receiver:
             command: increment on the path, and what the path does.
             air_rotation_B: (3,) angular velocity of the air about the aircraft [rad/s].
         """
-        v_air_B = R_WB.T @ (v_WB - air_velocity_W)
-        self.airspeed_m_s, self.angle_of_attack_rad, self.sideslip_rad = flow_angles(v_air_B)
-        actuators = self.actuators
-        R_measured, w_measured, f_measured, velocity_measured, airspeed_measured = self.own_sensors.step(
-            R_WB,
-            w_WB_B,
-            specific_force_B,
-            self.inertial_velocity.step(v_WB + self._trim_velocity_W),
-            self.airspeed_m_s,
-        )
+        actuators, v_air_B, wrench = self.actuators, self._v_air_B, self._wrench
+        flow = flow_about(R_WB, v_WB, air_velocity_W, v_air_B)
+        self.airspeed_m_s, self.angle_of_attack_rad, self.sideslip_rad = flow
+        velocity_W = self.inertial_velocity.step(v_WB)
+        R, w, f, v, airspeed = self.own_sensors.step(R_WB, w_WB_B, specific_force_B, velocity_W, flow[0])
         surfaces_rad, thrust_n = self.flight_control.step(
-            R_WB=R_measured,
-            w_WB_B=w_measured,
-            velocity_W=velocity_measured,
-            airspeed_m_s=airspeed_measured,
-            specific_force_B=f_measured,
+            R_WB=R,
+            w_WB_B=w,
+            velocity_W=v,
+            airspeed_m_s=airspeed,
+            specific_force_B=f,
             surfaces_rad=actuators.surfaces_rad,
             thrust_n=actuators.thrust_n,
             command=command,
         )
         actuators.step(surfaces_rad, thrust_n)
-        force_B, torque_B = self.trim.aerodynamics.force_and_moment(
-            v_air_B, w_WB_B, actuators.surfaces_rad, air_rotation_B
-        )
-        force_B[0] += actuators.thrust_n
-        return R_WB @ force_B, R_WB @ (torque_B + rotor_moment(self._airframe, w_WB_B))
+        self.throttle = actuators.throttle
+        aerodynamics, surfaces = self.trim.aerodynamics, actuators.surfaces_rad
+        force_B, torque_B = aerodynamics.force_and_moment(v_air_B, w_WB_B, surfaces, air_rotation_B)
+        _with_engine(R_WB, w_WB_B, force_B, torque_B, actuators.thrust_n, self._rotor_momentum, *wrench)
+        return wrench
+
+
+@njit(cache=True)
+def _with_engine(R_WB, w_B, force_B, torque_B, thrust, momentum, force_W, torque_W):  # type: ignore[no-untyped-def]
+    """Write force and torque along the axes of W, thrust and the rotor's moment (Eq. (4) of `engine`) included."""
+    force_x = force_B[0] + thrust
+    torque_y, torque_z = torque_B[1] - momentum * w_B[2], torque_B[2] + momentum * w_B[1]
+    for i in range(3):
+        force_W[i] = R_WB[i, 0] * force_x + R_WB[i, 1] * force_B[1] + R_WB[i, 2] * force_B[2]
+        torque_W[i] = R_WB[i, 0] * torque_B[0] + R_WB[i, 1] * torque_y + R_WB[i, 2] * torque_z

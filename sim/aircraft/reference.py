@@ -34,37 +34,43 @@ class Reference:
     """Eq. (1), one tick at a time."""
 
     def __init__(self, limits: ReferenceLimits, step_s: float) -> None:
-        self._velocity_limit = limits.velocity_m_s
-        self._constants = np.vstack([limits.gain_1_s, limits.acceleration_m_s2, limits.jerk_m_s3])
-        self._bandwidth, self._damping, self._step_s = limits.bandwidth_rad_s, limits.damping, step_s
+        shape = [limits.bandwidth_rad_s, limits.damping, limits.velocity_m_s]
+        self._constants = np.vstack([limits.gain_1_s, limits.acceleration_m_s2, limits.jerk_m_s3, shape])
+        self._step_s = step_s
         self._smooth = np.zeros((2, 3))  # F(u) and its rate
         self.chain: Array = np.zeros((4, 3))  #: r and its first three derivatives (rows), W axes [m/s, m/s^2, ...]
 
     def start(self, velocity_W: Array, R_WB: Array, command: ReceiverCommand) -> None:
         """Start from a velocity (3,) beyond trim, at rest with a command."""
         self._smooth[:], self.chain[:] = 0.0, 0.0
-        self._smooth[0] = R_WB @ self._shortened(command.velocity_m_s)
+        u = command.velocity_m_s
+        self._smooth[0] = R_WB @ (u * _shortening(u, self._constants[3, 2]))
         self.chain[0] = velocity_W
 
     def step(self, R_WB: Array, command: ReceiverCommand) -> Array:
         """(4, 3) the chain, advanced by one tick under a command that is in the axes of R_WB (3, 3)."""
-        u_W, a_W = R_WB @ self._shortened(command.velocity_m_s), R_WB @ command.acceleration_m_s2
-        _advance(self.chain, self._smooth, u_W, a_W, self._constants, self._bandwidth, self._damping, self._step_s)
+        u, a = command.velocity_m_s, command.acceleration_m_s2
+        _advance(self.chain, self._smooth, R_WB, u, a, self._constants, self._step_s)
         return self.chain
-
-    def _shortened(self, u: Array) -> Array:
-        size = float(np.sqrt(u @ u))
-        return u if size <= self._velocity_limit else u * (self._velocity_limit / size)
 
 
 @njit(cache=True)
-def _advance(chain, smooth, u, a, constants, w, zeta, step):  # type: ignore[no-untyped-def]
+def _shortening(u, longest):  # type: ignore[no-untyped-def]
+    size = np.sqrt(u[0] * u[0] + u[1] * u[1] + u[2] * u[2])
+    return 1.0 if size <= longest else longest / size
+
+
+@njit(cache=True)
+def _advance(chain, smooth, R, u_B, a_B, constants, step):  # type: ignore[no-untyped-def]
     """Eq. (1) over one tick, in place."""
+    w, zeta, share = constants[3, 0], constants[3, 1], _shortening(u_B, constants[3, 2])
     for i in range(3):
         k, a_max, jerk_max = constants[0, i], constants[1, i], constants[2, i]
-        smooth[1, i] += step * (w * w * (u[i] - smooth[0, i]) - 2.0 * zeta * w * smooth[1, i])
+        u = share * (R[i, 0] * u_B[0] + R[i, 1] * u_B[1] + R[i, 2] * u_B[2])
+        a = R[i, 0] * a_B[0] + R[i, 1] * a_B[1] + R[i, 2] * a_B[2]
+        smooth[1, i] += step * (w * w * (u - smooth[0, i]) - 2.0 * zeta * w * smooth[1, i])
         smooth[0, i] += step * smooth[1, i]
-        d = min(max(a[i] + k * (smooth[0, i] - chain[0, i]), -a_max), a_max)
+        d = min(max(a + k * (smooth[0, i] - chain[0, i]), -a_max), a_max)
         snap = w * w * (d - chain[1, i]) - 2.0 * zeta * w * chain[2, i]
         jerk = min(max(chain[2, i] + step * snap, -jerk_max), jerk_max)
         chain[3, i] = (jerk - chain[2, i]) / step

@@ -99,6 +99,7 @@ def steady_trim(
     climb_rad: float = 0.0,
     turn_rate_rad_s: float = 0.0,
     downwash_m_s: float = 0.0,
+    pitching_air_rad_s: float = 0.0,
 ) -> Trim:
     """Solve Eqs. (2) to (4).
 
@@ -109,14 +110,15 @@ def steady_trim(
         climb_rad: gamma, slope of the path against the undisturbed wind.
         turn_rate_rad_s: r, positive to the left.
         downwash_m_s: d.
+        pitching_air_rad_s: turning of the air about the aircraft's y axis (left): a downwash that changes along it.
 
     Raises:
         DockairError: no such flight at this airspeed and altitude within the airframe's data, the surfaces' limits and
             the thrust range.
     """
-    if not airspeed_m_s > 0.0:
-        raise DockairError("airspeed_m_s", expected="an airspeed > 0", got=airspeed_m_s)
+    _check_airspeed(airspeed_m_s)
     wanted = _Wanted(parameters, airspeed_m_s, air, climb_rad, turn_rate_rad_s, downwash_m_s)
+    wanted.air_rotation_B[1] = pitching_air_rad_s
     x: Array = np.zeros(7)
     x[_ALPHA], x[_BANK], x[_THRUST] = 0.05, -np.arctan(turn_rate_rad_s * airspeed_m_s / STANDARD_GRAVITY_M_S2), 0.1
     straight = turn_rate_rad_s == 0.0
@@ -130,6 +132,11 @@ def steady_trim(
         expected = f"an airspeed at which the receiver can fly {flight} in air of {air.density_kg_m3:.3f} kg/m^3"
         raise DockairError("airspeed_m_s", expected=expected, got=airspeed_m_s)
     return trim
+
+
+def _check_airspeed(airspeed_m_s: float) -> None:
+    if not airspeed_m_s > 0.0:
+        raise DockairError("airspeed_m_s", expected="an airspeed > 0", got=airspeed_m_s)
 
 
 def _inside(parameters: AirframeData, trim: Trim, air: Air) -> bool:
@@ -148,6 +155,7 @@ class _Wanted:
     def __init__(self, p: AirframeData, airspeed: float, air: Air, climb: float, turn_rate: float, sink: float) -> None:
         self._p, self._air, self._airspeed = p, air, airspeed
         self._path = (climb, turn_rate, sink)
+        self.air_rotation_B = np.zeros(3)
         self._aerodynamics = p.aerodynamics(air.density_kg_m3)
         self._weight, self._inertia = p.mass_kg * STANDARD_GRAVITY_M_S2, p.inertia_B
         self._v = airspeed * np.array([np.cos(climb), 0.0, np.sin(climb)])
@@ -166,7 +174,7 @@ class _Wanted:
         R_WB = self.attitude(x)
         w_B = R_WB.T @ self._w
         force, moment = self._aerodynamics.force_and_moment(
-            R_WB.T @ self._v_air, w_B, np.ascontiguousarray(x[_SURFACES])
+            R_WB.T @ self._v_air, w_B, np.ascontiguousarray(x[_SURFACES]), self.air_rotation_B
         )
         side = force[1]
         force[0] += x[_THRUST] * self._weight

@@ -32,8 +32,8 @@ from dockair.sim.hose.chain import DrogueParameters, HoseParameters
 
 # Layout of the coefficient vector the kernels take: numba caches no dataclasses.
 _RHO, _NU, _DIAMETER, _CN_LOW, _CN_HIGH, _LOG_RE_LOW, _LOG_RE_HIGH, _CF = range(8)
-_LINK_LENGTH, _DROGUE_AXIAL, _DROGUE_SIDE, _DROGUE_ARM, _DROGUE_SDDCQ = range(8, 13)
-_SIZE = 13
+_LINK_LENGTH, _DROGUE_AXIAL, _DROGUE_SIDE, _DROGUE_ARM, _DROGUE_SDDCQ, _RE_LOW = range(8, 14)
+_SIZE = 14
 
 _FRICTION_EXPONENT = -1.0 / 6.0  # Eq. (3), turbulent boundary layer
 _GAUSS = 0.5 / 3.0**0.5  # two-point abscissa on [-1/2, 1/2]
@@ -42,11 +42,12 @@ _GAUSS = 0.5 / 3.0**0.5  # two-point abscissa on [-1/2, 1/2]
 def load_coefficients(
     hose: HoseParameters, drogue: DrogueParameters, density_kg_m3: float, viscosity_m2_s: float
 ) -> Array:
-    """(13,) vector of what the kernels of this module need, SI."""
+    """(14,) vector of what the kernels of this module need, SI."""
     k = np.zeros(_SIZE)
     k[_RHO], k[_NU], k[_DIAMETER] = density_kg_m3, viscosity_m2_s, 2.0 * hose.radius_m
     k[_CN_LOW], k[_CN_HIGH] = hose.normal_drag_coefficient, hose.supercritical_drag_coefficient
-    k[_LOG_RE_LOW] = np.log(hose.crisis_reynolds / hose.crisis_width_ratio)
+    k[_RE_LOW] = hose.crisis_reynolds / hose.crisis_width_ratio
+    k[_LOG_RE_LOW] = np.log(k[_RE_LOW])
     k[_LOG_RE_HIGH] = np.log(hose.crisis_reynolds * hose.crisis_width_ratio)
     k[_CF], k[_LINK_LENGTH] = hose.friction_coefficient, hose.link_length_m
     k[_DROGUE_AXIAL] = drogue.drag_area_m2 * drogue.drag_coefficient
@@ -68,8 +69,9 @@ def _hose_load(t0, t1, t2, u0, u1, u2, k):  # type: ignore[no-untyped-def]
         return 0.0, 0.0, 0.0
     normal = 0.0
     if across > 0.0:
-        s = (np.log(across * k[_DIAMETER] / k[_NU]) - k[_LOG_RE_LOW]) / (k[_LOG_RE_HIGH] - k[_LOG_RE_LOW])
-        s = min(max(s, 0.0), 1.0)
+        s, reynolds = 0.0, across * k[_DIAMETER] / k[_NU]
+        if reynolds > k[_RE_LOW]:  # most of a hose is below the crisis and needs no logarithm
+            s = min(max((np.log(reynolds) - k[_LOG_RE_LOW]) / (k[_LOG_RE_HIGH] - k[_LOG_RE_LOW]), 0.0), 1.0)
         c_n = k[_CN_LOW] + (k[_CN_HIGH] - k[_CN_LOW]) * s * s * (3.0 - 2.0 * s)
         normal = 0.5 * k[_RHO] * c_n * k[_DIAMETER] * across
     # Eq. (3) with 1 / Re_f of Eq. (2), which is 0 and not infinite for a hose exactly along the stream
@@ -117,9 +119,45 @@ def tow_loads(position: Array, R: Array, v: Array, w: Array, air: Array, drawn_i
     Returns:
         (n + 1, 6) force [N] and moment about the centre of mass [N m], in W.
     """
-    n = position.shape[0] - 1
-    wrench = np.zeros((n + 1, 6))
-    length = k[_LINK_LENGTH]
+    wrench = np.zeros((position.shape[0], 6))
+    _add_loads(R, v, w, air, drawn_in, k, wrench)
+    return wrench
+
+
+@njit(cache=True)
+def write_tow_loads(
+    position: Array, R: Array, spatial: Array, reference: Array, wind: Array, gusts: Array, drawn_in: float, k: Array,
+    rates: Array, wrench: Array,
+) -> None:  # fmt: skip
+    """`tow_loads` into an array that is there already (n + 1, 6), of what MuJoCo knows.
+
+    Args:
+        position: as above.
+        R: as above.
+        spatial: (n + 1, 6) angular velocity, and velocity of the body's material at `reference`, in W.
+        reference: (3,) point of W.
+        wind: (3,) velocity of the undisturbed air [m/s].
+        gusts: (n + 1, 3) that of the air at each body beyond it [m/s].
+        drawn_in: as above.
+        k: as above.
+        rates: (3, n + 1, 3) written, too: v, w and the air's velocity.
+        wrench: as above.
+    """
+    v, w, air = rates[0], rates[1], rates[2]
+    for i in range(position.shape[0]):
+        x, y, z = position[i, 0] - reference[0], position[i, 1] - reference[1], position[i, 2] - reference[2]
+        for axis in range(3):
+            w[i, axis], air[i, axis] = spatial[i, axis], wind[axis] + gusts[i, axis]
+        v[i, 0] = spatial[i, 3] + spatial[i, 1] * z - spatial[i, 2] * y
+        v[i, 1] = spatial[i, 4] + spatial[i, 2] * x - spatial[i, 0] * z
+        v[i, 2] = spatial[i, 5] + spatial[i, 0] * y - spatial[i, 1] * x
+    wrench[:] = 0.0
+    _add_loads(R, v, w, air, drawn_in, k, wrench)
+
+
+@njit(cache=True)
+def _add_loads(R, v, w, air, drawn_in, k, wrench):  # type: ignore[no-untyped-def]
+    n, length = wrench.shape[0] - 1, k[_LINK_LENGTH]
     for i in range(n):
         inside = min(max(drawn_in - i * length, 0.0), length)
         outside = length - inside
@@ -133,7 +171,6 @@ def tow_loads(position: Array, R: Array, v: Array, w: Array, air: Array, drawn_i
     damping = 0.5 * k[_RHO] * k[_DROGUE_SDDCQ] * np.sqrt(u0 * u0 + u1 * u1 + u2 * u2)
     for axis in range(3):
         wrench[n, 3 + axis] -= damping * w[n, axis]
-    return wrench
 
 
 @njit(cache=True)

@@ -114,19 +114,26 @@ class Reel:
             rate_m_s: of winding, positive in.
             locked: the reel is dead. When it comes to life again its motor begins with the pull that the lock held.
         """
-        p = self._parameters
-        buffer = self._buffer_preload_n - p.buffer_stiffness_n_m * position_m - p.buffer_damping_n_s_m * rate_m_s
-        buffer = max(buffer, 0.0)
         if locked:
             force = self._locked(tension_n, position_m, rate_m_s)
-            self.motor_force_n = max(force - buffer, 0.0)
+            self.motor_force_n = max(force - self._buffer(position_m, rate_m_s), 0.0)
             return force
         self._held = None
         self.motor_force_n += self._blend * (self._wanted(tension_n) - self.motor_force_n)  # Eq. (1)
-        drive = min(max((p.take_up_speed_m_s - rate_m_s) / p.speed_band_m_s, 0.0), 1.0)
-        brake = min(max((-rate_m_s - p.pay_out_speed_m_s) / p.speed_band_m_s, 0.0), 1.0)
-        motor = self.motor_force_n * drive + p.brake_force_n * brake
-        return motor - p.drum_damping_n_s_m * rate_m_s + buffer  # Eq. (2)
+        p, motor = self._parameters, self.motor_force_n
+        drive, braking = p.take_up_speed_m_s - rate_m_s, -rate_m_s - p.pay_out_speed_m_s
+        if drive < p.speed_band_m_s:
+            motor *= max(drive / p.speed_band_m_s, 0.0)
+        if braking > 0.0:
+            motor += p.brake_force_n * min(braking / p.speed_band_m_s, 1.0)
+        return motor - p.drum_damping_n_s_m * rate_m_s + self._buffer(position_m, rate_m_s)  # Eq. (2)
+
+    def _buffer(self, position_m: float, rate_m_s: float) -> float:
+        """Last term of Eq. (2)."""
+        p = self._parameters
+        return max(
+            self._buffer_preload_n - p.buffer_stiffness_n_m * position_m - p.buffer_damping_n_s_m * rate_m_s, 0.0
+        )
 
     def _locked(self, tension_n: float, position_m: float, rate_m_s: float) -> float:
         p = self._parameters
@@ -176,11 +183,18 @@ def guide_loads(position: Array, R: Array, v: Array, w: Array, drawn_in: float, 
     Returns:
         (n, 6) force [N] and moment about the middle [N m], in W.
     """
-    n = position.shape[0]
+    wrench = np.zeros((position.shape[0], 6))
+    add_guide_loads(position, R, v, w, drawn_in, k, wrench)
+    return wrench
+
+
+@njit(cache=True)
+def add_guide_loads(position: Array, R: Array, v: Array, w: Array, drawn_in: float, k: Array, wrench: Array) -> None:
+    """Add `guide_loads` to an array (n, 6); what else the other arrays hold beyond n rows is not read."""
+    n = wrench.shape[0]
     length, mass, tension_length, stiffness, damping, ratio = k[0], k[1], k[2], k[3], k[4], k[5]
     stiffest = stiffness * length * length
     inertia = mass * length * length / 3.0
-    wrench = np.zeros((n, 6))
     for i in range(n):
         s = min((drawn_in - i * length) / length, 1.0)
         if s <= 0.0:
@@ -205,4 +219,3 @@ def guide_loads(position: Array, R: Array, v: Array, w: Array, drawn_in: float, 
                 force[axis] = -held * (stiffness * (position[j, axis] + arm[axis]) + damping * velocity[axis])
             wrench[j, :3] += force
             wrench[j, 3:] += np.cross(arm, force)
-    return wrench

@@ -10,9 +10,9 @@ import numpy as np
 
 from dockair.rotations import Array
 from dockair.sim.air.atmosphere import Air
-from dockair.sim.hose.chain import DrogueParameters, HoseParameters, velocities_at
-from dockair.sim.hose.loads import load_coefficients, tow_loads
-from dockair.sim.hose.reel import Reel, ReelParameters, guide_coefficients, guide_loads
+from dockair.sim.hose.chain import DrogueParameters, HoseParameters
+from dockair.sim.hose.loads import load_coefficients, write_tow_loads
+from dockair.sim.hose.reel import Reel, ReelParameters, add_guide_loads, guide_coefficients, guide_loads
 from dockair.sim.hose.rest import rest_shape
 
 
@@ -55,7 +55,8 @@ class Tow:
         self.rest = rest_shape(hose, drogue, wind_W, rho, nu)
         self.reel = Reel(reel, self.rest.root_tension_n, step_s)
         self._link_length_m, self._links = hose.link_length_m, hose.links
-        self._wind_W = wind_W
+        self._wind_W = np.array(wind_W, dtype=float)
+        self._rates = np.empty((3, hose.links + 1, 3))  # room for velocities; written anew whenever they are asked for
         self._loads = load_coefficients(hose, drogue, rho, nu)
         self._guide = guide_coefficients(hose, reel, self.rest.root_tension_n)
 
@@ -80,11 +81,15 @@ class Tow:
             drawn_in_m: length of hose inside the pod.
             pod: where the pod is; None for an exit at rest in the origin of W, without turn.
         """
-        v = velocities_at(position, spatial, reference)
-        w = np.ascontiguousarray(spatial[:, :3])
-        wrench = tow_loads(position, R, v, w, self._wind_W + gusts_W, drawn_in_m, self._loads)
+        rates, wrench = self._rates, np.empty(spatial.shape)
+        moving = (spatial, reference, self._wind_W, gusts_W)
+        write_tow_loads(position, R, *moving, drawn_in_m, self._loads, rates, wrench)
         if drawn_in_m > 0.0:
-            wrench[:-1] += self._guided(position[:-1], R[:-1], v[:-1], w[:-1], drawn_in_m, pod)
+            if pod is None:
+                add_guide_loads(position, R, rates[0], rates[1], drawn_in_m, self._guide, wrench[:-1])
+            else:
+                links = (position[:-1], R[:-1], rates[0, :-1], rates[1, :-1])
+                wrench[:-1] += self._guided(*links, drawn_in_m, pod)
         return wrench
 
     def _guided(self, position: Array, R: Array, v: Array, w: Array, drawn_in_m: float, pod: PodMotion | None) -> Array:

@@ -90,6 +90,24 @@ def test_a_source_that_is_off_leaves_what_the_others_do_to_the_bit(off):
     assert np.abs(everything[0] - without[0]).max() > 0.01
 
 
+def test_the_steady_part_is_the_wake_alone_to_the_bit_and_leaves_the_gusts_where_they_are():
+    air = motion(dryden(), single(), WAKE, BOW_WAVE)
+    before = now(air)
+    for steady, alone in zip(parts(now(air.steady())), parts(now(motion(wake=WAKE))), strict=True):
+        np.testing.assert_array_equal(steady, alone)
+    np.testing.assert_array_equal(now(air).tow_W, before.tow_W)
+    assert not now(motion(dryden()).steady()).receiver_W.any()
+
+
+def test_what_was_told_stays_when_the_air_is_asked_again_with_another_number_of_places():
+    air = motion(dryden(), single(), WAKE, BOW_WAVE)
+    before, fewer = now(air), air.at(TOW[:4], R_WB, P_WB, LEVEL, P_WT)
+    kept = before.tow_W.copy()
+    np.testing.assert_array_equal(fewer.tow_W, kept[:4])
+    np.testing.assert_array_equal(now(air).tow_W, kept)
+    np.testing.assert_array_equal(before.tow_W, kept)
+
+
 def test_gusts_alone_reach_the_tow_as_the_field_gives_them_to_the_bit():
     np.testing.assert_array_equal(now(motion(gusts=dryden())).tow_W, dryden().velocity(TOW[:, 0]))
     np.testing.assert_array_equal(now(motion(discrete=single())).tow_W, single().velocity(TOW[:, 0]))

@@ -404,6 +404,27 @@ def test_what_it_measures_of_the_air_is_reported_after_the_step() -> None:
     assert ours == pytest.approx((size, np.arctan2(8.0, 190.0), np.arcsin(6.0 / size)))
 
 
+def test_force_and_torque_are_those_of_air_engine_and_rotor_along_the_axes_of_the_world() -> None:
+    receiver, R_WB = make(), exp(np.array([0.3, -0.1, 0.2]))
+    v_WB, w_WB_B, air_W, turning_air = np.array([2.0, 3.0, -1.0]), np.array([0.2, -0.1, 0.3]), [-179.0, 2.0, 0.5], 0.04
+    force_W, torque_W = receiver.step(
+        R_WB=R_WB,
+        v_WB=v_WB,
+        w_WB_B=w_WB_B,
+        air_velocity_W=np.array(air_W),
+        specific_force_B=-R_WB.T @ GRAVITY_W,
+        command=ReceiverCommand(),
+        air_rotation_B=np.array([turning_air, 0.0, 0.0]),
+    )
+    force_B, moment_B = receiver.trim.aerodynamics.force_and_moment(
+        R_WB.T @ (v_WB - air_W), w_WB_B - [turning_air, 0.0, 0.0], receiver.actuators.surfaces_rad
+    )
+    force_B = force_B + [receiver.actuators.thrust_n, 0.0, 0.0]
+    np.testing.assert_allclose(force_W, R_WB @ force_B, rtol=1e-9, atol=1e-6)
+    np.testing.assert_allclose(torque_W, R_WB @ (moment_B + rotor_moment(AIRFRAME, w_WB_B)), rtol=1e-9, atol=1e-6)
+    assert np.linalg.norm(rotor_moment(AIRFRAME, w_WB_B)) > 10.0
+
+
 def test_flight_that_no_receiver_can_trim_is_refused() -> None:
     with pytest.raises(DockairError, match="airspeed_m_s: expected an airspeed at which the receiver can fly level"):
         make(airspeed_m_s=55.0)

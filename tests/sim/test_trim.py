@@ -51,6 +51,20 @@ def test_a_body_left_in_its_trim_stays_in_it(airframe: AirframeData, path: dict[
     assert trim.thrust_range.idle_n < trim.thrust_n < trim.thrust_range.military_n
 
 
+@pytest.mark.parametrize("airframe", BOTH, ids=NAMES)
+def test_trim_in_air_that_turns_about_the_wing_balances_with_that_air(airframe: AirframeData) -> None:
+    """A downwash that grows forward: no moment with the turning air, one to be trimmed out without it."""
+    air = np.array([0.0, 0.03, 0.0])
+    trim = steady_trim(airframe, 120.0, standard_atmosphere(3000.0), downwash_m_s=3.0, pitching_air_rad_s=0.03)
+    v_B = trim.R_WB.T @ [120.0, 0.0, 3.0]
+    force, moment = trim.aerodynamics.force_and_moment(v_B, np.zeros(3), trim.surfaces_rad, air)
+    force = trim.R_WB @ (force + [trim.thrust_n, 0.0, 0.0])
+    np.testing.assert_allclose(force, [0.0, 0.0, airframe.mass_kg * G], atol=1e-6 * airframe.mass_kg * G)
+    np.testing.assert_allclose(moment, 0.0, atol=1e-6 * airframe.mass_kg * G)
+    _, without = trim.aerodynamics.force_and_moment(v_B, np.zeros(3), trim.surfaces_rad)
+    assert abs(without[1]) > 1e-3 * airframe.mass_kg * G * airframe.chord_m
+
+
 def test_straight_flight_is_symmetric_to_the_bit() -> None:
     trim = steady_trim(AIRFRAME, 180.0, standard_atmosphere(6000.0), climb_rad=0.02)
     assert trim.sideslip_rad == trim.aileron_rad == trim.rudder_rad == trim.bank_rad == 0.0
