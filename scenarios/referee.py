@@ -14,6 +14,7 @@ from enum import Enum
 
 import numpy as np
 
+from dockair.sim.hose.chain import cross
 from dockair.sim.truth import Truth
 
 PASSED_M = 1.0  # a tip this far ahead of the ring's plane without being held has missed for good
@@ -60,7 +61,7 @@ class Referee:
     def watch(self, truth: Truth) -> None:
         """Take note of one physics tick."""
         p_DP = truth.p_DP
-        v_DP_D = truth.R_WD.T @ (truth.v_WP - truth.v_WD) - np.cross(truth.w_WD_D, p_DP)
+        v_DP_D = truth.R_WD.T @ (truth.v_WP - truth.v_WD) - cross(truth.w_WD_D, p_DP)
         if self._previous_x is not None and self._previous_x < 0.0 <= p_DP[0]:
             self._crossing = _Crossing(float(np.hypot(p_DP[1], p_DP[2])), float(v_DP_D[0]))
         self._previous_x = float(p_DP[0])
