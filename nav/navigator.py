@@ -187,8 +187,12 @@ class Navigator:
         roll_rad = expected_rad + math.remainder(found.roll_rad - expected_rad, symmetry_rad)
         turn_rad = math.remainder(roll_rad - believed_rad, 2.0 * math.pi)
         if abs(turn_rad) > self._settings.turned_rad:
-            self._filter.turn_drogue(turn_rad, time_s)
+            self._turn_belief(turn_rad, time_s)
         return roll_rad
+
+    def _turn_belief(self, roll_rad: float, time_s: float) -> None:
+        """Start the belief afresh where it is, the drogue rolled about its axis."""
+        self._filter.turn_drogue(roll_rad, time_s)
 
     def _shown(self, pixels: Array, window: Window) -> bool:
         """Whether a window holds all of the pixels (n, 2) that are on the sensor."""
@@ -215,7 +219,8 @@ class Navigator:
         state = self._filter.state(self._time_s)
         sigma_lateral_m = float(np.sqrt(np.linalg.eigvalsh(state.covariance[4:6, 4:6])[-1]))
         aged_s = self._time_s - self._used_time_s
-        valid = sigma_lateral_m <= self._settings.usable_sigma_m and aged_s <= self._settings.usable_age_s
+        known = bool(np.isfinite(state.p_PD_B).all() and np.isfinite(state.covariance).all())
+        valid = known and sigma_lateral_m <= self._settings.usable_sigma_m and aged_s <= self._settings.usable_age_s
         command = self._guidance.step(
             RelativeState(
                 usable=valid,

@@ -255,6 +255,11 @@ def _gyro_sheet(scenario: Scenario) -> GyroSheet:
         rate_hz=scenario.rates.gyro_hz,
         noise_density_rad_s_rthz=imu.gyro_noise_density_rad_s_rthz,
         bias_sigma_rad_s=imu.gyro_turn_on_bias_sigma_rad_s,
+        bias_walk_rad_s_rts=imu.gyro_bias_walk_rad_s_rts,
+        scale_factor_sigma=imu.gyro_scale_factor_sigma + imu.gyro_misalignment_sigma_rad,
+        range_rad_s=imu.gyro_range_rad_s,
+        accelerometer_noise_density_m_s2_rthz=imu.accelerometer_noise_density_m_s2_rthz,
+        accelerometer_bias_sigma_m_s2=imu.accelerometer_turn_on_bias_sigma_m_s2,
     )
 
 

@@ -1,4 +1,4 @@
-"""The command line: `dockair fly`, `scenarios`, `replay`, `reproduce`, `bench`, `design-ring`, `doctor`.
+"""The command line, `dockair`: `fly`, `scenarios`, `replay`, `reproduce`, `bench`, `design-ring`, `allan`, `doctor`.
 
 Exit status: 0 done as asked, whatever the flight's outcome; 1 a replay that was not identical; 2 bad input;
 3 the machine lacks something. With `--json` one object goes to stdout and nothing else; progress and errors go to
@@ -255,6 +255,28 @@ def design_ring(
         design.show_ranking(ranking, top)
         design.show_trials(tried)
         print(f"  {picture}")
+
+
+@app.command()
+def allan(
+    record: Annotated[Path, typer.Argument(metavar="RECORD", help="CSV or NPY of a gyro's rates at rest.")],
+    rate_hz: Annotated[float, typer.Option(help="Of the record's samples.")],
+    unit: Annotated[str | None, typer.Option(help="rad/s or deg/s, if the columns' names do not say.")] = None,
+    terms: Annotated[str, typer.Option(help="Which of Q, N, B, K to look for.")] = "QNBK",
+    bias_correlation_s: Annotated[float | None, typer.Option(help="Of the bias, where it is known.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Parameter sheet to write.")] = None,
+    as_json: Json = False,
+) -> None:
+    """Identify a gyro's noise terms by Allan deviation; write them as a parameter sheet."""
+    from dockair.scenarios import allan_tool
+
+    found = allan_tool.report(record, rate_hz, unit, terms=terms, bias_correlation_s=bias_correlation_s)
+    if out is not None:
+        allan_tool.write_sheet(found, out)
+    if as_json:
+        _print_json(found.to_dict())
+    else:
+        print(allan_tool.in_words(found))
 
 
 @app.command()

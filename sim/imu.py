@@ -11,6 +11,7 @@ Not modelled: the Earth's rotation (15 deg/h; W does not turn), vibration of the
 the motion does between two samples, a clock that runs fast or slow.
 """
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -22,7 +23,7 @@ from dockair.messages import ImuSample
 from dockair.rotations import Array
 from dockair.sim.air.atmosphere import STANDARD_GRAVITY_M_S2
 from dockair.sim.faults import ImuFault
-from dockair.sim.triad import Triad, TriadParameters
+from dockair.sim.triad import GAUSS_MARKOV_PEAK, Triad, TriadParameters
 
 _JITTER_LIMIT = 0.49  # of the sample time
 _BLOCK = 8192  # samples whose random numbers are drawn at a time
@@ -58,6 +59,12 @@ class ImuParameters:
     accelerometer_range_m_s2: float
     accelerometer_quantum_m_s2: float
     time_stamp_jitter_s: float
+
+    @property
+    def gyro_bias_walk_rad_s_rts(self) -> float:
+        """Random walk that stands for both the rate random walk and, below its correlation time, the instability."""
+        markov2 = 2.0 * (self.gyro_bias_instability_rad_s / GAUSS_MARKOV_PEAK) ** 2 / self.gyro_bias_correlation_s
+        return math.sqrt(self.gyro_rate_random_walk_rad_s_rts**2 + markov2)
 
 
 class ImuRecord(NamedTuple):

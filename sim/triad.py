@@ -31,7 +31,7 @@ from scipy.signal import cont2discrete
 
 from dockair.rotations import Array
 
-_GAUSS_MARKOV_PEAK = 0.617364283  # highest Allan deviation of Eq. (5) over its standard deviation
+GAUSS_MARKOV_PEAK = 0.617364283  # highest Allan deviation of Eq. (5) over its standard deviation
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,7 +65,7 @@ class Triad:
         self._gain = np.eye(3) + M
         self._cross = sheet.cross_sensitivity_sigma * drawn[3:6]
         self._turn_on = sheet.turn_on_bias_sigma * drawn[6]
-        sigma = sheet.bias_instability / _GAUSS_MARKOV_PEAK
+        sigma = sheet.bias_instability / GAUSS_MARKOV_PEAK
         decay = math.exp(-dt / sheet.bias_correlation_s)
         self._laws = np.array([
             sheet.noise_density / math.sqrt(dt),

@@ -45,6 +45,20 @@ class HeuristicDriftSettings:
     turn_rate_rad_s: float = float(np.radians(10.0))  #: of the turn switch
     loop: Literal["printed", "closed"] = "printed"
 
+    @classmethod
+    def for_aircraft(cls) -> "HeuristicDriftSettings":
+        """Constants of a fixed-wing aircraft with a gyro of 100 Hz: turns of a degree a second, bias that moves slowly.
+
+        The switch opens below the rate of a bank of 7 degrees at 180 m/s, 0.4 deg/s, and holds I above it; gusts yaw
+        less than that. I moves by 1e-4 deg/s a sample: the seconds of a turn's beginning, until the switch
+        holds it, add some thousandths of a degree a second.
+        """
+        return cls(
+            time_constant_s=2.0,
+            step_rad_s=float(np.radians(1e-4)),
+            turn_rate_rad_s=float(np.radians(0.4)),
+        )
+
     def __post_init__(self) -> None:
         for name, least in (("time_constant_s", 0.0), ("step_rad_s", 0.0), ("attenuation", 0.0), ("exponent", 0.0)):
             if not (np.isfinite(getattr(self, name)) and getattr(self, name) >= least):

@@ -43,6 +43,20 @@ class VisionDriftSettings:
     visual_share: float = 0.1  #: of a new visual heading, in what the gyro has carried on of the earlier ones
     heuristic: HeuristicDriftSettings = field(default_factory=HeuristicDriftSettings)
 
+    @classmethod
+    def for_aircraft(cls) -> "VisionDriftSettings":
+        """Constants of a fixed-wing aircraft: frames every 2 s, far scenery, turns of minutes.
+
+        Turns begin slowly, so the switch may close late; gusts make runs of equal signs of some seconds.
+        """
+        return cls(
+            turn_after_s=5.0,
+            correction_rate_rad_s=float(np.radians(0.5)),
+            oldest_visual_s=6.0,
+            visual_share=0.5,
+            heuristic=HeuristicDriftSettings.for_aircraft(),
+        )
+
     def __post_init__(self) -> None:
         for name in ("turn_after_s", "correction_rate_rad_s", "oldest_visual_s"):
             if not getattr(self, name) > 0.0:

@@ -15,7 +15,10 @@ from dockair.errors import DockairError
 from dockair.scenarios.reproduce import (
     contact_sheet,
     dop_figures,
+    fusion_consistency,
+    fusion_outages,
     ground_fig29,
+    heading_flight,
     heading_oval,
     heading_pairs,
     heading_straight,
@@ -48,6 +51,7 @@ from dockair.scenarios.reproduce import (
     world_reel,
     world_static,
     world_swing,
+    world_velocity_hold,
     world_wake,
     world_whip,
 )
@@ -56,7 +60,10 @@ Reproduction = Callable[[Path | None], dict[str, Any]]
 
 _MODULES = (
     contact_sheet,
+    fusion_consistency,
+    fusion_outages,
     ground_fig29,
+    heading_flight,
     heading_oval,
     heading_straight,
     image_contour,
@@ -85,6 +92,7 @@ _MODULES = (
     world_reel,
     world_static,
     world_swing,
+    world_velocity_hold,
     world_wake,
     world_whip,
 )

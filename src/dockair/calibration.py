@@ -228,11 +228,16 @@ class StartGeometry:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class GyroSheet:
-    """The gyro's data sheet."""
+    """The data sheet of the gyros, and of the accelerometers beside them."""
 
     rate_hz: int
     noise_density_rad_s_rthz: float
-    bias_sigma_rad_s: float
+    bias_sigma_rad_s: float  #: when switched on
+    bias_walk_rad_s_rts: float = 0.0  #: rate random walk and bias instability together
+    scale_factor_sigma: float = 0.0  #: with the misalignment of the axes
+    range_rad_s: float = float("inf")  #: of each axis
+    accelerometer_noise_density_m_s2_rthz: float = 0.0
+    accelerometer_bias_sigma_m_s2: float = 0.0  #: when switched on
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

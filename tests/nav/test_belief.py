@@ -1,122 +1,129 @@
-"""Motion of the belief: its Jacobian against differences, its noise against samples; mixtures and their fate."""
+"""The belief and a frame: what a camera that is off shows, the update against closed forms; mixtures and their fate."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.linalg import expm
 
 from dockair.calibration import Camera, LedRing, Mounting
-from dockair.nav.belief import Belief, MotionNoise, corrected, mixture, moved, pose_prior
+from dockair.nav.belief import (
+    Belief,
+    Sight,
+    Taking,
+    corrected,
+    felt_first,
+    mixture,
+    ring_sensitivity,
+    rolled,
+    widened,
+)
+from dockair.nav.belief_motion import CALIBRATION, ERRORS
+from dockair.nav.pose.difference import pose_difference
 from dockair.nav.pose.estimate import solve_pose
+from dockair.nav.pose.measurement import lines_of_sight_from_pixels
 from dockair.nav.pose.planar import mirrored
-from dockair.rotations import Array, exp, log, matrix_from_yaw_pitch_roll, skew
+from dockair.rotations import Array, exp, log, matrix_from_yaw_pitch_roll
 
 RING, CAMERA = LedRing().positions_D, Camera()
 MOUNTING = Mounting(
     R_BC=matrix_from_yaw_pitch_roll(-0.05, 0.02, 0.1),
     p_BC=np.array([3.3, -0.45, 0.75]),
     p_BP=np.array([6.0, -0.9, 0.6]),
+    p_BI=np.array([1.0, 0.2, -0.1]),
 )
-SILENT = MotionNoise(attitude2=0.0, acceleration2=0.0, gyro2=0.0)
+SIGHT = Sight(mounting=MOUNTING, points_D=RING)
+OPEN = [np.inf] * 7
+
+
+def covariance(blocks: dict[int, float]) -> Array:
+    """Diagonal, variance by the first error of each three."""
+    P = np.zeros((ERRORS, ERRORS))
+    for first, variance in blocks.items():
+        P[range(first, first + 3), range(first, first + 3)] = variance
+    return P
 
 
 def belief(P: Array, R: Array | None = None, log_weight: float = 0.0) -> Belief:
-    R = exp(np.array([0.1, -0.2, 0.3])) if R is None else R
-    return Belief(R, np.array([12.0, -0.5, 0.8]), np.array([0.4, -0.3, 0.2]), P, log_weight)
+    x = np.zeros((6, 3))
+    x[0], x[1] = [12.0, -0.5, 0.8], [0.4, -0.3, 0.2]
+    return Belief(exp(np.array([0.1, -0.2, 0.3])) if R is None else R, x, P, log_weight)
 
 
-def off(b: Belief, e: Array) -> Belief:
-    return Belief(exp(e[:3]) @ b.R_BD, b.p_BD + e[3:6], b.v_BD + e[6:], b.P)
+def pixels_of(R_CD: Array, p_CD: Array, points_D: Array = RING) -> Array:
+    return CAMERA.pixels_from_points(points_D @ R_CD.T + p_CD)
 
 
-def difference(a: Belief, b: Belief) -> Array:
-    return np.concatenate([log(a.R_BD @ b.R_BD.T), a.p_BD - b.p_BD, a.v_BD - b.v_BD])
+@pytest.mark.parametrize("k", range(ERRORS))
+def test_a_camera_and_ring_that_are_off_show_what_the_model_says(k):
+    """Each error by itself: the true LEDs seen by the true camera, solved with the nominal ones, against Eq. (1)."""
+    b = belief(np.eye(ERRORS), MOUNTING.R_BC @ matrix_from_yaw_pitch_roll(0.1, 0.25, 0.2))
+    b.x[0] = MOUNTING.p_BC - MOUNTING.p_BI + MOUNTING.R_BC @ [6.0, 0.3, -0.2]
+    e = np.zeros(ERRORS)
+    e[k] = 1e-4
+    axes, place, scale, strain, keystone = np.split(e[CALIBRATION], [3, 6, 7, 9])
+    y, z = RING[:, 1], RING[:, 2]
+    ring = RING * (1.0 + 0.0)
+    ring[:, 1] += strain[0] * y + strain[1] * z + y * (keystone[0] * y + keystone[1] * z)
+    ring[:, 2] += strain[1] * y - strain[0] * z + z * (keystone[0] * y + keystone[1] * z)
+    R_BC, p_BC = exp(axes) @ MOUNTING.R_BC, MOUNTING.p_BC + place
+    R_BD, p_BD = exp(e[:3]) @ b.R_BD, b.p_ID + e[3:6] + MOUNTING.p_BI
+    p_CD = R_BC.T @ (p_BD - p_BC)
+    seen = pixels_of(R_BC.T @ R_BD, p_CD - scale * p_CD, ring)
+    told = SIGHT.apparent(b)
+    pose = solve_pose(seen, RING, CAMERA, initial=(told.R_CD, told.p_CD))
+    shown = pose_difference(pose.R_CD, pose.p_CD, told.R_CD, told.p_CD)
+    np.testing.assert_allclose(shown, told.M @ e, atol=4e-6)
 
 
-@pytest.mark.parametrize("w", [np.zeros(3), np.array([0.3, -0.2, 0.5]), np.array([3.0, 2.0, -2.0])])
-def test_state_moves_as_seen_from_axes_that_turn(w):
-    """ds/dt = v - w x s, dv/dt = -w x v, dR/dt = -[w x] R, integrated by the matrix exponential."""
-    b, dt = belief(np.eye(9)), 0.7
-    after = moved(b, w, dt, SILENT)
-    A = np.block([[-skew(w), np.eye(3)], [np.zeros((3, 3)), -skew(w)]])
-    s_v = expm(A * dt) @ np.concatenate([b.p_BD, b.v_BD])
-    np.testing.assert_allclose(np.concatenate([after.p_BD, after.v_BD]), s_v, atol=1e-12)
-    np.testing.assert_allclose(after.R_BD, expm(-skew(w) * dt) @ b.R_BD, atol=1e-13)
+def test_strain_of_a_frontal_ring_moves_no_pose():
+    """Its image is an ellipse that no pose explains to first order, since a tilt enters by its square."""
+    J = ring_sensitivity(np.eye(3), np.array([6.0, 0.0, 0.0]), RING)
+    np.testing.assert_allclose(J[:, :2], 0.0, atol=1e-9)
+    assert np.abs(J[:3, 2:]).max() > 1.0  # but keystone does
 
 
-def test_covariance_moves_by_the_jacobian_of_the_motion():
-    w, dt, step, b = np.array([0.3, -0.2, 0.5]), 0.4, 1e-6, belief(np.eye(9))
-    after = moved(b, w, dt, SILENT)
-    F = np.empty((9, 9))
-    for k, e in enumerate(np.eye(9) * step):
-        plus, minus = (moved(off(b, s * e), w, dt, SILENT) for s in (1.0, -1.0))
-        F[:, k] = (difference(plus, after) - difference(minus, after)) / (2.0 * step)
-    root = np.random.default_rng(1).normal(size=(9, 9))
-    P = root @ root.T
-    np.testing.assert_allclose(moved(belief(P), w, dt, SILENT).P, F @ P @ F.T, atol=1e-7)
-
-
-def test_gyro_noise_enters_as_turning_the_rate_would():
-    """G of the module's head is the derivative of the moved state by the rate, taken with the opposite sign."""
-    w, dt, step, b = np.array([0.3, -0.2, 0.5]), 1e-3, 1e-4, belief(np.zeros((9, 9)))
-    G = np.empty((9, 3))
-    for k, e in enumerate(np.eye(3) * step):
-        plus, minus = (moved(b, w + s * e, dt, SILENT) for s in (1.0, -1.0))
-        G[:, k] = -difference(plus, minus) / (2.0 * step * dt)
-    P = moved(b, w, dt, MotionNoise(attitude2=0.0, acceleration2=0.0, gyro2=1e-6)).P
-    np.testing.assert_allclose(P, 1e-6 * dt * G @ G.T, atol=2e-3 * P.max())
-
-
-def test_noise_of_many_short_steps_is_that_of_one_long_step():
-    noise, b = MotionNoise(attitude2=1e-3, acceleration2=0.5, gyro2=0.0), belief(np.eye(9))
-    short = b
-    for _ in range(100):
-        short = moved(short, np.zeros(3), 0.01, noise)
-    np.testing.assert_allclose(short.P, moved(b, np.zeros(3), 1.0, noise).P, rtol=1e-9, atol=1e-12)
-
-
-def test_mixture_has_the_mean_and_covariance_of_samples():
-    """3 : 1 of two Gaussians far apart, against the closed form on scalars along one axis."""
-    d = np.zeros(9)
-    d[4] = 2.0
-    first = belief(0.01 * np.eye(9))
-    second = Belief(first.R_BD, first.p_BD + d[3:6], first.v_BD, 0.04 * np.eye(9), log_weight=np.log(1.0 / 3.0))
-    both = mixture([first, second])
-    np.testing.assert_allclose(both.p_BD - first.p_BD, [0.0, 0.5, 0.0], atol=1e-12)
-    expected = (0.75 * 0.01 + 0.25 * 0.04) * np.eye(9)
-    expected[4, 4] += 0.75 * 0.25 * 4.0
-    np.testing.assert_allclose(both.P, expected, atol=1e-12)
-    assert both.log_weight == pytest.approx(np.log(4.0 / 3.0))
+def test_predicted_pose_is_uncertain_by_the_calibration_too():
+    P = np.zeros((ERRORS, ERRORS))
+    P[CALIBRATION.start + 1, CALIBRATION.start + 1] = 1e-6  # the camera turned by 1 mrad about the body's y
+    seen = SIGHT.apparent(belief(P))
+    c = belief(P).p_ID + MOUNTING.p_BI - MOUNTING.p_BC
+    across = np.array([c[2], 0.0, -c[0]])
+    T = MOUNTING.R_BC.T
+    np.testing.assert_allclose(seen.covariance[3:, 3:], 1e-6 * np.outer(T @ across, T @ across), atol=1e-15)
 
 
 def start(sigma_tilt_rad: float, tilt_deg: float, range_m: float) -> tuple[Belief, Array]:
     """A frontal belief and a true attitude tilted against it, seen from the camera."""
     R_CD, p_CD = matrix_from_yaw_pitch_roll(0.0, np.deg2rad(tilt_deg), 0.0), np.array([range_m, 0.0, 0.0])
-    P = np.diag([sigma_tilt_rad**2] * 3 + [0.04] * 3 + [0.1] * 3)
-    P[3:6, 6:] = P[6:, 3:6] = 0.03 * np.eye(3)
-    return Belief(MOUNTING.R_BC, MOUNTING.p_BC + MOUNTING.R_BC @ p_CD, np.zeros(3), P), R_CD
+    P = covariance({0: sigma_tilt_rad**2, 3: 0.04, 6: 0.1, 15: 1e-5})
+    P[3:6, 6:9] = P[6:9, 3:6] = 0.03 * np.eye(3)
+    x = np.zeros((6, 3))
+    x[0] = MOUNTING.p_BC - MOUNTING.p_BI + MOUNTING.R_BC @ p_CD
+    return Belief(MOUNTING.R_BC, x, P), R_CD
 
 
-def test_two_floors_far_apart_stay_two_until_one_dies():
+@pytest.mark.parametrize("tight", [True, False], ids=["tight", "loose"])
+def test_two_floors_far_apart_stay_two_until_one_dies(tight):
     """20 m, 6 degrees, a prior that does not know the side: two hypotheses, and after some frames the true one."""
     rng = np.random.default_rng(5)
     b, R_CD = start(np.deg2rad(8.0), 6.0, 20.0)
-    p_CD, counts = pose_prior(b, MOUNTING).p_CD, []
+    p_CD, counts = SIGHT.apparent(b).p_CD, []
     beliefs = [b]
     for _ in range(60):
-        pixels = CAMERA.pixels_from_points(RING @ R_CD.T + p_CD) + 0.1 * rng.normal(size=(8, 2))
-        beliefs = corrected(beliefs, solve_pose(pixels, RING, CAMERA), MOUNTING, np.inf)
+        pixels = pixels_of(R_CD, p_CD) + 0.1 * rng.normal(size=(8, 2))
+        beliefs = corrected(beliefs, solve_pose(pixels, RING, CAMERA), SIGHT, OPEN, Taking(tight=tight)).beliefs
         counts.append(len(beliefs))
         assert beliefs[0].log_weight == 0.0
-        assert all(np.linalg.eigvalsh(h.P).min() > 0.0 for h in beliefs)
+        assert all(np.linalg.eigvalsh(h.P[:9, :9]).min() > 0.0 for h in beliefs)
     assert counts[0] == 2 and counts[-1] == 1
     assert np.linalg.norm(log(MOUNTING.R_BC.T @ beliefs[0].R_BD @ R_CD.T)) < np.deg2rad(1.0)
 
 
 def test_hypotheses_are_two_at_most_and_mirror_images():
     b, R_CD = start(np.deg2rad(8.0), 6.0, 20.0)
-    p_CD = pose_prior(b, MOUNTING).p_CD
-    pose = solve_pose(CAMERA.pixels_from_points(RING @ R_CD.T + p_CD), RING, CAMERA)
-    first, second = corrected([b], pose, MOUNTING, np.inf)
+    p_CD = SIGHT.apparent(b).p_CD
+    pose = solve_pose(pixels_of(R_CD, p_CD), RING, CAMERA)
+    first, second = corrected([b], pose, SIGHT, OPEN, Taking()).beliefs
     other, _ = mirrored(MOUNTING.R_BC.T @ first.R_BD, p_CD, RING)
     assert np.rad2deg(np.linalg.norm(log(MOUNTING.R_BC.T @ second.R_BD @ other.T))) < 2.0
 
@@ -124,17 +131,122 @@ def test_hypotheses_are_two_at_most_and_mirror_images():
 def test_velocity_follows_the_pose_by_regression():
     """A shift of the drogue seen where P_sv / P_ss = 0.75 /s raises the velocity by that much of what was taken."""
     b, _ = start(np.deg2rad(2.0), 0.0, 6.0)
-    prior = pose_prior(b, MOUNTING)
-    shifted = prior.p_CD + np.array([0.02, 0.05, -0.03])
-    pose = solve_pose(CAMERA.pixels_from_points(RING @ prior.R_CD.T + shifted), RING, CAMERA, sigma_px=0.02)
-    (after,) = corrected([b], pose, MOUNTING, np.inf)
-    np.testing.assert_allclose(after.v_BD, 0.75 * (after.p_BD - b.p_BD), rtol=1e-3, atol=1e-6)
-    np.testing.assert_allclose(np.diag(after.P)[6:], 0.1 - 0.75**2 * (0.04 - np.diag(after.P)[3:6]), rtol=1e-3)
+    seen = SIGHT.apparent(b)
+    pose = solve_pose(
+        pixels_of(seen.R_CD, seen.p_CD + np.array([0.02, 0.05, -0.03])), RING, CAMERA, sigma_px=0.02
+    )  # fmt: skip
+    (after,) = corrected([b], pose, SIGHT, OPEN, Taking()).beliefs
+    np.testing.assert_allclose(after.v_ID, 0.75 * (after.p_ID - b.p_ID), rtol=1e-3, atol=1e-6)
+    np.testing.assert_allclose(np.diag(after.P)[6:9], 0.1 - 0.75**2 * (0.04 - np.diag(after.P)[3:6]), rtol=1e-3)
+
+
+def test_an_update_is_the_kalman_filter_s_where_the_problem_is_linear():
+    """Loose, near, tilted: gain, covariance and chi-square of the textbook, with M and the covariance of the pose."""
+    rng = np.random.default_rng(7)
+    root = 1e-3 * rng.normal(size=(ERRORS, ERRORS))
+    b = belief(root @ root.T, MOUNTING.R_BC @ matrix_from_yaw_pitch_roll(0.1, 0.3, 0.0))
+    b.x[0] = MOUNTING.p_BC - MOUNTING.p_BI + MOUNTING.R_BC @ [4.0, 0.1, 0.1]
+    seen = SIGHT.apparent(b)
+    pose = solve_pose(pixels_of(exp(np.full(3, 1e-4)) @ seen.R_CD, seen.p_CD + 1e-3), RING, CAMERA, sigma_px=0.1)
+    found = corrected([b], pose, SIGHT, OPEN, Taking(tight=False))
+    S = seen.covariance + pose.covariance
+    y = pose_difference(pose.R_CD, pose.p_CD, seen.R_CD, seen.p_CD)
+    K = b.P @ seen.M.T @ np.linalg.inv(S)
+    K[CALIBRATION] = 0.0  # considered
+    A = np.eye(ERRORS) - K @ seen.M
+    after = found.beliefs[0]
+    np.testing.assert_allclose(after.P, A @ b.P @ A.T + K @ pose.covariance @ K.T, atol=1e-9)
+    moved = np.concatenate([log(after.R_BD @ b.R_BD.T), (after.x - b.x).ravel()])
+    np.testing.assert_allclose(moved, (K @ y)[: CALIBRATION.start], atol=1e-6)
+    assert found.chi2 == pytest.approx(float(y @ np.linalg.solve(S, y)), rel=1e-3)
+
+
+def test_what_is_considered_is_neither_estimated_nor_made_smaller():
+    P = covariance({0: 1e-4, 3: 1e-2, CALIBRATION.start: 1e-6, CALIBRATION.start + 3: 4e-6})
+    b = belief(P, MOUNTING.R_BC @ matrix_from_yaw_pitch_roll(0.1, 0.3, 0.0))
+    b.x[0] = MOUNTING.p_BC - MOUNTING.p_BI + MOUNTING.R_BC @ [6.0, 0.1, 0.1]
+    seen = SIGHT.apparent(b)
+    beliefs = [b]
+    for _ in range(200):
+        pose = solve_pose(pixels_of(seen.R_CD, seen.p_CD), RING, CAMERA, sigma_px=0.1)
+        beliefs = corrected(beliefs, pose, SIGHT, OPEN, Taking()).beliefs
+    after = beliefs[0]
+    np.testing.assert_array_equal(after.P[CALIBRATION, CALIBRATION], P[CALIBRATION, CALIBRATION])
+    floor = 4e-6 + 1e-6 * 6.0**2  # the camera's place, and its turn at 6 m; 200 frames do not get below
+    assert np.diag(after.P)[4] == pytest.approx(floor, rel=0.05)
+    assert np.linalg.eigvalsh(after.P).min() > -1e-15
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_a_few_leds_correct_what_they_see(count):
+    """Their own places agree with the truth within 3 sigma of a pixel afterwards; chi2 has two degrees each."""
+    rng = np.random.default_rng(count)
+    b, _ = start(np.deg2rad(2.0), 0.0, 6.0)
+    seen = SIGHT.apparent(b)
+    moved = seen.p_CD + np.array([0.1, 0.05, -0.04])
+    pixels = pixels_of(seen.R_CD, moved, RING[:count]) + 0.1 * rng.normal(size=(count, 2))
+    sight = lines_of_sight_from_pixels(pixels, RING[:count], CAMERA, np.full(count, 0.1))
+    found = corrected([b], sight, SIGHT, OPEN, Taking())
+    assert found.degrees_of_freedom == min(2 * count, 6)
+    after = SIGHT.apparent(found.beliefs[0])
+    np.testing.assert_allclose(pixels_of(after.R_CD, after.p_CD, RING[:count]), pixels, atol=0.3)
+    P = found.beliefs[0].P
+    assert np.diag(P)[4] < 0.01 * 0.04  # across
+    if count == 1:
+        assert np.diag(P)[3] > 0.5 * 0.04  # along
 
 
 def test_gate_refuses_and_leaves_nothing():
     b, _ = start(np.deg2rad(2.0), 0.0, 6.0)
-    prior = pose_prior(b, MOUNTING)
-    pose = solve_pose(CAMERA.pixels_from_points(RING @ prior.R_CD.T + prior.p_CD + [0.0, 2.0, 0.0]), RING, CAMERA)
-    assert corrected([b], pose, MOUNTING, 27.9) == []
-    assert len(corrected([b], pose, MOUNTING, np.inf)) == 1
+    seen = SIGHT.apparent(b)
+    pose = solve_pose(pixels_of(seen.R_CD, seen.p_CD + [0.0, 2.0, 0.0]), RING, CAMERA)
+    refused = corrected([b], pose, SIGHT, [0.0] * 6 + [27.9], Taking())
+    assert refused.beliefs == [] and refused.chi2 > 27.9
+    assert len(corrected([b], pose, SIGHT, OPEN, Taking()).beliefs) == 1
+
+
+def test_mixture_has_the_mean_and_covariance_of_both():
+    """3 : 1 of two Gaussians far apart, against the closed form on scalars along one axis."""
+    first = belief(0.01 * np.eye(ERRORS))
+    x = first.x.copy()
+    x[0, 1] += 2.0
+    both = mixture([first, Belief(first.R_BD, x, 0.04 * np.eye(ERRORS), log_weight=np.log(1.0 / 3.0))])
+    np.testing.assert_allclose(both.p_ID - first.p_ID, [0.0, 0.5, 0.0], atol=1e-12)
+    expected = (0.75 * 0.01 + 0.25 * 0.04) * np.eye(ERRORS)
+    expected[4, 4] += 0.75 * 0.25 * 4.0
+    np.testing.assert_allclose(both.P, expected, atol=1e-12)
+    assert both.log_weight == pytest.approx(np.log(4.0 / 3.0))
+
+
+def test_a_rolled_belief_forgets_how_its_attitude_went_with_the_rest():
+    root = np.random.default_rng(2).normal(size=(ERRORS, ERRORS))
+    before = belief(root @ root.T)
+    after = rolled(before, 0.5)
+    np.testing.assert_allclose(before.R_BD.T @ after.R_BD, exp(np.array([0.5, 0.0, 0.0])), atol=1e-12)
+    np.testing.assert_array_equal(after.P[:3, 3:], 0.0)
+    np.testing.assert_array_equal(after.P[3:, 3:], before.P[3:, 3:])
+    assert np.linalg.eigvalsh(after.P).min() > -1e-9
+
+
+def test_a_widened_belief_is_less_certain_of_nine_errors_alone():
+    before = belief(np.eye(ERRORS))
+    added = widened(before, (0.1, 0.2, 0.3)).P - before.P
+    np.testing.assert_allclose(np.diag(added)[:9], np.repeat([0.01, 0.04, 0.09], 3))
+    assert np.count_nonzero(added) == 9
+
+
+def test_the_first_force_is_that_of_the_formation():
+    np.testing.assert_array_equal(felt_first(belief(np.eye(ERRORS)), np.array([0.5, 0.0, 9.8])).x[5], [-0.5, 0.0, -9.8])
+
+
+def test_evidence_that_is_the_same_in_every_frame_does_not_add_up():
+    """Frontal, 20 m: with memory m and share q the odds of the two minima stay below q/(1 - m) times a frame's own."""
+    b, R_CD = start(np.deg2rad(8.0), 6.0, 20.0)
+    pose = solve_pose(pixels_of(R_CD, SIGHT.apparent(b).p_CD), RING, CAMERA)
+    (alone,) = [corrected([b], pose, SIGHT, OPEN, Taking()).beliefs[1].log_weight]
+    (shared,) = [corrected([b], pose, SIGHT, OPEN, Taking(share=0.1)).beliefs[1].log_weight]
+    assert shared == pytest.approx(0.1 * alone)
+    first, second = corrected([b], pose, SIGHT, OPEN, Taking()).beliefs
+    weighed = [first, replace(second, log_weight=-5.0)]
+    ends = [corrected(weighed, pose, SIGHT, OPEN, Taking(memory=memory)).beliefs[1] for memory in (1.0, 0.5)]
+    assert ends[1].log_weight - ends[0].log_weight == pytest.approx(2.5, abs=0.1)

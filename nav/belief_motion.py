@@ -1,0 +1,226 @@
+"""How the belief about the drogue moves between frames: its state, its errors, and the noise they gather.
+
+Held in body axes B, from the place I of the accelerometers; u' is the rate of change seen from axes that do not turn:
+
+    R = R_BD,  s = p_ID_B,  v = s',  n = swing of the drogue about its place of rest,  m = n',
+    b = bias of the gyro,   c = gravity less the steady acceleration of the formation
+    a = -W^2 n - 2 z W m + white drive                                                                (1)
+    s' = v,   v' = a - (f + c),   n' = m,   m' = a,   w = w_gyro - b                                  (2)
+
+W = diag(0, W_left, W_up): along the hose nothing pulls the drogue back, and n, m stay 0 there. f is the accelerometers'
+specific force, so that f + c is the receiver's acceleration beyond the formation's, which the belief need not guess;
+their bias is part of c, from which it cannot be told. In body axes every vector turns with E = exp(-[w x] dt). Errors
+
+    e = (phi, ds, dv, dn, dm, db, dc, calibration),   R_true = exp(phi) R,   dw = -db - noise             (3)
+
+so that a turn that the gyro did not measure enters phi with +1 and each vector u with -[u x]. One step is Eq. (2) to
+second order in dt, then E; the steps are at most `longest_step_s`.
+
+Between two samples the rate is linear, after the last it is held. The truth departs from that by an angular
+acceleration of sigma_A: a steady one since the last sample, or one that changes its sign half-way between two. A time t
+after the last, or between two that are T apart, the gyro's squared noise density grows by
+
+    sigma_A^2 t^3,   or   sigma_A^2 T^3 / 64,   but at most by that of a rate that is not known at all             (4)
+
+The receiver's acceleration is taken for white where no two samples of it stand near.
+
+Not modelled: the size of the IMU, the swing's axes turning with the tanker, a formation that speeds up (walk of c).
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from dockair.rotations import Array
+
+PHI, PLACE, VELOCITY = slice(0, 3), slice(3, 6), slice(6, 9)
+SWING, SWING_RATE, BIAS, FORMATION = slice(9, 12), slice(12, 15), slice(15, 18), slice(18, 21)
+CALIBRATION = slice(21, 32)
+ERRORS = 32  #: how many errors a belief has
+S, V, N, M, B, C = range(6)  #: rows of the state (6, 3)
+_MOVING = 21  # errors that move; the calibration's do not
+
+
+class Motion(NamedTuple):
+    """Belief about motion, in the order in which the kernel takes it; densities are squared."""
+
+    stiffness: Array  #: (3,) W^2 [1/s^2]
+    friction: Array  #: (3,) 2 z W [1/s]
+    attitude2: float  #: drogue's turning [rad^2/s]
+    drive2: float  #: of Eq. (1) [m^2/s^3]
+    receiver2: float  #: receiver's acceleration where it is not measured [m^2/s^3]
+    accelerometer2: float  #: [m^2/s^3]
+    gyro2: float  #: [rad^2/s]
+    bias2: float  #: walk of the gyro's bias [rad^2/s^3]
+    formation2: float  #: walk of c [m^2/s^5]
+    scale2: float  #: the gyro's noise by its scale factor, per squared rate [s]
+    held_turn2: float  #: sigma_A^2 of Eq. (4) [rad^2/s^4]
+    held_most2: float  #: noise density of a rate that is not known [rad^2/s]
+    longest_gap_s: float  #: between two samples of acceleration that are used
+    longest_step_s: float
+
+
+@njit(cache=True)
+def _turned(E: Array, u: Array) -> Array:
+    out = np.empty(3)
+    for i in range(3):
+        out[i] = E[i, 0] * u[0] + E[i, 1] * u[1] + E[i, 2] * u[2]
+    return out
+
+
+@njit(cache=True)
+def _turn(w: Array, dt: float) -> Array:
+    """(3, 3) E = exp(-[w x] dt)."""
+    angle = np.sqrt(w[0] ** 2 + w[1] ** 2 + w[2] ** 2) * dt
+    p = 1.0 - angle**2 / 6.0 if angle < 1e-4 else np.sin(angle) / angle
+    q = 0.5 - angle**2 / 24.0 if angle < 1e-4 else (1.0 - np.cos(angle)) / angle**2
+    x, y, z = -w[0] * dt, -w[1] * dt, -w[2] * dt
+    E = np.empty((3, 3))
+    E[0, 0], E[0, 1], E[0, 2] = 1.0 - q * (y * y + z * z), -p * z + q * x * y, p * y + q * x * z
+    E[1, 0], E[1, 1], E[1, 2] = p * z + q * x * y, 1.0 - q * (x * x + z * z), -p * x + q * y * z
+    E[2, 0], E[2, 1], E[2, 2] = -p * y + q * x * z, p * x + q * y * z, 1.0 - q * (x * x + y * y)
+    return E
+
+
+@njit(cache=True)
+def _errors_moved(P: Array, E: Array, x: Array, dt: float, felt: bool, stiffness: Array, friction: Array) -> None:
+    """P <- F P in place; x (6, 3) is the state after the step."""
+    for j in range(P.shape[1]):
+        for i in range(3):
+            a = -stiffness[i] * P[9 + i, j] - friction[i] * P[12 + i, j]
+            a = a - 0.5 * dt * (stiffness[i] * P[12 + i, j] + friction[i] * a)  # half-way
+            relative = a - P[18 + i, j] if felt else a
+            P[3 + i, j] += dt * P[6 + i, j] + 0.5 * dt * dt * relative
+            P[6 + i, j] += dt * relative
+            P[9 + i, j] += dt * P[12 + i, j] + 0.5 * dt * dt * a
+            P[12 + i, j] += dt * a
+        b0, b1, b2 = dt * P[15, j], dt * P[16, j], dt * P[17, j]
+        for block in range(7):
+            if block == 5:  # the gyro's bias stays in the body
+                continue
+            r = 3 * block
+            p0, p1, p2 = P[r, j], P[r + 1, j], P[r + 2, j]
+            q0 = E[0, 0] * p0 + E[0, 1] * p1 + E[0, 2] * p2
+            q1 = E[1, 0] * p0 + E[1, 1] * p1 + E[1, 2] * p2
+            q2 = E[2, 0] * p0 + E[2, 1] * p1 + E[2, 2] * p2
+            if block == 0:
+                P[r, j], P[r + 1, j], P[r + 2, j] = q0 + b0, q1 + b1, q2 + b2
+                continue
+            u = x[5] if block == 6 else x[block - 1]
+            P[r, j] = q0 - (u[1] * b2 - u[2] * b1)
+            P[r + 1, j] = q1 - (u[2] * b0 - u[0] * b2)
+            P[r + 2, j] = q2 - (u[0] * b1 - u[1] * b0)
+
+
+@njit(cache=True)
+def _noise_added(P: Array, x: Array, dt: float, gyro2: float, drive2: float, other2: float, rest: Array) -> None:
+    """P <- P + Q in place; `other2` drives the velocity alone, `rest` is of attitude, bias and formation."""
+    for i in range(3):
+        P[i, i] += rest[0] * dt
+        P[15 + i, 15 + i] += rest[1] * dt
+        P[18 + i, 18 + i] += rest[2] * dt
+        swings = i > 0
+        for row, powers in ((3, 1), (6, 0), (9, 1), (12, 0)):
+            for column, more in ((3, 1), (6, 0), (9, 1), (12, 0)):
+                if (row > 6 or column > 6) and not swings:
+                    continue
+                q = drive2 + other2 if row <= 6 and column <= 6 else drive2
+                order = powers + more
+                share = 1.0 if order == 0 else (0.5 * dt if order == 1 else dt * dt / 3.0)
+                P[row + i, column + i] += q * dt * share
+    G = np.zeros((_MOVING, 3))
+    for i in range(3):
+        G[i, i] = 1.0
+    for block in range(1, 7):
+        if block != 5:
+            u, r = (x[5] if block == 6 else x[block - 1]), 3 * block
+            G[r, 1], G[r, 2], G[r + 1, 2] = u[2], -u[1], u[0]
+            G[r + 1, 0], G[r + 2, 0], G[r + 2, 1] = -u[2], u[1], -u[0]
+    for i in range(_MOVING):
+        for j in range(_MOVING):
+            P[i, j] += gyro2 * dt * (G[i, 0] * G[j, 0] + G[i, 1] * G[j, 1] + G[i, 2] * G[j, 2])
+
+
+@njit(cache=True)
+def _held_noise(after: float, before: float, turn2: float, most2: float) -> float:
+    """Mean of sigma_A^2 t^3 over a piece of time, t from `before` to `after`, at most `most2` (Eq. (4))."""
+    corner = (most2 / turn2) ** (1.0 / 3.0) if turn2 > 0.0 else np.inf
+    if after <= before or corner <= before:
+        return most2 if turn2 > 0.0 else 0.0
+    inside = min(after, corner)
+    return (turn2 * (inside**4 - before**4) / 4.0 + most2 * max(after - corner, 0.0)) / (after - before)
+
+
+@njit(cache=True)
+def propagated(
+    R: Array, x: Array, P: Array, t0: float, t1: float, times: Array, rates: Array, forces: Array, motion: Motion
+) -> tuple[Array, Array, Array]:
+    """Return R (3, 3), x (6, 3), P at t1 [s], from those at t0 <= t1 and the samples about.
+
+    Args:
+        R: (3, 3) R_BD.
+        x: (6, 3) s, v, n, m, b, c.
+        P: (32, 32) covariance of the errors.
+        t0: time of the belief.
+        t1: time wanted.
+        times: (k,) stamps of the samples, increasing.
+        rates: (k, 3) of the gyro, body axes [rad/s].
+        forces: (k, 3) of the accelerometers, body axes [m/s^2]; NaN where there is none.
+        motion: belief about motion.
+    """
+    R, x, P = R.copy(), x.copy(), P.copy()
+    n, t = len(times), t0
+    k = int(np.searchsorted(times, t0, side="right")) - 1
+    rest = np.array([motion.attitude2, motion.bias2, motion.formation2])
+    while t < t1:
+        knot = min(times[k + 1], t1) if k + 1 < n else t1
+        pieces = max(int(np.ceil((knot - t) / motion.longest_step_s - 1e-9)), 1)
+        dt, begin = (knot - t) / pieces, t
+        for piece in range(pieces):
+            ta, tb = begin + piece * dt, begin + (piece + 1) * dt
+            middle, w, f, held2, felt = 0.5 * (ta + tb), np.zeros(3), np.zeros(3), motion.held_most2, False
+            if 0 <= k < n - 1:
+                gap = times[k + 1] - times[k]
+                share = (middle - times[k]) / gap
+                w = (1.0 - share) * rates[k] + share * rates[k + 1]
+                f = (1.0 - share) * forces[k] + share * forces[k + 1]
+                held2 = min(motion.held_turn2 * gap**3 / 64.0, motion.held_most2)
+                felt = gap <= motion.longest_gap_s
+            elif n > 0:
+                near = 0 if k < 0 else n - 1
+                w, f = rates[near].copy(), forces[near].copy()
+                far, close = (
+                    max(abs(ta - times[near]), abs(tb - times[near])),
+                    min(abs(ta - times[near]), abs(tb - times[near])),
+                )
+                held2 = _held_noise(far, close, motion.held_turn2, motion.held_most2)
+                felt = far <= motion.longest_gap_s
+            felt = felt and np.isfinite(f[0]) and np.isfinite(f[1]) and np.isfinite(f[2])
+            size2 = w[0] ** 2 + w[1] ** 2 + w[2] ** 2
+            w = w - x[4]
+            for i in range(3):
+                a = -motion.stiffness[i] * x[2, i] - motion.friction[i] * x[3, i]
+                a = a - 0.5 * dt * (motion.stiffness[i] * x[3, i] + motion.friction[i] * a)  # half-way
+                j, m = (i + 1) % 3, (i + 2) % 3
+                before = f[i] + 0.5 * dt * (w[j] * f[m] - w[m] * f[j])  # f in the axes at the step's begin
+                relative = a - before - x[5, i] if felt else a
+                x[0, i] += dt * x[1, i] + 0.5 * dt * dt * relative
+                x[1, i] += dt * relative
+                x[2, i] += dt * x[3, i] + 0.5 * dt * dt * a
+                x[3, i] += dt * a
+            E = _turn(w, dt)
+            R = np.dot(E, R)
+            for row in (0, 1, 2, 3, 5):
+                x[row] = _turned(E, x[row])
+            _errors_moved(P, E, x, dt, felt, motion.stiffness, motion.friction)
+            P = P.T.copy()
+            _errors_moved(P, E, x, dt, felt, motion.stiffness, motion.friction)
+            gyro2 = motion.gyro2 + held2 + motion.scale2 * size2
+            other2 = motion.accelerometer2 if felt else motion.receiver2
+            _noise_added(P, x, dt, gyro2, motion.drive2, other2, rest)
+        for i in range(ERRORS):  # at every sample, so that the way there does not matter to the last bit
+            for j in range(i):
+                P[i, j] = P[j, i] = 0.5 * (P[i, j] + P[j, i])
+        t, k = knot, k + (1 if k + 1 < n and knot == times[k + 1] else 0)
+    return R, x, P

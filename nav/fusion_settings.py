@@ -1,0 +1,147 @@
+"""Belief about motion and hardware that the relative filter starts from."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dockair.calibration import GyroSheet, NavigationSheets
+from dockair.errors import DockairError
+from dockair.nav.belief import Belief, Taking
+from dockair.nav.belief_motion import Motion
+from dockair.rotations import Array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FusionSettings:
+    """Belief about motion, and the gate.
+
+    Raises:
+        DockairError: a coupling that does not exist.
+    """
+
+    #: "tight": a frame's lines of sight are fitted together with the belief, single LEDs can be used; "loose": the
+    #: frame's own pose and covariance are averaged with it.
+    coupling: str = "tight"
+    #: The drogue's swing across the hose: a 15 m hose with a 20 kg drogue at 180 m/s swings near 0.33 Hz to the sides
+    #: and 0.4 Hz up and down; damping between its bare pendulum and what the gusts' own spectrum adds.
+    swing_frequency_hz: tuple[float, float] = (0.33, 0.40)
+    swing_damping: float = 0.15
+    #: [m/s^2/sqrt(Hz)]: with the swing 0.09 m and 0.2 m/s rms. In light gusts it swings by 0.07 m and 0.14 m/s; the
+    #: rest is for the receiver's bow wave.
+    drogue_acceleration_density: float = 0.25
+    receiver_acceleration_density: float = (
+        0.42  # where it is not measured: 0.3 m/s^2 over 1 s, twice variance times time
+    )
+    formation_walk_m_s2_rts: float = 0.3  # entry of a turn: 4 m/s^2 within some seconds; costs little (docs/fusion.md)
+    start_formation_sigma_m_s2: float = 0.5  # gusts and manoeuvre at the first sample
+    attitude_density: float = 0.015  # turning of the drogue [rad/sqrt(s)]; in light gusts 0.006 over 0.2 s to 1 s
+    start_velocity_sigma_m_s: float = 1.0  # assumed: joining up ends within this of the drogue's velocity
+    #: A rate that is not measured departs from that of the last sample: 3 degrees/s within a quarter of a second, the
+    #: rolling of a receiver that flies in light gusts; then nothing is known of it but this.
+    held_rate_sigma_rad_s: float = 0.05
+    held_rate_time_s: float = 0.25
+    manoeuvre_s: float = 1.0  # how long the gyro's error of scale keeps its sign: of one roll or pitch movement
+    saturated_share: float = 0.999  # of the gyro's range; the last digit may be rounded down
+    gate_probability: float = 0.9999  # a good frame is refused once in 10 000
+    #: Which of two minima is right: a frame counts a tenth, because the LEDs are as far off in the next one, and is
+    #: forgotten within fifty, so that what they say for the wrong one does not add up.
+    evidence_share: float = 0.1
+    evidence_memory: float = 0.98
+    #: A drogue that is struck or let go changes its velocity at once, which white acceleration does not foresee. After
+    #: so many frames refused in a row the belief is widened: by the closure speed, its way over the refused frames, and
+    #: some degrees of swing.
+    refusals_until_doubt: int = 3
+    doubt_velocity_sigma_m_s: float = 1.2
+    doubt_position_sigma_m: float = 0.08
+    doubt_attitude_sigma_rad: float = 0.1
+    buffer_s: float = 0.25  # how late a frame may be
+    leap_s: float = 1.0  # how far ahead of all others a stamp is believed without a second one
+    node_interval_s: float = 0.02  # between beliefs kept to begin at when a frame is late; a frame's period
+    longest_gap_s: float = 0.02  # between samples of acceleration: a receiver does not change it much sooner
+    longest_step_s: float = 0.01  # of Eq. (2) of `belief_motion`: the swing's period is 300 of them
+    #: Hardware beside its sheets, 1 sigma each: 0.05 degrees of mounting and 1 px of principal point; 2 mm of mounting;
+    #: 0.05 % of focal length and 0.3 mm of the ring's diameter of 0.5 m (as-built hardware is drawn so).
+    camera_axes_sigma_rad: float = 9.4e-4
+    camera_place_sigma_m: float = 2e-3
+    camera_scale_sigma: float = 7.8e-4
+    led_place_sigma_m: float = 3e-4  # each LED; the ring's strain and keystone follow, and its share of the scale
+    rate_average_s: float = (
+        0.01  # gyro samples averaged for Eq. (1) of `fusion`: noise against lag, 5 samples at 500 Hz
+    )
+
+    def __post_init__(self) -> None:
+        exists = ("tight", "loose")
+        if self.coupling not in exists:
+            raise DockairError("fusion.coupling", expected="one that exists", got=self.coupling, exists=exists)
+
+
+def taking_of(settings: FusionSettings) -> Taking:
+    """Return how frames are taken."""
+    return Taking(tight=settings.coupling == "tight", memory=settings.evidence_memory, share=settings.evidence_share)
+
+
+def motion_of(settings: FusionSettings, gyro: GyroSheet) -> Motion:
+    """Return what the kernel takes."""
+    omega = 2.0 * np.pi * np.array([0.0, *settings.swing_frequency_hz])
+    held2 = settings.held_rate_sigma_rad_s**2
+    return Motion(
+        stiffness=omega**2,
+        friction=2.0 * settings.swing_damping * omega,
+        attitude2=settings.attitude_density**2,
+        drive2=settings.drogue_acceleration_density**2,
+        receiver2=settings.receiver_acceleration_density**2,
+        accelerometer2=gyro.accelerometer_noise_density_m_s2_rthz**2,
+        gyro2=gyro.noise_density_rad_s_rthz**2,
+        bias2=gyro.bias_walk_rad_s_rts**2,
+        formation2=settings.formation_walk_m_s2_rts**2,
+        scale2=2.0 * gyro.scale_factor_sigma**2 * settings.manoeuvre_s,
+        held_turn2=held2 / settings.held_rate_time_s**2,
+        held_most2=2.0 * held2 * settings.held_rate_time_s,
+        longest_gap_s=settings.longest_gap_s,
+        longest_step_s=settings.longest_step_s,
+    )
+
+
+def start_of(settings: FusionSettings, sheets: NavigationSheets) -> Belief:
+    """Return the belief before the first message; the swing is that of gusts that have blown for ever."""
+    start, gyro = sheets.start, sheets.gyro
+    omega = 2.0 * np.pi * np.array(settings.swing_frequency_hz)
+    swing_rate2 = np.append(0.0, settings.drogue_acceleration_density**2 / (4.0 * settings.swing_damping * omega))
+    swing2 = np.append(0.0, swing_rate2[1:] / omega**2)
+    variances = np.concatenate(
+        [
+            np.full(3, start.sigma_R_rad**2),
+            np.square(start.sigma_p_m),
+            settings.start_velocity_sigma_m_s**2 + swing_rate2,
+            swing2,
+            swing_rate2,
+            np.full(3, gyro.bias_sigma_rad_s**2),
+            np.full(3, settings.start_formation_sigma_m_s2**2 + gyro.accelerometer_bias_sigma_m_s2**2),
+            _calibration_variances(settings, sheets.ring.positions_D),
+        ]
+    )
+    P = np.diag(variances)
+    P[np.arange(6, 9), np.arange(12, 15)] = P[np.arange(12, 15), np.arange(6, 9)] = swing_rate2
+    x = np.zeros((6, 3))
+    x[0] = start.p_PD_B + sheets.mounting.p_BP - sheets.mounting.p_BI
+    return Belief(np.array(start.R_BD, dtype=float), x, P)
+
+
+def _calibration_variances(settings: FusionSettings, points_D: Array) -> Array:
+    """(11,) of camera axes, camera place, scale, strain and keystone of the ring.
+
+    Of LEDs that are each out of place by sigma, least squares finds a scale and a strain of variance sigma^2 over the
+    sum of r^2, and a keystone of 2 sigma^2 over that of r^4, in whatever direction the ring is even.
+    """
+    radius2 = (points_D**2).sum(axis=1)
+    led2 = settings.led_place_sigma_m**2
+    strain2 = led2 / radius2.sum()
+    return np.concatenate(
+        [
+            np.full(3, settings.camera_axes_sigma_rad**2),
+            np.full(3, settings.camera_place_sigma_m**2),
+            [settings.camera_scale_sigma**2 + strain2],
+            np.full(2, strain2),
+            np.full(2, 2.0 * led2 / (radius2**2).sum()),
+        ]
+    )

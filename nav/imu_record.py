@@ -1,0 +1,120 @@
+"""The IMU's samples of the last moments, in body axes: which are believed, and the rate between them.
+
+Not taken are samples that are not newer than the last, whose stamp or rate is not a number, or with a rate at the
+gyro's limit, which says no more than that the true one is beyond. A stamp that jumps ahead is not believed until a
+second one near it says the same.
+"""
+
+import numpy as np
+
+from dockair.calibration import GyroSheet, Mounting
+from dockair.messages import ImuSample
+from dockair.rotations import Array
+
+_FIRST_ROOM = 256  # samples; doubled when needed
+
+
+class Stamps:
+    """Which stamps may be believed.
+
+    Args:
+        leap_s: how far ahead of the newest a stamp may be without a second one.
+    """
+
+    def __init__(self, leap_s: float) -> None:
+        self._leap_s, self.newest_s, self._doubtful_s = leap_s, -np.inf, np.nan
+
+    def believed(self, time_s: float, newest_s: float) -> bool:
+        """Whether a stamp is, where the newest of all that is known is `newest_s` (-inf: nothing)."""
+        near = time_s - newest_s <= self._leap_s or not np.isfinite(newest_s)
+        again = 0.0 < time_s - self._doubtful_s <= self._leap_s
+        if np.isfinite(time_s) and (near or again):
+            self._doubtful_s = np.nan
+            self.newest_s = max(self.newest_s, time_s)
+            return True
+        self._doubtful_s = time_s
+        return False
+
+
+class ImuRecord:
+    """Samples in order.
+
+    Args:
+        mounting: of the IMU.
+        gyro: its sheet.
+        saturated: share of the gyro's range from which on a rate says nothing.
+    """
+
+    def __init__(self, mounting: Mounting, gyro: GyroSheet, saturated: float) -> None:
+        self._R_BI, self._limit_rad_s = mounting.R_BI, saturated * gyro.range_rad_s
+        self._times, self._rates, self._forces = np.empty(_FIRST_ROOM), np.empty((_FIRST_ROOM, 3)), self._none()
+        self._first = self._end = 0
+
+    @staticmethod
+    def _none() -> Array:
+        return np.full((_FIRST_ROOM, 3), np.nan)
+
+    @property
+    def times_s(self) -> Array:
+        """(k,) stamps, increasing."""
+        return self._times[self._first : self._end]
+
+    @property
+    def rates_B(self) -> Array:
+        """(k, 3) of the gyro [rad/s]."""
+        return self._rates[self._first : self._end]
+
+    @property
+    def forces_B(self) -> Array:
+        """(k, 3) of the accelerometers [m/s^2], NaN where there is none."""
+        return self._forces[self._first : self._end]
+
+    @property
+    def newest_s(self) -> float:
+        """Stamp of the newest sample; -inf before the first."""
+        return float(self._times[self._end - 1]) if self._end > self._first else -np.inf
+
+    def take(self, sample: ImuSample) -> bool:
+        """Keep a sample; False if it is not taken."""
+        rate_I = sample.angular_rate_rad_s
+        inside = bool((np.abs(rate_I) < self._limit_rad_s).all())  # false for what is not a number
+        if not (inside and self.newest_s < sample.time_stamp_s < np.inf):
+            return False
+        if self._end == len(self._times):
+            self._make_room()
+        k = self._end
+        self._times[k], self._rates[k] = sample.time_stamp_s, self._R_BI @ rate_I
+        self._forces[k] = self._R_BI @ sample.specific_force_m_s2
+        self._end += 1
+        return True
+
+    def forget(self, time_s: float) -> None:
+        """Drop what is older than a time but for the last sample before it."""
+        last = int(np.searchsorted(self.times_s, time_s, side="right")) - 1
+        self._first += max(last, 0)
+
+    def rate_B(self, time_s: float) -> Array:
+        """(3,) rate [rad/s], linear between samples, that of the nearest one outside, 0 when there is none."""
+        times, rates = self.times_s, self.rates_B
+        if not len(times):
+            return np.zeros(3)
+        k = int(np.searchsorted(times, time_s, side="right"))
+        if k in (0, len(times)):
+            return np.asarray(rates[min(k, len(times) - 1)].copy())
+        share = (time_s - times[k - 1]) / (times[k] - times[k - 1])
+        return np.asarray((1.0 - share) * rates[k - 1] + share * rates[k])
+
+    def mean_rate_B(self, start_s: float, end_s: float) -> Array:
+        """(3,) mean of the samples after `start_s` up to `end_s`; the rate there when there is none."""
+        first, stop = np.searchsorted(self.times_s, (start_s, end_s), side="right")
+        return np.asarray(self.rates_B[first:stop].mean(axis=0)) if stop > first else self.rate_B(end_s)
+
+    def _make_room(self) -> None:
+        kept = self._end - self._first
+        room = max(_FIRST_ROOM, 2 * kept)
+        for name in ("_times", "_rates", "_forces"):
+            old = getattr(self, name)
+            new = np.full((room, *old.shape[1:]), np.nan)
+            new[:kept] = old[self._first : self._end]
+            setattr(self, name, new)
+        self._first, self._end = 0, kept

@@ -1,0 +1,185 @@
+"""Motion of the belief: closed forms, its Jacobian against differences, its noise against the Lyapunov equation."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.linalg import expm
+
+from dockair.nav.belief_motion import BIAS, CALIBRATION, ERRORS, Motion, propagated
+from dockair.rotations import Array, exp, log, skew
+
+OMEGA = 2.0 * np.pi * np.array([0.0, 0.33, 0.40])
+SILENT = Motion(
+    stiffness=OMEGA**2,
+    friction=0.3 * OMEGA,
+    attitude2=0.0,
+    drive2=0.0,
+    receiver2=0.0,
+    accelerometer2=0.0,
+    gyro2=0.0,
+    bias2=0.0,
+    formation2=0.0,
+    scale2=0.0,
+    held_turn2=0.0,
+    held_most2=0.0,
+    longest_gap_s=0.1,
+    longest_step_s=0.01,
+)
+R0 = exp(np.array([0.1, -0.2, 0.3]))
+X0 = np.array(
+    [
+        [9.0, -0.5, 0.8],
+        [0.4, -0.3, 0.2],
+        [0.0, 0.1, -0.2],
+        [0.0, -0.3, 0.25],
+        [0.01, -0.02, 0.03],
+        [0.3, -0.1, -9.7],
+    ]
+)
+ZERO = np.zeros((ERRORS, ERRORS))
+
+
+def samples(w: Array, f: Array, until_s: float, rate_hz: float = 250.0) -> tuple[Array, Array, Array]:
+    times = np.arange(round(until_s * rate_hz) + 1) / rate_hz
+    return times, np.tile(w, (len(times), 1)), np.tile(f, (len(times), 1))
+
+
+def off(x: Array, R: Array, e: Array) -> tuple[Array, Array]:
+    return exp(e[:3]) @ R, x + e[3 : CALIBRATION.start].reshape(6, 3)
+
+
+def difference(a: tuple[Array, Array], b: tuple[Array, Array]) -> Array:
+    return np.concatenate([log(a[0] @ b[0].T), (a[1] - b[1]).ravel(), np.zeros(ERRORS - CALIBRATION.start)])
+
+
+@pytest.mark.parametrize("w", [np.zeros(3), np.array([0.3, -0.2, 0.5])])
+def test_state_follows_its_differential_equation(w):
+    """Integrated by Runge-Kutta in axes that turn, u' = -w x u and the swing's own terms."""
+    f = np.array([0.2, 0.4, 9.5])
+
+    def rate(_: float, y: Array) -> Array:
+        s, v, n, m, b, c = y.reshape(6, 3)
+        a, turn = -SILENT.stiffness * n - SILENT.friction * m, w - b
+        moved = np.array([v, a - f - c, m, a, np.zeros(3), np.zeros(3)])
+        moved[[0, 1, 2, 3, 5]] -= np.cross(turn, np.array([s, v, n, m, c]))
+        return moved.ravel()
+
+    expected = solve_ivp(rate, (0.0, 0.8), X0.ravel(), rtol=1e-10, atol=1e-12).y[:, -1].reshape(6, 3)
+    R, x, _ = propagated(R0, X0, ZERO, 0.0, 0.8, *samples(w, f, 0.8), SILENT)
+    np.testing.assert_allclose(x, expected, atol=2e-4)  # second order in 4 ms
+    np.testing.assert_allclose(R, expm(-skew(w - X0[4]) * 0.8) @ R0, atol=1e-12)
+
+
+def test_a_swing_without_damping_keeps_its_period():
+    """After one period of 1/0.33 s it is where it was; side by side with a receiver that keeps its course."""
+    x = np.zeros((6, 3))
+    x[0, 0], x[2, 1] = 10.0, 0.2
+    calm = SILENT._replace(friction=np.zeros(3))
+    period_s = 1.0 / 0.33
+    _, after, _ = propagated(R0, x, ZERO, 0.0, period_s, *samples(np.zeros(3), np.zeros(3), period_s), calm)
+    assert after[2, 1] == pytest.approx(0.2, abs=2e-4)
+    assert after[0, 1] == pytest.approx(0.0, abs=1e-3)
+
+
+@pytest.mark.parametrize("fitted", [True, False], ids=["accelerometers", "no accelerometers"])
+def test_covariance_moves_by_the_jacobian_of_the_motion(fitted):
+    w, f, step = np.array([0.3, -0.2, 0.5]), np.array([0.2, 0.4, 9.5]) if fitted else np.full(3, np.nan), 1e-6
+    given = samples(w, f, 0.1)
+    after = propagated(R0, X0, ZERO, 0.0, 0.1, *given, SILENT)[:2]
+    F = np.eye(ERRORS)
+    for k in range(CALIBRATION.start):
+        e = step * np.eye(ERRORS)[k]
+        plus, minus = (propagated(*off(X0, R0, s * e), ZERO, 0.0, 0.1, *given, SILENT)[:2] for s in (1.0, -1.0))
+        F[:, k] = (difference(plus, after) - difference(minus, after)) / (2.0 * step)
+    root = np.random.default_rng(1).normal(size=(ERRORS, ERRORS))
+    P = propagated(R0, X0, root @ root.T, 0.0, 0.1, *given, SILENT)[2]
+    np.testing.assert_allclose(P, F @ root @ root.T @ F.T, atol=4e-3 * 32)  # but for a half step of db x f
+    np.testing.assert_array_equal(P, P.T)
+
+
+def test_gyro_noise_enters_as_turning_the_rate_would():
+    step, still = 1e-4, SILENT._replace(stiffness=np.zeros(3), friction=np.zeros(3))
+    G = np.zeros((ERRORS, 3))
+    w, f = np.array([0.3, -0.2, 0.5]), np.full(3, np.nan)
+    after = propagated(R0, X0, ZERO, 0.0, 1e-3, *samples(w, f, 1e-3, 1000.0), still)[:2]
+    for k, e in enumerate(np.eye(3) * step):
+        ends = [propagated(R0, X0, ZERO, 0.0, 1e-3, *samples(w + s * e, f, 1e-3, 1000.0), still)[:2] for s in (1, -1)]
+        G[:, k] = -(difference(ends[0], after) - difference(ends[1], after)) / (2.0 * step * 1e-3)
+    P = propagated(R0, X0, ZERO, 0.0, 1e-3, *samples(w, f, 1e-3, 1000.0), still._replace(gyro2=1e-6))[2]
+    np.testing.assert_allclose(P, 1e-9 * G @ G.T, atol=2e-3 * P.max())
+
+
+def test_noise_of_the_swing_is_that_of_the_lyapunov_equation():
+    """Not turning: P' = A P + P A' + Q by Van Loan's matrix exponential, an axis without and one with swing."""
+    q2, other2, t = 0.05, 0.02, 1.0
+    P = propagated(
+        R0,
+        np.zeros((6, 3)),
+        ZERO,
+        0.0,
+        t,
+        *samples(np.zeros(3), np.zeros(3), t),
+        SILENT._replace(drive2=q2, accelerometer2=other2),
+    )[2]
+    for axis in (0, 2):
+        A = np.zeros((4, 4))
+        A[0, 1] = A[2, 3] = 1.0
+        A[1, 2:] = A[3, 2:] = -SILENT.stiffness[axis], -SILENT.friction[axis]
+        drive = np.array([0.0, 1.0, 0.0, 1.0 if axis else 0.0])
+        Q = q2 * np.outer(drive, drive) + np.diag([0.0, other2, 0.0, 0.0])
+        loan = expm(np.block([[-A, Q], [np.zeros((4, 4)), A.T]]) * t)
+        expected = loan[4:, 4:].T @ loan[:4, 4:]
+        rows = [3 + axis, 6 + axis, 9 + axis, 12 + axis]
+        np.testing.assert_allclose(P[np.ix_(rows, rows)], expected, rtol=0.02, atol=1e-5)
+
+
+def test_walks_grow_with_time():
+    given = samples(np.zeros(3), np.zeros(3), 0.5)
+    moving = SILENT._replace(attitude2=1e-3, bias2=1e-8, formation2=0.04)
+    P = propagated(R0, np.zeros((6, 3)), ZERO, 0.0, 0.5, *given, moving)[2]
+    np.testing.assert_allclose(np.diag(P)[:3], 0.5e-3 + 1e-8 * 0.5**3 / 3.0, rtol=1e-3)
+    np.testing.assert_allclose(np.diag(P)[BIAS], 0.5e-8, rtol=1e-9)
+    np.testing.assert_allclose(np.diag(P)[18:21], 0.02, rtol=1e-9)
+    np.testing.assert_allclose(np.diag(P)[6:9], 0.04 * 0.5**3 / 3.0, rtol=0.02)
+
+
+@pytest.mark.parametrize(("wait_s", "corner"), [(0.1, False), (1.0, True)])
+def test_a_rate_that_is_held_is_as_uncertain_as_a_rate_that_is_missing(wait_s, corner):
+    """After the last sample the angle's variance is A^2 t^4 / 4, and beyond the corner it grows by the ceiling."""
+    turn2, most2 = 0.04, 1.25e-3
+    held = SILENT._replace(held_turn2=turn2, held_most2=most2)
+    given = samples(np.zeros(3), np.full(3, np.nan), 0.1)
+    P = propagated(R0, np.zeros((6, 3)), ZERO, 0.1, 0.1 + wait_s, *given, held)[2]
+    knee = (most2 / turn2) ** (1.0 / 3.0)
+    expected = turn2 * min(wait_s, knee) ** 4 / 4.0 + most2 * max(wait_s - knee, 0.0)
+    assert (wait_s > knee) is corner
+    np.testing.assert_allclose(np.diag(P)[:3], expected, rtol=1e-9)
+
+
+def test_a_gap_between_samples_is_bridged_with_its_own_uncertainty():
+    held = SILENT._replace(held_turn2=0.04, held_most2=1.25e-3)
+    times = np.array([0.0, 0.2])
+    P = propagated(R0, np.zeros((6, 3)), ZERO, 0.0, 0.2, times, np.zeros((2, 3)), np.zeros((2, 3)), held)[2]
+    np.testing.assert_allclose(np.diag(P)[:3], 0.04 * 0.2**4 / 64.0, rtol=1e-9)
+
+
+def test_in_a_gap_the_receiver_s_acceleration_is_not_taken_for_known():
+    """Samples 0.2 s apart with 5 m/s^2 between them: not used, and the velocity's variance is that of a guess."""
+    times, forces = np.array([0.0, 0.2]), np.tile([5.0, 0.0, 0.0], (2, 1))
+    guess = SILENT._replace(receiver2=0.2, accelerometer2=1e-6)
+    _, x, P = propagated(R0, np.zeros((6, 3)), ZERO, 0.0, 0.2, times, np.zeros((2, 3)), forces, guess)
+    np.testing.assert_array_equal(x[1], 0.0)
+    np.testing.assert_allclose(np.diag(P)[6:9], 0.04, rtol=1e-9)
+
+
+def test_many_samples_at_once_are_the_same_one_by_one_to_the_last_bit():
+    rng = np.random.default_rng(3)
+    times = np.arange(41) / 250.0
+    w, f = 0.2 * rng.normal(size=(41, 3)), rng.normal(size=(41, 3))
+    noisy = SILENT._replace(drive2=0.1, gyro2=1e-7, accelerometer2=1e-5, attitude2=1e-4)
+    at_once = propagated(R0, X0, np.eye(ERRORS), 0.0, times[-1], times, w, f, noisy)
+    step = R0, X0, np.eye(ERRORS)
+    for k in range(40):
+        step = propagated(*step, times[k], times[k + 1], times, w, f, noisy)
+    for a, b in zip(at_once, step, strict=True):
+        np.testing.assert_array_equal(a, b)

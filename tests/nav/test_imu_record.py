@@ -1,0 +1,72 @@
+"""Which samples are believed, and the rate between them."""
+
+import numpy as np
+import pytest
+
+from dockair.calibration import GyroSheet, Mounting
+from dockair.messages import ImuSample
+from dockair.nav.imu_record import ImuRecord, Stamps
+
+MOUNTING = Mounting(R_BC=np.eye(3), p_BC=np.zeros(3), p_BP=np.zeros(3))
+GYRO = GyroSheet(rate_hz=100, noise_density_rad_s_rthz=1e-4, bias_sigma_rad_s=1e-3, range_rad_s=4.0)
+
+
+def record() -> ImuRecord:
+    return ImuRecord(MOUNTING, GYRO, 0.999)
+
+
+def sample(time_s: float, rate: float = 0.1) -> ImuSample:
+    return ImuSample(time_stamp_s=time_s, angular_rate_rad_s=np.array([0.0, rate, 0.0]))
+
+
+@pytest.mark.parametrize(
+    ("time_s", "rate"),
+    [(1.0, 0.1), (0.9, 0.1), (np.nan, 0.1), (np.inf, 0.1), (1.1, np.nan), (1.1, 4.0), (1.1, -3.999)],
+    ids=["same stamp", "backwards", "no stamp", "endless", "no rate", "saturated", "a digit below"],
+)
+def test_a_sample_that_says_nothing_is_not_taken(time_s, rate):
+    kept = record()
+    assert kept.take(sample(1.0))
+    assert not kept.take(sample(time_s, rate))
+    assert kept.times_s.tolist() == [1.0]
+
+
+def test_a_rate_just_inside_the_range_is_taken():
+    assert record().take(sample(1.0, 3.99))
+
+
+def test_thousands_of_samples_are_kept_in_order_while_old_ones_are_forgotten():
+    kept = record()
+    for k in range(3000):
+        assert kept.take(sample(0.01 * k, 0.001 * k))
+        kept.forget(0.01 * k - 0.3)
+    assert len(kept.times_s) < 40
+    assert kept.times_s[0] <= 29.691 < kept.times_s[1]  # one before, to interpolate from
+    np.testing.assert_allclose(kept.rates_B[:, 1], 0.1 * kept.times_s)
+    assert kept.rate_B(29.805)[1] == pytest.approx(2.9805)
+
+
+def test_nothing_is_lost_when_nothing_may_be_forgotten():
+    kept = record()
+    assert all(kept.take(sample(0.01 * k, 0.001 * k)) for k in range(1500))
+    np.testing.assert_allclose(kept.times_s, 0.01 * np.arange(1500))
+    np.testing.assert_allclose(kept.rates_B[:, 1], 0.001 * np.arange(1500))
+
+
+def test_mean_rate_is_of_the_samples_in_the_interval_or_else_the_rate_there():
+    kept = record()
+    for k in range(5):
+        kept.take(sample(0.01 * k, float(k % 2)))
+    assert kept.mean_rate_B(0.005, 0.035)[1] == pytest.approx(2.0 / 3.0)
+    assert kept.mean_rate_B(0.011, 0.015)[1] == pytest.approx(0.5)
+    np.testing.assert_array_equal(record().mean_rate_B(0.0, 1.0), np.zeros(3))
+
+
+def test_a_stamp_that_leaps_needs_a_second_one():
+    stamps = Stamps(1.0)
+    assert stamps.believed(5.0, -np.inf)
+    assert not stamps.believed(107.0, 5.0)
+    assert stamps.believed(5.02, 5.0)
+    assert not stamps.believed(107.02, 5.02)
+    assert stamps.believed(107.04, 5.02)
+    assert not stamps.believed(np.nan, 107.04)
