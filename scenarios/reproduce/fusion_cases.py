@@ -44,7 +44,8 @@ class Consistency:
 
     @staticmethod
     def _inside(values: Array, band: tuple[float, float]) -> float:
-        return float(np.mean((values > band[0]) & (values < band[1])))
+        offered = values[np.isfinite(values)]
+        return float(np.mean((offered > band[0]) & (offered < band[1])))
 
     @property
     def nees_inside(self) -> float:
@@ -61,7 +62,8 @@ def consistency(flown: Sequence[Track]) -> Consistency:
     """Return the averages; of the innovations those of frames that were offered."""
     nees = np.mean([track.nees for track in flown], axis=0)[_SETTLED_FRAMES:]
     ratio = np.array([track.nis / np.where(track.freedom > 0, track.freedom, np.nan) for track in flown])
-    nis = np.nanmean(ratio, axis=0)[_SETTLED_FRAMES:]
+    offered = np.isfinite(ratio).sum(axis=0)  # how many approaches had a frame then
+    nis = np.where(offered > 0, np.nansum(ratio, axis=0) / np.maximum(offered, 1), np.nan)[_SETTLED_FRAMES:]
     count = len(flown)
     low, high = chi2.ppf(_BAND, 9 * count) / (9 * count)
     low_nis, high_nis = chi2.ppf(_BAND, 6 * count) / (6 * count)
