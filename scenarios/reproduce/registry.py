@@ -4,106 +4,36 @@ A reproduction is a function of a folder for its picture, or None for no picture
 
     {"id": ..., "source": ..., "rows": [{"case": ..., "ours": {...}, "reference": {...}}]}
 
-with units in the keys; `ours` has every key of `reference`.
+with units in the keys; `ours` has every key of `reference`. A module of this folder is one when it has ID, TITLE and
+`reproduce`, or several when it has REPRODUCTIONS, id -> (title, function); no other list names it.
 """
 
+import pkgutil
 from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 from dockair.errors import DockairError
-from dockair.scenarios.reproduce import (
-    contact_sheet,
-    dop_figures,
-    fusion_consistency,
-    fusion_outages,
-    ground_fig29,
-    heading_flight,
-    heading_oval,
-    heading_pairs,
-    heading_straight,
-    image_contour,
-    image_ellipse,
-    image_frames,
-    image_hough,
-    image_identification,
-    image_kalman,
-    image_labels,
-    image_morphology,
-    image_panels,
-    image_three_point,
-    pose_divergence,
-    pose_efficiency,
-    pose_flips,
-    pose_frontal,
-    pose_integrity,
-    pose_opencv,
-    pose_surface,
-    pose_table3,
-    sensor_band,
-    world_bow_wave,
-    world_contact,
-    world_convergence,
-    world_excursions,
-    world_gusts,
-    world_hose_checks,
-    world_receiver,
-    world_reel,
-    world_static,
-    world_swing,
-    world_velocity_hold,
-    world_wake,
-    world_whip,
-)
+from dockair.scenarios import reproduce as _package
 
 Reproduction = Callable[[Path | None], dict[str, Any]]
 
-_MODULES = (
-    contact_sheet,
-    fusion_consistency,
-    fusion_outages,
-    ground_fig29,
-    heading_flight,
-    heading_oval,
-    heading_straight,
-    image_contour,
-    image_ellipse,
-    image_frames,
-    image_identification,
-    image_kalman,
-    image_labels,
-    image_morphology,
-    image_panels,
-    image_three_point,
-    pose_divergence,
-    pose_efficiency,
-    pose_flips,
-    pose_frontal,
-    pose_integrity,
-    pose_opencv,
-    sensor_band,
-    world_bow_wave,
-    world_contact,
-    world_convergence,
-    world_excursions,
-    world_gusts,
-    world_hose_checks,
-    world_receiver,
-    world_reel,
-    world_static,
-    world_swing,
-    world_velocity_hold,
-    world_wake,
-    world_whip,
-)
-_REPRODUCTIONS: dict[str, tuple[str, Reproduction]] = {
-    **{module.ID: (module.TITLE, module.reproduce) for module in _MODULES},
-    **dop_figures.REPRODUCTIONS,
-    **heading_pairs.REPRODUCTIONS,
-    **image_hough.REPRODUCTIONS,
-    **pose_surface.REPRODUCTIONS,
-    **pose_table3.REPRODUCTIONS,
-}
+
+def _found() -> dict[str, tuple[str, Reproduction]]:
+    """Id -> title and function, of every module beside this one."""
+    found: dict[str, tuple[str, Reproduction]] = {}
+    for name in sorted(info.name for info in pkgutil.iter_modules(_package.__path__)):
+        if name == __name__.rpartition(".")[2]:
+            continue
+        module = import_module(f"{_package.__name__}.{name}")
+        found |= getattr(module, "REPRODUCTIONS", {})
+        if hasattr(module, "ID"):
+            found[module.ID] = module.TITLE, module.reproduce
+    return found
+
+
+_REPRODUCTIONS = _found()
 
 
 def ids() -> tuple[str, ...]:
