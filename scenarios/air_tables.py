@@ -11,24 +11,16 @@
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from dockair.errors import DockairError
 from dockair.scenarios.refusal import Expected
-
-
-def _tuple_from_list(value: Any) -> Any:
-    return tuple(value) if isinstance(value, list) else value
-
+from dockair.scenarios.table import Table, tuple_from_list
 
 _GustSpeed = Annotated[float, Field(ge=-30.0, le=30.0)]
 
 
-class _Table(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
-
-
-class Turbulence(_Table):
+class Turbulence(Table):
     """Gusts. One of `sigma_m_s` and `intensity`; without either the air is still."""
 
     model: Literal["none", "dryden"] = "none"  #: "dryden" as soon as one of the others is given; "none" overrules them
@@ -55,25 +47,25 @@ class Turbulence(_Table):
         return self
 
 
-class SingleGust(_Table):
+class SingleGust(Table):
     """One gust of 1 - cosine shape."""
 
     at_s: float = Field(ge=0.0, le=600.0)  #: when its front meets the drogue
     length_m: float = Field(ge=1.0, le=1000.0)  #: from its front to its peak
     velocity_m_s: Annotated[
         tuple[_GustSpeed, _GustSpeed, _GustSpeed],
-        BeforeValidator(_tuple_from_list),
+        BeforeValidator(tuple_from_list),
         Expected("three numbers from -30 to 30"),
     ]  #: at its peak: forward, left, up
 
 
-class Wake(_Table):
+class Wake(Table):
     """The tanker's wake; sheet `wake`."""
 
     present: bool = True
 
 
-class BowWave(_Table):
+class BowWave(Table):
     """The receiver's bow wave; sheet `bow_wave`."""
 
     present: bool = True
@@ -81,6 +73,6 @@ class BowWave(_Table):
 
 Gusts = Annotated[
     tuple[SingleGust, ...],
-    BeforeValidator(_tuple_from_list),
+    BeforeValidator(tuple_from_list),
     Expected("tables [[gusts]], each with at_s, length_m and velocity_m_s"),
 ]

@@ -26,6 +26,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from dockair.errors import DockairError
 from dockair.scenarios.refusal import Expected
+from dockair.scenarios.table import tuple_from_list
 from dockair.sim.faults import (
     CameraDropOut,
     DeadReel,
@@ -89,10 +90,6 @@ def _has_default(kind: str, name: str) -> bool:
     return next(f.default for f in fields(_CLASSES[kind]) if f.name == name) is not MISSING
 
 
-def _tuple_from_list(value: Any) -> Any:
-    return tuple(value) if isinstance(value, list) else value
-
-
 _Led = Annotated[int, Field(ge=0, le=7)]
 _Step = Annotated[float, Field(ge=-5000.0, le=5000.0)]  # deg/s
 
@@ -106,7 +103,7 @@ class FaultTable(BaseModel):
     start_s: float = Field(default=0.0, ge=0.0)
     stop_s: float | None = Field(default=None, gt=0.0)
     leds: Annotated[
-        tuple[_Led, ...] | None, BeforeValidator(_tuple_from_list), Expected("numbers of LEDs, from 0 to 7")
+        tuple[_Led, ...] | None, BeforeValidator(tuple_from_list), Expected("numbers of LEDs, from 0 to 7")
     ] = None
     factor: float | None = Field(default=None, ge=0.0, le=1.0)
     frequency_hz: float | None = Field(default=None, gt=0.0, le=1e5)
@@ -117,7 +114,7 @@ class FaultTable(BaseModel):
     exposure_us: float | None = Field(default=None, gt=0.0, le=20_000.0)
     rate_deg_s: Annotated[
         tuple[_Step, _Step, _Step] | None,
-        BeforeValidator(_tuple_from_list),
+        BeforeValidator(tuple_from_list),
         Expected("three numbers, each from -5000 to 5000"),
     ] = None
     limit_deg_s: float | None = Field(default=None, gt=0.0, le=5000.0)

@@ -7,7 +7,10 @@ import pytest
 
 from dockair.errors import DockairError
 from dockair.scenarios.scenario_file import scenario_names
-from dockair.scenarios.schema import Accept, Scenario, Start, Sun, load_scenario
+from dockair.scenarios.accept import Accept
+from dockair.scenarios.flight_tables import Start
+from dockair.scenarios.light_tables import Sun
+from dockair.scenarios.schema import Scenario, load_scenario
 
 
 @pytest.fixture

@@ -1,0 +1,32 @@
+"""The tables of a scenario that say who navigates and how the receiver docks."""
+
+from typing import Annotated
+
+from pydantic import Field
+
+from dockair.scenarios.refusal import Expected
+from dockair.scenarios.table import Table
+
+
+class Navigation(Table):
+    """Who navigates: a class with `messages.Navigates`' method, or "truth" for perfect navigation."""
+
+    navigator: Annotated[
+        str,
+        Field(pattern=r"^(truth|[A-Za-z_][\w.]*:[A-Za-z_]\w*)$"),
+        Expected('"truth" or "module:Class"'),
+    ] = "dockair.nav.navigator:Navigator"
+
+    @property
+    def is_truth(self) -> bool:
+        """Whether the truth stands in place of `nav`."""
+        return self.navigator == "truth"
+
+
+class Guidance(Table):
+    """How the receiver docks."""
+
+    closure_speed_m_s: float = Field(default=1.2, ge=0.3, le=2.6)  #: 2.6 m/s (5 kt) is the service limit
+    hold_s: float = Field(default=5.0, ge=0.0, le=300.0)
+    take_in_m: float = Field(default=1.5, ge=0.0, le=6.0)  #: hose pushed in before holding
+    stabilise_s: float = Field(default=3.0, ge=0.0, le=60.0)  #: steady in pre-contact before closing
