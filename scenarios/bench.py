@@ -4,6 +4,8 @@ Speeds are benchmarks, never tests: they belong to the machine that printed them
 """
 
 import functools
+import importlib
+import os
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
@@ -12,6 +14,7 @@ from typing import Any
 from unittest.mock import patch
 
 from dockair.scenarios.schema import Scenario
+from dockair.sim.opengl import kind_of_context
 
 #: Part -> (module, attribute or Class.method). An inner part is named before the outer one that contains it.
 PARTS: dict[str, tuple[str, str]] = {
@@ -114,3 +117,20 @@ def bench(scenario: Scenario, seconds: float = 20.0) -> BenchReport:
         flight.close()
     own = {part: s - sum(spent[inner] for inner in CONTAINS.get(part, ())) for part, s in spent.items()}
     return BenchReport(simulated_s=simulated_s, wall_s=wall_s, frames=frames, seconds_by_part=own, calls_by_part=calls)
+
+
+def bench_stages(subject: str, scenario: Scenario) -> dict[str, Any]:
+    """Return the speeds of one part's stages, {"milliseconds" or "microseconds": {what: time}, "ratios": {...}}.
+
+    Args:
+        subject: "sensors", "image", "pose", "world" or "loop".
+        scenario: whose sensors are measured; the other parts have their own.
+    """
+    os.environ.setdefault("MUJOCO_GL", kind_of_context())  # mujoco.Renderer asks for it at its first import
+    if subject == "sensors":
+        from dockair.scenarios.bench_sensors import bench_sensors
+
+        return bench_sensors(scenario)
+    module = importlib.import_module(f"dockair.scenarios.bench_{subject}")
+    figures: dict[str, Any] = getattr(module, f"bench_{subject}")()
+    return figures

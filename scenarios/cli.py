@@ -11,12 +11,15 @@ import os
 import sys
 from enum import Enum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 import dockair
 from dockair.errors import DockairError
+from dockair.scenarios.allan_command import allan
+from dockair.scenarios.cli_options import Json, ScenarioName, Seed, Settings, overrides, print_json
+from dockair.scenarios.design_ring_command import design_ring
 
 if TYPE_CHECKING:
     from dockair.scenarios.schema import Scenario
@@ -35,16 +38,6 @@ class Record(Enum):
     FULL = "full"
     WINDOW = "window"
     NONE = "none"
-
-
-Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout and nothing else.")]
-ScenarioName = Annotated[str, typer.Argument(metavar="SCENARIO", help="A name in the library or a TOML path.")]
-Settings = Annotated[
-    list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Dotted key and TOML value; may be repeated.")
-]
-Seed = Annotated[
-    int | None, typer.Option(min=0, max=2**63 - 1, help="Seed of every random stream; the scenario's by default.")
-]
 
 
 @app.callback(invoke_without_command=True)
@@ -75,7 +68,7 @@ def fly(
     from dockair.scenarios.output_folder import check_output_folder, default_output_folder
     from dockair.scenarios.schema import load_scenario
 
-    chosen = load_scenario(scenario, _overrides(settings))
+    chosen = load_scenario(scenario, overrides(settings))
     seed = chosen.seed if seed is None else seed
     _require_background(chosen)
     folder = out or default_output_folder(chosen.name, seed)
@@ -88,7 +81,7 @@ def fly(
     offset, speed = (contact.radial_offset_m, contact.closure_speed_m_s) if contact else (None, None)
     shortfalls = chosen.accept.shortfalls(result.outcome, offset, speed)
     if as_json:
-        _print_json(result.to_dict())
+        print_json(result.to_dict())
     else:
         show_result(result.to_dict(), shortfalls if chosen.accept.claims_figures else None, folder)
 
@@ -102,7 +95,7 @@ def scenarios(as_json: Json = False) -> None:
 
     library = [load_scenario(name) for name in scenario_names()]
     if as_json:
-        _print_json({"scenarios": [scenario.model_dump(mode="json") for scenario in library]})
+        print_json({"scenarios": [scenario.model_dump(mode="json") for scenario in library]})
     else:
         show_scenarios(library)
 
@@ -119,7 +112,7 @@ def replay(
         raise DockairError(str(out), expected="the folder of a recorded flight", got="no such folder")
     report = replay_flight(out)
     if as_json:
-        _print_json(json.loads(report.to_json()))
+        print_json(json.loads(report.to_json()))
     else:
         print(report)
     if not report.identical:
@@ -139,7 +132,7 @@ def reproduce(
 
     if wanted is None:
         if as_json:
-            _print_json({"ids": registry.ids()})
+            print_json({"ids": registry.ids()})
         else:
             show_reproductions(registry.titles())
         return
@@ -147,7 +140,7 @@ def reproduce(
     with show_working(f"reproducing {wanted}"):
         table = registry.reproduce(wanted, folder)
     if as_json:
-        _print_json(table)
+        print_json(table)
     else:
         show_reproduction(table, folder / picture_name(wanted))
 
@@ -177,106 +170,30 @@ def bench(
     The parts are the sensors, the image stages and the pose solvers, these two beside OpenCV's, and the world beside a
     bare step of MuJoCo; only flight and sensors depend on the scenario.
     """
+    from dockair.scenarios.bench import bench as bench_scenario
+    from dockair.scenarios.bench import bench_stages
     from dockair.scenarios.output import show_bench, show_stages_bench, show_working
     from dockair.scenarios.schema import load_scenario
 
-    chosen = load_scenario(scenario, _overrides(settings))
+    chosen = load_scenario(scenario, overrides(settings))
     if subject is not BenchSubject.FLIGHT:
         with show_working(f"measuring: {subject.value}"):
-            figures = _stages_bench(subject, chosen)
+            figures = bench_stages(subject.value, chosen)
         if as_json:
-            _print_json(figures)
+            print_json(figures)
         else:
             show_stages_bench(figures)
         return
     _require_background(chosen)
-    from dockair.scenarios.bench import bench as bench_scenario
-
     report = bench_scenario(chosen, seconds)
     if as_json:
-        _print_json(report.to_json())
+        print_json(report.to_json())
     else:
         show_bench(report)
 
 
-def _stages_bench(subject: BenchSubject, scenario: "Scenario") -> dict[str, Any]:
-    if subject is BenchSubject.POSE:
-        from dockair.scenarios.bench_pose import bench_pose
-
-        return bench_pose()
-    if subject is BenchSubject.WORLD:
-        from dockair.scenarios.bench_world import bench_world
-
-        return bench_world()
-    from dockair.sim.opengl import kind_of_context
-
-    os.environ.setdefault("MUJOCO_GL", kind_of_context())  # mujoco.Renderer asks for it at its first import
-    if subject is BenchSubject.IMAGE:
-        from dockair.scenarios.bench_image import bench_image
-
-        return bench_image()
-    from dockair.scenarios.bench_sensors import bench_sensors
-
-    return bench_sensors(scenario)
-
-
-@app.command("design-ring")
-def design_ring(
-    rim: Annotated[str, typer.Option(help="Numbers of LEDs on the rim.")] = "6,8,12",
-    inner: Annotated[str, typer.Option(help="Numbers of LEDs off the rim's plane.")] = "0,1,4",
-    depth: Annotated[str, typer.Option(help="How far ahead of it [m]; behind it when negative.")] = "0.1,0.2",
-    diameter: Annotated[str, typer.Option(help="Diameters of the rim's circle [m].")] = "0.4,0.5,0.6",
-    spacing: Annotated[str, typer.Option(help="equal, coded (one LED off its place), or both.")] = "equal",
-    ranges: Annotated[str, typer.Option(help="Nearest and farthest of the approach [m].")] = "2,30",
-    tilt: Annotated[float, typer.Option(help="Largest tilt of the drogue [deg].")] = 20.0,
-    sigma_px: Annotated[float, typer.Option(help="Standard deviation of a pixel coordinate.")] = 0.1,
-    camera: Annotated[Path | None, typer.Option(help="The camera's calibration, a TOML file.")] = None,
-    by: Annotated[str, typer.Option(help="all (range, lateral, attitude), one of them, or camera.")] = "all",
-    top: Annotated[int, typer.Option(min=1, help="Rings to show.")] = 12,
-    trials: Annotated[int, typer.Option(min=0, max=100_000, help="Noisy frames to solve at each of some nodes.")] = 0,
-    out: Annotated[Path | None, typer.Option(help="Folder for the picture; out/design-ring by default.")] = None,
-    as_json: Json = False,
-) -> None:
-    """Compare rings of LEDs by the bound on the drogue's pose over the approach: a ranking and a picture."""
-    from dockair.scenarios import design_ring_options as options
-    from dockair.scenarios import design_ring_output as design
-    from dockair.scenarios.output import show_working
-
-    rings = options.rings_from_options(rim, inner, depth, diameter, spacing)
-    corridor = options.corridor_from_options(ranges, tilt, sigma_px, camera)
-    folder = design.prepared_folder(out or Path("out") / "design-ring")
-    with show_working(f"comparing {len(rings)} rings"):
-        ranking = options.ranking_from(rings, corridor, by)
-        tried = design.trials_of(ranking, trials)
-    picture = design.draw(ranking, folder)
-    if as_json:
-        _print_json(ranking.to_dict(top) | {"trials": [node.to_dict() for node in tried], "picture": str(picture)})
-    else:
-        design.show_ranking(ranking, top)
-        design.show_trials(tried)
-        print(f"  {picture}")
-
-
-@app.command()
-def allan(
-    record: Annotated[Path, typer.Argument(metavar="RECORD", help="CSV or NPY of a gyro's rates at rest.")],
-    rate_hz: Annotated[float, typer.Option(help="Of the record's samples.")],
-    unit: Annotated[str | None, typer.Option(help="rad/s or deg/s, if the columns' names do not say.")] = None,
-    terms: Annotated[str, typer.Option(help="Which of Q, N, B, K to look for.")] = "QNBK",
-    bias_correlation_s: Annotated[float | None, typer.Option(help="Of the bias, where it is known.")] = None,
-    out: Annotated[Path | None, typer.Option(help="Parameter sheet to write.")] = None,
-    as_json: Json = False,
-) -> None:
-    """Identify a gyro's noise terms by Allan deviation; write them as a parameter sheet."""
-    from dockair.scenarios import allan_tool
-
-    found = allan_tool.report(record, rate_hz, unit, terms=terms, bias_correlation_s=bias_correlation_s)
-    if out is not None:
-        allan_tool.write_sheet(found, out)
-    if as_json:
-        _print_json(found.to_dict())
-    else:
-        print(allan_tool.in_words(found))
+app.command("design-ring")(design_ring)
+app.command()(allan)
 
 
 @app.command()
@@ -287,7 +204,7 @@ def doctor(as_json: Json = False) -> None:
 
     checks = examine(Path("out"))
     if as_json:
-        _print_json(to_json(checks))
+        print_json(to_json(checks))
     else:
         show_checks(checks, package_versions())
     if not is_fit(checks):
@@ -309,20 +226,6 @@ def _require_background(scenario: "Scenario") -> None:
         require_rendering()
     elif scenario.camera.background == "auto" and available_backend() == "analytic":
         print(f"dockair: no OpenGL here ({why_analytic()}): the camera's background is analytic", file=sys.stderr)
-
-
-def _overrides(settings: list[str] | None) -> dict[str, str]:
-    overrides = {}
-    for setting in settings or ():
-        key, equals, value = setting.partition("=")
-        if not equals or not key.strip():
-            raise DockairError("--set", expected="key=value, as in turbulence.sigma_m_s=1.1", got=setting)
-        overrides[key.strip()] = value.strip()
-    return overrides
-
-
-def _print_json(table: Any) -> None:
-    print(json.dumps(table, allow_nan=False))
 
 
 def main() -> None:

@@ -22,11 +22,11 @@ from dataclasses import MISSING, fields
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic import BeforeValidator, Field
 
 from dockair.errors import DockairError
 from dockair.scenarios.refusal import Expected
-from dockair.scenarios.table import tuple_from_list
+from dockair.scenarios.table import Table, tuple_from_list
 from dockair.sim.faults import (
     CameraDropOut,
     DeadReel,
@@ -94,10 +94,8 @@ _Led = Annotated[int, Field(ge=0, le=7)]
 _Step = Annotated[float, Field(ge=-5000.0, le=5000.0)]  # deg/s
 
 
-class FaultTable(BaseModel):
+class FaultTable(Table):
     """One fault. Which of the optional keys it must have, `kind` says."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 
     kind: FaultKind
     start_s: float = Field(default=0.0, ge=0.0)

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from dockair.errors import DockairError
-from dockair.scenarios.scenario_file import scenario_names
 from dockair.scenarios.accept import Accept
 from dockair.scenarios.flight_tables import Start
 from dockair.scenarios.light_tables import Sun
+from dockair.scenarios.scenario_file import scenario_names
 from dockair.scenarios.schema import Scenario, load_scenario
 
 
