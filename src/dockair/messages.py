@@ -88,6 +88,8 @@ class NavSolution:
     frame_time_stamp_s: float  #: stamp of the newest frame used, NaN before the first
     candidates_px: Array  #: (n, 2) centroids of the newest frame, full-frame coordinates
     led_pixels_px: Array  #: (8, 2) where each LED was seen; NaN where it was not
+    contact_usable: bool = True  #: whether contact may be flown on it, as far as the navigation's integrity can tell
+    phase_reason: str = ""  #: why the present phase was entered
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
