@@ -36,6 +36,7 @@ from dockair.sim.camera.sky import Weather
 from dockair.sim.faults import Faults
 from dockair.sim.hose.chain import DrogueParameters, HoseParameters
 from dockair.sim.hose.coupling import CouplingParameters
+from dockair.sim.hose.fuel import FuelParameters
 from dockair.sim.hose.reel import ReelParameters
 from dockair.sim.hose.rest import rest_shape
 from dockair.sim.imu import Imu, ImuParameters
@@ -181,6 +182,7 @@ def _world_parameters(scenario: Scenario, air: Air, mounting: Mounting) -> World
         drogue=_sheet(scenario, "drogue", DrogueParameters),
         reel=_sheet(scenario, "reel", ReelParameters),
         coupling=_sheet(scenario, "coupling", CouplingParameters),
+        fuel=_sheet(scenario, "fuel", FuelParameters),
         tanker=_sheet(scenario, "tanker", TankerParameters),
         mounting=mounting,
         air=air,

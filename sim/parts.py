@@ -13,8 +13,10 @@ from dockair.sim.air.atmosphere import Air
 from dockair.sim.air.motion import AirState
 from dockair.sim.hose.chain import DrogueParameters, HoseParameters
 from dockair.sim.hose.coupling import CouplingParameters
+from dockair.sim.hose.fuel import FuelParameters
 from dockair.sim.hose.reel import ReelParameters
 from dockair.sim.outlines import TankerParameters
+from dockair.sim.scene import SceneParameters
 
 
 class Airframe(Protocol):
@@ -112,6 +114,7 @@ class WorldParameters:
     drogue: DrogueParameters
     reel: ReelParameters
     coupling: CouplingParameters
+    fuel: FuelParameters
     tanker: TankerParameters
     mounting: Mounting
     air: Air
@@ -126,3 +129,21 @@ class WorldStart:
 
     p_PD_B: Array  #: (3,) the drogue's mean ring centre from the probe's tip, body axes of the trimmed receiver [m]
     settle_s: float  #: how long hose and gusts run before
+
+
+def scene_of(parameters: WorldParameters, receiver: Airframe, step_s: float) -> SceneParameters:
+    """Return what of a world is in its scene."""
+    p = parameters
+    return SceneParameters(
+        hose=p.hose,
+        drogue=p.drogue,
+        reel=p.reel,
+        coupling=p.coupling,
+        tanker=p.tanker,
+        mounting=p.mounting,
+        receiver_mass_kg=receiver.mass_kg,
+        receiver_inertia_B=np.asarray(receiver.inertia_B),
+        sun_direction_W=p.sun_direction_W,
+        step_s=step_s,
+        receiver_outline=p.receiver_outline,
+    )

@@ -66,6 +66,8 @@ class Truth:
     throttle: float  #: commanded fraction of the thrust range
     latched: bool  #: the probe is held by the coupling
     coupling_force_n: float  #: pull on the probe by the coupling, 0 when not latched
+    fuel_kg: float = 0.0  #: that has flowed through the coupling
+    fuel_flow_kg_s: float = 0.0
     probe_touches_drogue: bool  #: any contact of the probe with basket or coupling at this tick
     receiver_touches: str  #: name of what the receiver (other than its probe) touches, "" for nothing
 
@@ -92,6 +94,7 @@ class Seen(NamedTuple):
     air: AirState
     flow: tuple[float, float, float, float]  #: receiver's airspeed, angle of attack, sideslip, and its throttle
     latched: bool
+    fuel: tuple[float, float]  #: given, flow
     touches: tuple[bool, str]  #: whether the probe touches the drogue; what the receiver touches
 
 
@@ -148,6 +151,8 @@ _CUT: dict[str, Callable[[Seen], Any]] = {
     "sideslip_rad": lambda seen: seen.flow[2],
     "throttle": lambda seen: seen.flow[3],
     "latched": lambda seen: seen.latched,
+    "fuel_kg": lambda seen: seen.fuel[0],
+    "fuel_flow_kg_s": lambda seen: seen.fuel[1],
     "probe_touches_drogue": lambda seen: seen.touches[0],
     "receiver_touches": lambda seen: seen.touches[1],
 }  # fmt: skip

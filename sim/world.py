@@ -15,7 +15,7 @@ At construction the hose starts from its shape at rest and settles in the gusts,
 receiver waits far behind; then the receiver is put, at rest in W and trimmed in the wake's downwash there, where the
 probe's tip stands to the drogue's *mean* place over the second half of that time as asked.
 
-Not modelled: fuel flow; what hose and receiver do to the tanker.
+Not modelled: what hose and receiver do to the tanker; the mass of the fuel that flows (`hose.fuel`).
 """
 
 import copy
@@ -36,12 +36,13 @@ from dockair.sim.air.atmosphere import STANDARD_GRAVITY_M_S2
 from dockair.sim.air.motion import AirState
 from dockair.sim.aircraft.tanker import TankerPath, TankerPathParameters
 from dockair.sim.hose.coupling import CouplingState, next_coupling_state, probe_in_coupling
-from dockair.sim.hose.reel import Reel
+from dockair.sim.hose.fuel import Fuel
+from dockair.sim.hose.reel import Reel, reel_light
 from dockair.sim.hose.rest import hinge_angles
 from dockair.sim.hose.tow import Tow
 from dockair.sim.led_tanker import LedTanker
-from dockair.sim.parts import AirAround, Airframe, FlyingAirframe, WorldParameters, WorldStart, still_air
-from dockair.sim.scene import SceneParameters, build_scene
+from dockair.sim.parts import AirAround, Airframe, FlyingAirframe, WorldParameters, WorldStart, scene_of, still_air
+from dockair.sim.scene import build_scene
 from dockair.sim.step_limit import check_step
 from dockair.sim.truth import Seen, Truth, observe, truth_of
 
@@ -62,7 +63,7 @@ class WorldState:
     """Everything that a world remembers; opaque."""
 
     engine: Array
-    parts: tuple[Reel, Airframe, AirAround | None]
+    parts: tuple[Reel, Airframe, AirAround | None, Fuel]
     coupling: CouplingState
     truth: Truth
     seen: Array
@@ -101,14 +102,14 @@ class World:
             raise DockairError("start.settle_s", expected="a time >= 0", got=start.settle_s)
         self.parameters, self._receiver, self._air, self._clock = parameters, receiver, air, clock
         self._reel_locked = reel_locked
-        self.model = build_scene(_scene_parameters(parameters, receiver, clock))
+        self.model = build_scene(scene_of(parameters, receiver, clock.step_s))
         self.data = mujoco.MjData(self.model)
         self._at = Addresses.of(self.model)
         self._keep_views(self._at, self.data)
         self._wind_W = np.array([-parameters.airspeed_m_s, 0.0, 0.0])
         p = parameters
         self._tow = Tow(p.hose, p.drogue, p.reel, p.air, self._wind_W, clock.step_s)
-        self._coupling = CouplingState.READY
+        self._coupling, self._fuel = CouplingState.READY, Fuel(p.fuel, clock.step_s)
         exit_T = np.array(p.tanker.exit_m, dtype=float)
         path = tanker_path or TankerPath(TankerPathParameters(), p.airspeed_m_s, -exit_T)
         self._tanker = LedTanker(path, self.model, self.data, self._at, exit_T, clock.step_s)
@@ -144,7 +145,7 @@ class World:
         mujoco.mj_getState(self.model, self.data, engine, _STATE)
         return WorldState(
             engine=engine,
-            parts=copy.deepcopy((self._tow.reel, self._receiver, self._air)),
+            parts=copy.deepcopy((self._tow.reel, self._receiver, self._air, self._fuel)),
             coupling=self._coupling,
             truth=self.truth,
             seen=self._seen,
@@ -155,7 +156,7 @@ class World:
         """Go back to a saved state; what follows is the same to the bit."""
         mujoco.mj_setState(self.model, self.data, state.engine, _STATE)
         mujoco.mj_step1(self.model, self.data)
-        self._tow.reel, self._receiver, self._air = copy.deepcopy(state.parts)
+        self._tow.reel, self._receiver, self._air, self._fuel = copy.deepcopy(state.parts)
         self._coupling, self.truth, self._seen, self._air_state = state.coupling, state.truth, state.seen, state.air
         now, self._tick = self.truth, state.truth.tick
         self._R_WB, self._tensions = now.R_WB, (now.root_tension_n, now.drogue_tension_n, now.coupling_force_n)
@@ -220,6 +221,9 @@ class World:
         self._tanker.set_out(time_s)
         self._solve(time_s, self._at.tow.start + self._tow.link_at_exit(position))
         self._decide_coupling()
+        if self._coupling is CouplingState.LATCHED or self._fuel.flow_kg_s > 0.0:
+            light = reel_light(position, locked, self.parameters.reel)
+            self._fuel.step(light, self._coupling is CouplingState.LATCHED)
         if self._air is not None:
             self._air.step()
         self._tanker.arrive()
@@ -263,7 +267,8 @@ class World:
         own, self._air_state = self._receiver, air
         flow = own.airspeed_m_s, own.angle_of_attack_rad, own.sideslip_rad, own.throttle
         latched, time_s = self._coupling is CouplingState.LATCHED, self._clock.seconds(tick)
-        self.truth = truth_of(Seen(tick, time_s, x, hose, tanker.state, self._tensions, air, flow, latched, touches))
+        fuel, seen = (self._fuel.given_kg, self._fuel.flow_kg_s), (tick, time_s, x, hose, tanker.state)
+        self.truth = truth_of(Seen(*seen, self._tensions, air, flow, latched, fuel, touches))
 
 
 @njit(cache=True)
@@ -278,20 +283,3 @@ def _solved(cfrc_int, xmat, qacc, at_exit, drogue, limit):  # type: ignore[no-un
         size = np.sqrt(f[3] * f[3] + f[4] * f[4] + f[5] * f[5])
         tensions[i] = np.copysign(size, f[3] * R[0] + f[4] * R[3] + f[5] * R[6])
     return tensions[0], tensions[1], converged
-
-
-def _scene_parameters(parameters: WorldParameters, receiver: Airframe, clock: Clock) -> SceneParameters:
-    p = parameters
-    return SceneParameters(
-        hose=p.hose,
-        drogue=p.drogue,
-        reel=p.reel,
-        coupling=p.coupling,
-        tanker=p.tanker,
-        mounting=p.mounting,
-        receiver_mass_kg=receiver.mass_kg,
-        receiver_inertia_B=np.asarray(receiver.inertia_B),
-        sun_direction_W=p.sun_direction_W,
-        step_s=clock.step_s,
-        receiver_outline=p.receiver_outline,
-    )

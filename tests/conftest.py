@@ -17,6 +17,7 @@ from dockair.sim.air.motion import AirMotion
 from dockair.sim.aircraft.tanker import TankerPath, TankerPathParameters
 from dockair.sim.hose.chain import DrogueParameters, HoseParameters
 from dockair.sim.hose.coupling import CouplingParameters
+from dockair.sim.hose.fuel import FuelParameters
 from dockair.sim.hose.reel import ReelParameters
 from dockair.sim.outlines import TankerParameters
 from dockair.sim.world import World, WorldParameters, WorldStart
@@ -26,6 +27,7 @@ SHEETS: dict[str, type[Any]] = {
     "drogue": DrogueParameters,
     "reel": ReelParameters,
     "coupling": CouplingParameters,
+    "fuel": FuelParameters,
     "tanker": TankerParameters,
 }
 

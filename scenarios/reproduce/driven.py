@@ -22,6 +22,7 @@ from dockair.rotations import Array, exp
 from dockair.sim.air.atmosphere import STANDARD_GRAVITY_M_S2, standard_atmosphere
 from dockair.sim.hose.chain import DrogueParameters, HoseParameters
 from dockair.sim.hose.coupling import CouplingParameters
+from dockair.sim.hose.fuel import FuelParameters
 from dockair.sim.hose.reel import ReelParameters
 from dockair.sim.outlines import TankerParameters
 from dockair.sim.world import World, WorldParameters, WorldStart
@@ -83,6 +84,7 @@ def driven_world(
         drogue=sheet("drogue", DrogueParameters),
         reel=sheet("reel", ReelParameters),
         coupling=sheet("coupling", CouplingParameters),
+        fuel=sheet("fuel", FuelParameters),
         tanker=sheet("tanker", TankerParameters),
         mounting=Mounting(R_BC=np.eye(3), p_BC=camera, p_BP=probe),
         air=standard_atmosphere(ALTITUDE_M),

@@ -94,6 +94,8 @@ def test_every_number_of_a_solution_reaches_its_row(hand_made):
         "frame_time_stamp_s": 8.0,
         "candidates_px": solution.candidates_px[:-1],
         "led_pixels_px": np.full((8, 2), np.nan),
+        "contact_usable": False,
+        "phase_reason": "steady",
     }
     assert set(changes) == {f.name for f in fields(NavSolution)}
     before = estimate_row(solution)
