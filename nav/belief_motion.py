@@ -11,7 +11,7 @@ W = diag(0, W_left, W_up): along the hose nothing pulls the drogue back, and n, 
 specific force, so that f + c is the receiver's acceleration beyond the formation's, which the belief need not guess;
 their bias is part of c, from which it cannot be told. In body axes every vector turns with E = exp(-[w x] dt). Errors
 
-    e = (phi, ds, dv, dn, dm, db, dc, calibration),   R_true = exp(phi) R,   dw = -db - noise             (3)
+    e = (phi, ds, dv, dn, dm, db, dc, calibration, ring),   R_true = exp(phi) R,   dw = -db - noise             (3)
 
 so that a turn that the gyro did not measure enters phi with +1 and each vector u with -[u x]. One step is Eq. (2) to
 second order in dt, then E; the steps are at most `longest_step_s`.
@@ -36,10 +36,10 @@ from dockair.rotations import Array
 
 PHI, PLACE, VELOCITY = slice(0, 3), slice(3, 6), slice(6, 9)
 SWING, SWING_RATE, BIAS, FORMATION = slice(9, 12), slice(12, 15), slice(15, 18), slice(18, 21)
-CALIBRATION = slice(21, 32)
-ERRORS = 32  #: how many errors a belief has
+CALIBRATION, RING, HARDWARE = slice(21, 28), slice(28, 44), slice(21, 44)
+ERRORS = 44  #: how many errors a belief has
 S, V, N, M, B, C = range(6)  #: rows of the state (6, 3)
-_MOVING = 21  # errors that move; the calibration's do not
+_MOVING = 21  # errors that move; those of calibration and ring do not
 
 
 class Motion(NamedTuple):
@@ -161,7 +161,7 @@ def propagated(
     Args:
         R: (3, 3) R_BD.
         x: (6, 3) s, v, n, m, b, c.
-        P: (32, 32) covariance of the errors.
+        P: (44, 44) covariance of the errors.
         t0: time of the belief.
         t1: time wanted.
         times: (k,) stamps of the samples, increasing.

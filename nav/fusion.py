@@ -7,12 +7,12 @@ drogue from the accelerometers, r = p_IP, and the rate w = w_WB_B of the moment:
     p_PD = s - r,   v_PD = v - w x r,   d/dt p_PD (in body axes) = v - w x s                          (1)
 
 A frame is taken at its capture time: the belief is rolled back to the stamp, corrected, and everything newer is run
-again, in whatever order frames arrive. The gate is the frame's likelihood ratio against the prediction, chi-square
-with 6 degrees of freedom, or 2 n with n < 3 LEDs. Several refusals in a row are taken for a drogue that was struck or
-let go: the belief is widened before the next frame.
+again, in whatever order frames arrive. The gate is what frame and belief cost together, chi-square with two degrees of
+freedom an LED (six for a pose alone). Several refusals in a row are taken for a drogue that was struck or let go: the
+belief is widened before the next frame.
 
 Not modelled: contact (the drogue moves with the probe then, and white acceleration has to follow), a formation that
-turns or speeds up but by the walk of c, hidden LEDs in the ring's errors.
+turns or speeds up but by the walk of c.
 """
 
 from bisect import bisect_right
@@ -26,8 +26,9 @@ from dockair.calibration import NavigationSheets
 from dockair.errors import DockairError
 from dockair.messages import ImuSample
 from dockair.nav import belief_motion as motion
-from dockair.nav.belief import Belief, Correction, Sight, corrected, felt_first, mixture, rolled, widened
+from dockair.nav.belief import Correction, corrected, felt_first, mixture, rolled, widened
 from dockair.nav.belief_motion import Motion, propagated
+from dockair.nav.belief_sight import Belief, Sight
 from dockair.nav.fusion_settings import FusionSettings as FusionSettings
 from dockair.nav.fusion_settings import motion_of, start_of, taking_of
 from dockair.nav.imu_record import ImuRecord, Stamps
@@ -76,7 +77,7 @@ class RelativeFilter:
         self._sheets = sheets
         self._sight = Sight(mounting=sheets.mounting, points_D=sheets.ring.positions_D)
         probability = self._settings.gate_probability
-        self._gates = [0.0, *(float(chi2.ppf(probability, freedom)) for freedom in range(1, 7))]
+        self._gates = [0.0, *(float(chi2.ppf(probability, freedom)) for freedom in range(1, 17))]
         self._taking = taking_of(self._settings)
         self._motion: Motion = motion_of(self._settings, sheets.gyro)
         self._start = [start_of(self._settings, sheets)]
@@ -141,7 +142,8 @@ class RelativeFilter:
 
     def turn_drogue(self, roll_rad: float, time_s: float) -> None:
         """Begin afresh at a time with the drogue rolled about its axis: its LEDs had been numbered wrongly."""
-        beliefs = [rolled(belief, roll_rad) for belief in self._beliefs(time_s)]
+        led2 = self._settings.led_place_sigma_m**2
+        beliefs = [rolled(belief, roll_rad, led2) for belief in self._beliefs(time_s)]
         self._nodes, self._head = [_Node(time_s, None, beliefs)], None
         self._renew_head()
 
@@ -185,17 +187,7 @@ class RelativeFilter:
             (count, 2) pixels, NaN behind the camera; (count,) standard deviation of each in its worst direction [px],
             from the belief alone: without the centroid's noise, the lens's distortion neglected.
         """
-        R_CD, p_CD, covariance = self.predicted_pose(time_s)
-        camera = self._sheets.camera
-        a = self._sheets.ring.positions_D @ R_CD.T
-        pixels = camera.pixels_from_points(a + p_CD)
-        sigma = np.full(len(a), np.nan)
-        for i in np.flatnonzero(np.isfinite(pixels).all(axis=1)):
-            x, y, z = a[i] + p_CD
-            G = camera.focal_length_px / x * np.array([[y / x, -1.0, 0.0], [z / x, 0.0, -1.0]])
-            H = G @ np.hstack([-skew(a[i]), np.eye(3)])
-            sigma[i] = np.sqrt(np.linalg.eigvalsh(H @ covariance @ H.T)[-1])
-        return pixels, sigma
+        return self._sight.led_pixels(mixture(self._beliefs(time_s)), self._sheets.camera)
 
     def _rate_variance(self, time_s: float) -> float:
         """Of the averaged rate, each axis, by what may have changed since the samples' middle.

@@ -6,8 +6,9 @@ import numpy as np
 
 from dockair.calibration import GyroSheet, NavigationSheets
 from dockair.errors import DockairError
-from dockair.nav.belief import Belief, Taking
+from dockair.nav.belief import Taking
 from dockair.nav.belief_motion import Motion
+from dockair.nav.belief_sight import Belief
 from dockair.rotations import Array
 
 
@@ -64,7 +65,7 @@ class FusionSettings:
     camera_axes_sigma_rad: float = 9.4e-4
     camera_place_sigma_m: float = 2e-3
     camera_scale_sigma: float = 7.8e-4
-    led_place_sigma_m: float = 3e-4  # each LED; the ring's strain and keystone follow, and its share of the scale
+    led_place_sigma_m: float = 3e-4  # each LED, in the ring's plane
     rate_average_s: float = (
         0.01  # gyro samples averaged for Eq. (1) of `fusion`: noise against lag, 5 samples at 500 Hz
     )
@@ -117,7 +118,7 @@ def start_of(settings: FusionSettings, sheets: NavigationSheets) -> Belief:
             swing_rate2,
             np.full(3, gyro.bias_sigma_rad_s**2),
             np.full(3, settings.start_formation_sigma_m_s2**2 + gyro.accelerometer_bias_sigma_m_s2**2),
-            _calibration_variances(settings, sheets.ring.positions_D),
+            _hardware_variances(settings, len(sheets.ring.positions_D)),
         ]
     )
     P = np.diag(variances)
@@ -127,21 +128,13 @@ def start_of(settings: FusionSettings, sheets: NavigationSheets) -> Belief:
     return Belief(np.array(start.R_BD, dtype=float), x, P)
 
 
-def _calibration_variances(settings: FusionSettings, points_D: Array) -> Array:
-    """(11,) of camera axes, camera place, scale, strain and keystone of the ring.
-
-    Of LEDs that are each out of place by sigma, least squares finds a scale and a strain of variance sigma^2 over the
-    sum of r^2, and a keystone of 2 sigma^2 over that of r^4, in whatever direction the ring is even.
-    """
-    radius2 = (points_D**2).sum(axis=1)
-    led2 = settings.led_place_sigma_m**2
-    strain2 = led2 / radius2.sum()
+def _hardware_variances(settings: FusionSettings, leds: int) -> Array:
+    """(23,) of camera axes, camera place, scale, and of each LED's place."""
     return np.concatenate(
         [
             np.full(3, settings.camera_axes_sigma_rad**2),
             np.full(3, settings.camera_place_sigma_m**2),
-            [settings.camera_scale_sigma**2 + strain2],
-            np.full(2, strain2),
-            np.full(2, 2.0 * led2 / (radius2**2).sum()),
+            [settings.camera_scale_sigma**2],
+            np.full(2 * leds, settings.led_place_sigma_m**2),
         ]
     )

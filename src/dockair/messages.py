@@ -4,6 +4,7 @@
 |-----------------|------------|---------------------|-----------------|-------|
 | CameraFrame     | sim/camera | nav                 | camera rate     | C     |
 | ImuSample       | sim/imu    | nav                 | gyro rate       | I     |
+| LedObservation  | nav, or a model of it | nav      | camera rate     | C     |
 | ReceiverCommand | nav        | sim flight control  | control rate    | B     |
 | NavSolution     | nav        | loop, log, gymnasium| control rate    | B, C  |
 | TankerAnnouncement | sim tanker | nav, if it listens | before a change |    |
@@ -55,6 +56,16 @@ class ImuSample:
     angular_rate_rad_s: Array  #: (3,) w_WI_I, as measured
     specific_force_m_s2: Array = field(default_factory=lambda: np.full(3, np.nan))
     #: (3,) acceleration of I less gravity, I axes, as measured; NaN where no accelerometers are fitted
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class LedObservation:
+    """Named LEDs of one frame: what finding the ring makes of pixels, or a model of the camera draws without any."""
+
+    time_stamp_s: float  #: of the frame
+    led_numbers: NDArray[np.int64]  #: (n,) which LED of the sheet's ring each is; n may be 0
+    centroids_px: Array  #: (n, 2) full-frame coordinates
+    sigma_px: Array  #: (n,) standard deviation of each coordinate
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -110,5 +121,8 @@ class Navigates(Protocol):
     """
 
     def step(self, imu: Sequence[ImuSample], frame: CameraFrame | None) -> NavSolution:
-        """Take what arrived since the last control tick; return what is believed and commanded now."""
+        """Take what arrived since the last control tick; return what is believed and commanded now.
+
+        One whose scenario senses by measurements gets a `LedObservation` in place of the frame.
+        """
         ...

@@ -257,8 +257,8 @@ def test_a_code_that_contradicts_a_tracked_ring_puts_its_numbers_right_within_se
     """The belief and the track are misled by hand, two places on."""
     sky = Sky(render, still, ring=UNEVEN)
     sky.run(0.4)
-    sky.navigator._turn_belief(np.pi / 2, sky.navigator._frame_time_s)
-    sky.navigator._tracker._kalman.x[3] += np.pi / 2
+    sky.navigator._filter.turn_drogue(np.pi / 2, sky.navigator._finder._frame_time_s)
+    sky.navigator._finder._tracker._kalman.x[3] += np.pi / 2
     statuses = [sky.step().status for _ in range(14)]
     assert "ring ambiguous" in statuses and statuses[-1] == "pose used"
     assert names_are_true(sky, sky.run(0.1))
@@ -270,7 +270,7 @@ def test_a_turned_belief_keeps_its_place_and_what_the_gyro_said_since_the_frame(
     imu = tuple(ImuSample(time_stamp_s=k / 500.0, angular_rate_rad_s=w_B) for k in range(1, 41))
     navigator.step(imu, None)
     before = navigator._filter.state()
-    navigator._turn_belief(np.pi / 2, 0.04)
+    navigator._filter.turn_drogue(np.pi / 2, 0.04)
     after = navigator._filter.state()
     np.testing.assert_allclose(after.R_BD, before.R_BD @ exp(np.array([np.pi / 2, 0.0, 0.0])), atol=2e-3)
     np.testing.assert_allclose(after.p_PD_B, before.p_PD_B, atol=5e-3)
@@ -294,8 +294,8 @@ def test_a_window_that_does_not_show_where_the_belief_has_the_ring_is_given_up(r
     """The track is led astray by hand: without this rule it would be given five frames."""
     sky = Sky(render, still)
     sky.run(0.4)
-    sky.navigator._tracker._kalman.x[0] -= 700.0
-    sky.window = sky.navigator._window()
+    sky.navigator._finder._tracker._kalman.x[0] -= 700.0
+    sky.window = sky.navigator._finder.window(sky.navigator._time_s)
     windows = [sky.step().window for _ in range(6)]
     assert None in windows
     assert sky.run(0.1).status == "pose used"
@@ -308,7 +308,7 @@ def test_the_turn_of_the_camera_is_the_gyro_s_in_the_camera_s_axes(axis):
     w_B[axis] = 0.1
     times = np.arange(1, 20) / 500.0
     navigator.step(tuple(ImuSample(time_stamp_s=float(t), angular_rate_rad_s=w_B) for t in times), None)
-    turn_C, interval_s = navigator._turn_C(0.01, 0.03)
+    turn_C, interval_s = navigator._finder._turn_C(0.01, 0.03)
     assert interval_s == pytest.approx(0.02)
     R_BC = nav_sheets.mounting.R_BC
     np.testing.assert_allclose(R_BC @ exp(turn_C) @ R_BC.T, exp(0.02 * w_B), atol=1e-9)
