@@ -51,9 +51,10 @@ class Rates(Table):
 
 
 class Tanker(Table):
-    """What the tanker flies; how fast it rolls and pulls over, and what it announces, sheet `tanker_path` says."""
+    """What the tanker flies, and which hose is out; how fast it rolls, and what it announces, sheet `tanker_path` says."""
 
     manoeuvre: Literal["straight", "racetrack", "toboggan"] = "straight"
+    pod: Literal["centreline", "left_wing", "right_wing"] = "centreline"  #: the refuelling unit whose hose is out
     starts_s: float = Field(default=2.0, ge=0.0, le=600.0)  #: when the first turn, or the descent, begins
     turns: Literal["left", "right"] = "left"
     bank_deg: float = Field(default=25.0, gt=0.0, le=45.0)

@@ -9,7 +9,8 @@ middle of the wing's root (tanker). `yaw_rad` turns it about z, then `pitch_rad`
 Left out: control surfaces, undercarriage. Within a few decimetres these are where the skins are.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from dockair.errors import DockairError
 from dockair.rotations import Array, matrix_from_yaw_pitch_roll, quaternion_from_matrix
 
 Point = tuple[float, float, float]
+Pod = Literal["centreline", "left_wing", "right_wing"]  #: the unit whose hose is out
 
 NOSE_BEHIND_TIP_M = 1.2  #: where the nose ends, behind the probe's tip: the boom must clear the basket
 
@@ -31,9 +33,23 @@ class TankerParameters:
     length_m: float
     fuselage_radius_m: float
     exit_m: Array  #: (3,) the hose's exit in T
+    wing_exit_m: Array  #: (3,) the same of a unit under the left wing; under the right one it is the mirror image
     pod_length_m: float
     pod_radius_m: float
     reflectance: float
+
+    def at_pod(self, pod: Pod) -> "TankerParameters":
+        """The same tanker with its hose at another unit.
+
+        Raises:
+            DockairError: no such unit.
+        """
+        if pod not in get_args(Pod):
+            raise DockairError("tanker.pod", expected="a refuelling unit", got=pod, exists=list(get_args(Pod)))
+        if pod == "centreline":
+            return self
+        side = np.array([1.0, 1.0 if pod == "left_wing" else -1.0, 1.0])
+        return replace(self, exit_m=self.wing_exit_m * side)
 
 
 @dataclass(frozen=True, slots=True)

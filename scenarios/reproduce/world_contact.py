@@ -29,7 +29,7 @@ from dockair.sim.hose.coupling import CouplingParameters
 ID = "world/contact"
 TITLE = "capture, rim strike or miss against offset, direction, speed and angle of the probe"
 _SOURCE = "closed form (1) for the miss"
-_SPEEDS_M_S = (0.6, 1.2, 1.5, 1.8, 2.4)
+_SPEEDS_M_S = (0.6, 1.2, 1.8, 2.4, 2.6)  # the last is the limit of the service procedures
 _OFFSETS_M = tuple(float(offset) for offset in np.arange(8) * 0.05)
 _DIRECTIONS_DEG = {"below": -90.0, "below and aside": -45.0, "aside": 0.0, "above and aside": 45.0, "above": 90.0}
 _NOSE_DOWN_DEG = (-10.0, -5.0, 5.0, 10.0)

@@ -152,7 +152,7 @@ class NearInfraredCamera:
         window = self._checked(window)
         fault = self._faults.camera(time_s)
         if fault.dropped:
-            transfer_jitter_s(self._sheets.sensor, self._noise.transfer)  # so that later frames take what they took
+            self.transfer_jitter_s()  # so that later frames take what they took
             return None
         if fault.stuck and self._last is not None:
             return replace(self._last, time_stamp_s=time_s)
@@ -175,6 +175,11 @@ class NearInfraredCamera:
         return self._last
 
     @property
+    def full_window(self) -> Window:
+        """The whole sensor."""
+        return self._as_built.camera.full_window
+
+    @property
     def background(self) -> str:
         """Which background is in use: "mujoco" or "analytic"."""
         return self._background.backend
@@ -184,10 +189,20 @@ class NearInfraredCamera:
         stuck_at = None if fault is None else fault.exposure_s
         return self._control.exposure_s if stuck_at is None else stuck_at
 
-    def latency_s(self, frame: CameraFrame) -> float:
-        """Draw the time [s] from the frame's stamp until it has arrived."""
-        sensor = self._sheets.sensor
-        return latency_s(frame.window, sensor, frame.exposure_s) + transfer_jitter_s(sensor, self._noise.transfer)
+    def latency_s(self, frame: CameraFrame, jitter_s: float | None = None) -> float:
+        """Time [s] from the frame's stamp until it has arrived; its jitter is drawn unless it has been."""
+        jitter_s = self.transfer_jitter_s() if jitter_s is None else jitter_s
+        return latency_s(frame.window, self._sheets.sensor, frame.exposure_s) + jitter_s
+
+    def least_latency_s(self, window: Window | None) -> float:
+        """Time [s], jitter apart, before which the next frame will not arrive, whatever its exposure and faults."""
+        if self._faults.any:  # it may be an older one again, of a smaller window
+            return latency_s(Window(0, 0, 0, 0), self._sheets.sensor, 0.0)
+        return latency_s(window or self.full_window, self._sheets.sensor, self._sheets.exposure.shortest_s)
+
+    def transfer_jitter_s(self) -> float:
+        """Draw what the next frame's transfer takes beyond its mean [s]."""
+        return transfer_jitter_s(self._sheets.sensor, self._noise.transfer)
 
     def reset(self) -> None:
         """Forget the frames so far: the exposure is the first one again."""

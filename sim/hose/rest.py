@@ -1,4 +1,4 @@
-"""Hose and drogue at rest in a steady stream: their shape and the tension along them.
+"""Hose and drogue at rest in steady air: their shape and the tension along them.
 
 Each rigid link is in balance about its front joint under the pull F of what hangs at its rear end, its weight w and
 its air load a(t), both acting at its middle:
@@ -37,16 +37,25 @@ class RestShape:
     root_tension_n: float
     drogue_tension_n: float
 
+    def p_WD(self, drogue: DrogueParameters) -> Array:
+        """(3,) centre of the LED ring [m]."""
+        return np.asarray(self.p_WH[-1] - drogue.hose_joint_x_m * self.t_D_W)
+
+    def air_places_W(self, drogue: DrogueParameters) -> Array:
+        """(links + 1, 3) where the air acts: the links' middles and the drogue's canopy [m]."""
+        canopy = self.p_WD(drogue) + drogue.drag_centre_x_m * self.t_D_W
+        return np.vstack([0.5 * (self.p_WH[:-1] + self.p_WH[1:]), canopy])
+
 
 def rest_shape(
     hose: HoseParameters, drogue: DrogueParameters, wind_W: Array, density_kg_m3: float, viscosity_m2_s: float
 ) -> RestShape:
-    """Shape at rest in a steady uniform stream, Eqs. (1) and (2).
+    """Shape at rest in a steady stream, Eqs. (1) and (2).
 
     Args:
         hose: the hose's sheet.
         drogue: the drogue's sheet.
-        wind_W: (3,) velocity of the air in W [m/s].
+        wind_W: velocity of the air in W [m/s], (3,) where it is uniform, or (links + 1, 3) at each link and the drogue.
         density_kg_m3: of the air.
         viscosity_m2_s: kinematic viscosity of the air.
     """
@@ -55,18 +64,20 @@ def rest_shape(
     weight = drogue.mass_kg * gravity
     mass_arm = drogue.hose_joint_x_m - drogue.centre_of_mass_x_m
     drag_arm = drogue.hose_joint_x_m - drogue.drag_centre_x_m
-    t_D = _unit(-wind_W) if wind_W.any() else _unit(-gravity)
+    winds = np.ascontiguousarray(np.broadcast_to(wind_W, (hose.links + 1, 3)))
+    at_drogue = winds[-1]
+    t_D = _unit(-at_drogue) if at_drogue.any() else _unit(-gravity)
     for _ in range(_FIXED_POINT_ITERATIONS):
-        force = drogue_force(t_D, wind_W, coefficients)
+        force = drogue_force(t_D, at_drogue, coefficients)
         t_D = _unit(-(mass_arm * weight + drag_arm * force))  # Eq. (2)
 
-    pull = drogue_force(t_D, wind_W, coefficients) + weight
+    pull = drogue_force(t_D, at_drogue, coefficients) + weight
     drogue_tension = float(np.linalg.norm(pull))
     directions = np.empty((hose.links, 3))
     for i in reversed(range(hose.links)):
         t = _unit(-pull)
         for _ in range(_FIXED_POINT_ITERATIONS):
-            load = hose.link_mass_kg * gravity + hose.link_length_m * hose_load_per_length(t, wind_W, coefficients)
+            load = hose.link_mass_kg * gravity + hose.link_length_m * hose_load_per_length(t, winds[i], coefficients)
             t = _unit(-(pull + 0.5 * load))  # Eq. (1)
         directions[i] = t
         pull = pull + load

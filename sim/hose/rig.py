@@ -142,6 +142,26 @@ class HoseRig:
         force = self.data.cfrc_int[[self._root, self._tow.stop - 1], 3:]
         return float(np.linalg.norm(force[0])), float(np.linalg.norm(force[1]))
 
+    def air_powers_w(self) -> tuple[float, float]:
+        """Power of the wind now [W]: of its loads on a chain at rest in this shape, and of the rest of them.
+
+        Raises:
+            RuntimeError: no air.
+        """
+        if self._loads is None:
+            raise RuntimeError("a rig without air has no power of it")
+        model, data = self.model, self.data
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        mujoco.mj_comVel(model, data)
+        place, spatial, R = data.xipos[self._tow], data.cvel[self._tow], data.xmat[self._tow].reshape(-1, 3, 3)
+        v, w = velocities_at(place, spatial, data.subtree_com[self._tree]), np.ascontiguousarray(spatial[:, :3])
+        air = np.tile(self._wind_W, (self._bodies, 1))
+        rates = np.hstack([v, w])
+        loads = tow_loads(place, R, v, w, air, 0.0, self._loads)
+        at_rest = tow_loads(place, R, np.zeros_like(v), np.zeros_like(w), air, 0.0, self._loads)
+        return float(np.sum(at_rest * rates)), float(np.sum((loads - at_rest) * rates))
+
     def energy_j(self) -> float:
         """Kinetic energy of hose and drogue, and potential energy of their weight and bending."""
         model, data = self.model, self.data

@@ -18,6 +18,12 @@ def test_tip_anywhere_in_the_bore_at_the_coupling_point_is_near_enough_to_latch(
     assert 0.0 < COUPLING.socket_radius_m - COUPLING.probe_tip_radius_m < COUPLING.capture_distance_m
 
 
+def test_tip_anywhere_at_the_bottom_of_the_bore_is_near_enough_to_latch():
+    """A nozzle that rests there in line is held: one that came in at an angle gets there before the drogue is in line."""
+    aside = COUPLING.socket_radius_m - COUPLING.probe_tip_radius_m
+    assert np.hypot(aside, COUPLING.stop_gap_m) < COUPLING.capture_distance_m
+
+
 def test_coupling_point_lies_in_the_bore_behind_the_throat_and_before_the_hose():
     assert DROGUE.rim_x_m < DROGUE.throat_x_m < COUPLING.depth_m
     assert COUPLING.depth_m + COUPLING.stop_gap_m < DROGUE.hose_joint_x_m

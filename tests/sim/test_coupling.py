@@ -71,6 +71,15 @@ def test_basket_leads_a_probe_that_comes_in_beside_the_centre_to_the_coupling(ma
     np.testing.assert_allclose(truth.p_DP, [COUPLING.depth_m, 0.0, 0.0], atol=0.005)
 
 
+@pytest.mark.parametrize("direction_deg", np.arange(0.0, 360.0, 45.0))
+def test_basket_leads_a_fast_probe_to_the_coupling_from_any_side(make_world, receiver_on_rails, direction_deg):
+    """Just under the limit of the closing speed: the blow turns the drogue, and it is taken once it is in line again."""
+    angle = np.radians(direction_deg)
+    aside = {"y": 0.15 * float(np.cos(angle)), "z": 0.15 * float(np.sin(angle))}
+    _, truth, touched = _fly_in(make_world, receiver_on_rails, speed=2.5, **aside)
+    assert touched and truth.latched
+
+
 @pytest.mark.parametrize(("y", "z"), [(0.3, 0.0), (-0.3, 0.0), (0.0, 0.3), (0.0, -0.3)])
 def test_probe_at_the_rim_strikes_it_and_does_not_latch(make_world, receiver_on_rails, y, z):
     _, truth, touched = _fly_in(make_world, receiver_on_rails, y=y, z=z)

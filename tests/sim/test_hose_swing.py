@@ -8,6 +8,7 @@ import pytest
 from scipy.optimize import brentq
 from scipy.special import j0, j1, y0, y1
 
+from dockair.messages import ReceiverCommand
 from dockair.parameters import load_parameters
 from dockair.sim.air.atmosphere import standard_atmosphere
 from dockair.sim.hose.chain import DrogueParameters, HoseParameters
@@ -116,3 +117,23 @@ def test_more_drag_on_the_drogue_shortens_the_swing_and_more_damping_of_the_hose
     assert first(drogue=replace(DROGUE, drag_coefficient=1.0)).period_s < 0.99 * first().period_s
     damped = replace(HOSE, bending_damping_n_m2_s=50.0)
     assert first(hose=damped).damping_ratio > first().damping_ratio
+
+
+def _heights(make_world, locked):
+    """Hose's end over its rest through two swings, let go 2.6 m up in the first vertical mode."""
+    linear = LinearSwing(HOSE, DROGUE, np.array([-150.0, 0.0, 0.0]), standard_atmosphere(6096.0), "vertical")
+    world = make_world(
+        airspeed_m_s=150.0, altitude_m=6096.0, p_PD_B=(60.0, 0.0, 0.0), reel_locked=lambda time_s: locked
+    )
+    world.data.qpos[world._at.hinges] = hinge_angles(linear.directions(linear.modes()[0], 2.6, 0.0)).ravel()
+    truths = [world.step(ReceiverCommand()) for _ in range(4000)]
+    height = np.array([truth.p_WH[-1, 2] for truth in truths]) - world.rest.p_WH[-1, 2]
+    return height, np.array([truth.reel_position_m for truth in truths])
+
+
+def test_a_large_vertical_swing_decays_alike_on_a_working_reel_and_on_a_locked_one(make_world):
+    """The reel rests on its stop, which the swing's tension hardly moves: it neither damps nor feeds the swing."""
+    (working, moved), (held, _) = (_heights(make_world, locked) for locked in (False, True))
+    assert np.ptp(held) > 2.5
+    assert 0.0 < np.ptp(moved) < 0.02
+    np.testing.assert_allclose(working, held, atol=0.01 * np.ptp(held))

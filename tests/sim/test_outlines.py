@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from dockair.calibration import Mounting
+from dockair.errors import DockairError
 from dockair.parameters import load_parameters
 from dockair.rotations import matrix_from_quaternion
 from dockair.sim.outlines import Piece, TankerParameters, receiver_pieces, tanker_pieces
@@ -44,3 +45,17 @@ def test_pod_ends_where_the_hose_comes_out_and_the_nose_behind_the_probes_tip() 
     np.testing.assert_allclose(np.array(pod.to) - [pod.size[0], 0.0, 0.0], TANKER.exit_m, atol=1e-12)
     foremost = max(p.at[0] + p.size[0] for p in OUTLINES["receiver"] if p.name.startswith("fuselage"))
     assert foremost == pytest.approx(MOUNTING.p_BP[0] - 1.2)
+
+
+def test_the_right_pods_exit_mirrors_the_left_ones_and_the_centreline_stays() -> None:
+    left, right = TANKER.at_pod("left_wing"), TANKER.at_pod("right_wing")
+    np.testing.assert_array_equal(right.exit_m, left.exit_m * [1.0, -1.0, 1.0])
+    assert left.exit_m[1] > 0.5 * TANKER.fuselage_radius_m + 3.0  # clear of the fuselage
+    assert TANKER.at_pod("centreline") is TANKER
+    pods = {pod: named(tanker_pieces(TANKER.at_pod(pod)), "pod").at[1] for pod in ("left_wing", "right_wing")}
+    assert pods == {"left_wing": left.exit_m[1], "right_wing": right.exit_m[1]}
+
+
+def test_an_unknown_pod_is_refused() -> None:
+    with pytest.raises(DockairError, match="tanker.pod"):
+        TANKER.at_pod("middle")  # type: ignore[arg-type]

@@ -8,6 +8,7 @@ import pytest
 from dockair.parameters import load_parameters
 from dockair.rotations import exp
 from dockair.sim.hose.chain import DrogueParameters, HoseParameters
+from dockair.sim.hose.loads import drogue_force, hose_load_per_length, load_coefficients
 from dockair.sim.hose.rest import hinge_angles, rest_shape
 
 
@@ -47,3 +48,25 @@ def test_drogue_with_lift_balances_about_the_hoses_end_and_pulls_with_its_whole_
     assert rest.drogue_tension_n == pytest.approx(np.linalg.norm(force + weight), rel=1e-12)
     neutral = rest_shape(hose, replace(drogue, canopy_side_coefficient=0.5), wind, rho, 1.863e-5)
     assert np.sign(rest.p_WH[-1, 2] - neutral.p_WH[-1, 2]) == np.sign(ratio - 1.0)
+
+
+def test_in_air_that_differs_along_the_hose_every_link_is_in_balance_in_its_own():
+    """Side wind that grows toward the drogue: no moment about any front joint, and the root carries all loads."""
+    hose, drogue = load_parameters("hose", HoseParameters), load_parameters("drogue", DrogueParameters)
+    rho, nu = 0.66, 2.4e-5
+    winds = np.tile([-150.0, 0.0, -3.0], (hose.links + 1, 1))
+    winds[:, 1] = np.linspace(0.0, 8.0, hose.links + 1)
+    rest, k = rest_shape(hose, drogue, winds, rho, nu), load_coefficients(hose, drogue, rho, nu)
+    pull = drogue_force(rest.t_D_W, winds[-1], k) + [0.0, 0.0, -9.80665 * drogue.mass_kg]
+    assert np.linalg.norm(pull) == pytest.approx(rest.drogue_tension_n, rel=1e-12)
+    for i in reversed(range(hose.links)):
+        load = hose.link_length_m * hose_load_per_length(rest.t_W[i], winds[i], k)
+        load[2] -= 9.80665 * hose.link_mass_kg
+        np.testing.assert_allclose(np.cross(rest.t_W[i], pull + 0.5 * load), 0.0, atol=1e-6)
+        pull = pull + load
+    assert rest.root_tension_n == pytest.approx(np.linalg.norm(pull), rel=1e-12)
+    assert rest.p_WH[-1, 1] > 0.1
+    uniform = [
+        rest_shape(hose, drogue, wind, rho, nu).p_WH for wind in (winds[0], np.tile(winds[0], (hose.links + 1, 1)))
+    ]
+    assert np.array_equal(*uniform)

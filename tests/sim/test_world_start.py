@@ -18,6 +18,7 @@ from dockair.sim.aircraft.receiver import Receiver
 from dockair.sim.aircraft.trim import level_trim
 from dockair.sim.hose.chain import DrogueParameters, HoseParameters
 from dockair.sim.hose.coupling import CouplingParameters
+from dockair.sim.hose.fuel import FuelParameters
 from dockair.sim.hose.reel import ReelParameters
 from dockair.sim.outlines import TankerParameters
 from dockair.sim.world import World, WorldParameters, WorldStart
@@ -58,6 +59,7 @@ def world(wake: bool) -> World:
         drogue=load_parameters("drogue", DrogueParameters),
         reel=load_parameters("reel", ReelParameters),
         coupling=load_parameters("coupling", CouplingParameters),
+        fuel=load_parameters("fuel", FuelParameters),
         tanker=TANKER,
         mounting=MOUNTING,
         air=AIR,
