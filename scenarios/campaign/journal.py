@@ -1,0 +1,111 @@
+"""What is done, a line of JSON a flight, on the disk before the next is counted; a campaign that was killed reads it.
+
+A line that was being written when the power went is the last one and not whole: it is cut off, and its flight is flown
+again. A line that could not be written (no room) is cut off likewise. One process writes at a time.
+"""
+
+import errno
+import fcntl
+import json
+import os
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+from dockair.errors import DockairError, MachineError
+
+FILE_NAME = "journal.jsonl"
+_NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+
+Entry = dict[str, Any]  #: key, row, wall_time_s, traceback
+
+
+class Journal:
+    """The journal of a folder, open for one campaign; use it in a `with` statement.
+
+    Args:
+        folder: that holds it, or will.
+
+    Raises:
+        DockairError: another process writes it; a line other than the last is no entry; it cannot be opened.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.path = folder / FILE_NAME
+        try:
+            self._file = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
+        except OSError as error:
+            raise DockairError(str(self.path), expected="a file that can be written", got=error.strerror) from None
+        try:
+            self._lock()
+            self.entries, self._size = read(self.path)
+            os.ftruncate(self._file, self._size)
+        except BaseException:
+            os.close(self._file)
+            raise
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        os.close(self._file)
+
+    def append(self, entry: Entry) -> None:
+        """Write an entry; when this returns, it outlives a power cut.
+
+        Raises:
+            MachineError: there is no room; what was there is as it was.
+        """
+        line = (json.dumps(entry, allow_nan=False) + "\n").encode()
+        try:
+            written = 0
+            while written < len(line):
+                written += os.write(self._file, line[written:])
+            os.fsync(self._file)
+        except OSError as error:
+            os.ftruncate(self._file, self._size)
+            if error.errno not in _NO_ROOM:
+                raise
+            remedy = f"make some and give the same command again, {len(self.entries)} flights are kept"
+            raise MachineError(str(self.path), expected="room to write", remedy=remedy) from None
+        self._size += len(line)
+        self.entries[entry["key"]] = entry
+
+    def clear(self) -> None:
+        """Forget everything."""
+        os.ftruncate(self._file, 0)
+        self.entries, self._size = {}, 0
+
+    def _lock(self) -> None:
+        try:
+            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)  # goes with the process, however that ends
+        except OSError:
+            expected = "a folder in which no campaign is running"
+            raise DockairError(str(self.path.parent), expected=expected, got="another process at work") from None
+
+
+def read(path: Path) -> tuple[dict[str, Entry], int]:
+    """Return the entries by key, later ones in place of earlier, and how many bytes they take.
+
+    Raises:
+        DockairError: a line other than the last is no entry.
+    """
+    entries: dict[str, Entry] = {}
+    size, lines = 0, path.read_bytes().splitlines(keepends=True)
+    for number, line in enumerate(lines, start=1):
+        entry = _entry(line)
+        if entry is None and number < len(lines):
+            raise DockairError(f"{path}:{number}", expected="an entry of a campaign", got=line[:40])
+        if entry is not None:
+            entries[entry["key"]] = entry
+            size += len(line)
+    return entries, size
+
+
+def _entry(line: bytes) -> Entry | None:
+    try:
+        entry = json.loads(line)
+    except ValueError:
+        return None
+    whole = line.endswith(b"\n") and isinstance(entry, dict) and {"key", "row"} <= entry.keys()
+    return entry if whole else None

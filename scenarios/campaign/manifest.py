@@ -1,0 +1,176 @@
+"""What a campaign was: its plan, its code, the machine; and whether what is asked now is still the same campaign.
+
+Rows of two codes are rows of two campaigns. A plan may grow (more seeds, more scenarios) as long as every flight that
+is done is still part of it.
+"""
+
+import json
+import os
+import platform
+import subprocess
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from hashlib import blake2b
+from pathlib import Path
+from typing import Any
+
+import dockair
+from dockair.errors import DockairError
+from dockair.scenarios.campaign.jobs import Job
+from dockair.scenarios.campaign.plan import Plan
+from dockair.scenarios.campaign.row import sensing_of
+from dockair.scenarios.campaign.whole_file import write_whole
+from dockair.scenarios.metrics import versions
+
+FILE_NAME = "manifest.json"
+SCHEMA_VERSION = 1
+
+#: Beginnings of names in `scenarios` whose files show, compare or plan flights and do not fly them; library and plans
+#: are in the jobs' keys.
+_NOT_FLOWN = tuple(
+    "allan bench campaign cli design_ring doctor library output parameters_page picture plans recording replay report "
+    "reproduce statistics".split()
+)
+_SAME = ("code", "versions", "background")
+
+
+def manifest_of(plan: Plan, jobs: Sequence[Job], flight: str) -> dict[str, Any]:
+    """Return the manifest of a campaign that begins now.
+
+    Args:
+        plan: as flown, the command line's changes included.
+        jobs: of the plan.
+        flight: name of the function that flies a job.
+    """
+    commit, changed = commit_of_the_code()
+    asked = plan.model_dump(mode="json", exclude_unset=True)
+    for table in (asked, *asked["scenarios"]):
+        if table.get("seeds") is not None:
+            table["seeds"] = _in_runs(table["seeds"])
+    return {
+        "schema_version": SCHEMA_VERSION,
+        "plan": asked,
+        "flights": len(jobs),
+        "seeds": _in_runs(sorted({job.seed for job in jobs})),
+        "scenarios": _hashes(jobs),
+        "flight": flight,
+        "background": _background(jobs),
+        "code": code_digest(),
+        "commit": commit,
+        "uncommitted_changes": changed,
+        "versions": versions(),
+        "machine": f"{platform.machine()}, {platform.system()} {platform.release()}, {os.cpu_count()} cores",
+        "begun": datetime.now(UTC).isoformat(timespec="seconds"),
+    }
+
+
+def require_same(earlier: dict[str, Any], now: dict[str, Any], done: set[str], jobs: Sequence[Job], where: str) -> None:
+    """Refuse to go on with a campaign that has become another one.
+
+    Args:
+        earlier: manifest in the folder.
+        now: manifest of what is asked.
+        done: keys of the flights that are done.
+        jobs: that are asked.
+        where: the folder, as its user would write it.
+
+    Raises:
+        DockairError: code, versions or background have changed, or flights are no longer part of the plan.
+    """
+    expected = "the campaign that was begun there (--fresh begins it anew, another --out keeps both)"
+    for name in _SAME:
+        if earlier.get(name) != now[name] and (name != "background" or earlier["background"] and now["background"]):
+            raise DockairError(where, expected=expected, got=_difference(name, earlier, now))
+    strangers = len(done - {job.key for job in jobs})
+    if strangers:
+        got = f"another plan: {strangers} of {len(done)} flights that are done are not part of it"
+        raise DockairError(where, expected=expected, got=got)
+
+
+def _difference(name: str, earlier: dict[str, Any], now: dict[str, Any]) -> str:
+    if name == "code":
+        return f"another code (of commit {earlier.get('commit')}, {earlier.get('begun')})"
+    return f"other {name}: {earlier.get(name)}, now {now[name]}"
+
+
+def write_json(table: Any, path: Path) -> None:
+    """Write a file whole or not at all."""
+    write_whole(path, (json.dumps(table, indent=1, allow_nan=False) + "\n").encode())
+
+
+def read_manifest(folder: Path) -> dict[str, Any]:
+    """Return a folder's manifest.
+
+    Raises:
+        DockairError: there is none, or it cannot be read.
+    """
+    path = folder / FILE_NAME
+    try:
+        table: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise DockairError(str(path), expected="the manifest of a campaign", got=error.strerror) from None
+    except ValueError as error:
+        raise DockairError(str(path), expected="the manifest of a campaign", got=str(error)) from None
+    return table
+
+
+def code_digest() -> str:
+    """Return a digest of every file that decides a flight: world, sensors, navigation, loop, parameters."""
+    package = Path(dockair.__file__).parent
+    digest = blake2b(digest_size=8)
+    for folder in (package, *(package / name for name in ("sim", "nav", "scenarios", "assets"))):
+        for path in sorted(folder.glob("*.py") if folder == package else folder.rglob("*")):
+            name = path.relative_to(folder).as_posix()
+            shown = folder.name == "scenarios" and name.startswith(_NOT_FLOWN)
+            if path.is_file() and path.suffix not in (".pyc", ".nbi", ".nbc", ".md") and not shown:
+                digest.update(f"{folder.name}/{name}".encode() + path.read_bytes())
+    return digest.hexdigest()
+
+
+def commit_of_the_code() -> tuple[str | None, bool | None]:
+    """Return the commit that the package was loaded from and whether files differ from it; None outside git."""
+    folder = Path(dockair.__file__).resolve().parent
+
+    def git(*arguments: str) -> str:
+        command = ["git", "-C", str(folder), *arguments]
+        return subprocess.run(command, capture_output=True, text=True, check=True, timeout=60).stdout.strip()
+
+    try:
+        git("ls-files", "--error-unmatch", "__init__.py")  # somebody else's repository may hold our .venv
+        return git("rev-parse", "HEAD"), bool(git("status", "--porcelain", ":/"))
+    except (OSError, subprocess.SubprocessError):
+        return None, None
+
+
+def _background(jobs: Sequence[Job]) -> str:
+    """Return who draws here what the camera sees where a scenario leaves that to the machine; "" if none does.
+
+    Raises:
+        MachineError: a scenario asks for MuJoCo's drawing, and there is no off-screen OpenGL.
+    """
+    from dockair.scenarios.doctor import require_rendering
+    from dockair.sim.opengl import available_backend
+
+    wanted = {job.scenario.camera.background for job in jobs if sensing_of(job.scenario) == "camera"}
+    if "mujoco" in wanted:
+        require_rendering()
+    return available_backend() if "auto" in wanted else ""
+
+
+def _hashes(jobs: Sequence[Job]) -> dict[str, Any]:
+    """Return each scenario's digest, or how many there are where keys are drawn."""
+    found: dict[str, set[str]] = {}
+    for job in jobs:
+        found.setdefault(job.scenario.name, set()).add(job.scenario_hash)
+    return {name: sorted(digests) if len(digests) < 10 else f"{len(digests)} draws" for name, digests in found.items()}
+
+
+def _in_runs(seeds: Sequence[int]) -> list[int | str]:
+    """Return whole numbers in order with runs as "first-last": 0-59 instead of sixty numbers."""
+    runs: list[list[int]] = []
+    for seed in seeds:
+        if runs and seed == runs[-1][-1] + 1:
+            runs[-1] = [runs[-1][0], seed]
+        else:
+            runs.append([seed])
+    return [run[0] if len(run) == 1 else f"{run[0]}-{run[1]}" for run in runs]

@@ -1,0 +1,133 @@
+"""Finds and reads a plan's TOML, lays what the command line says over it, and refuses what cannot be flown."""
+
+import os
+import tomllib
+from collections.abc import Mapping
+from importlib.resources import files
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import ValidationError
+
+from dockair.errors import DockairError
+from dockair.scenarios.campaign.draws import Draw
+from dockair.scenarios.campaign.plan import Plan, RatesAsked
+from dockair.scenarios.refusal import refusal
+from dockair.scenarios.scenario_file import scenario_names
+from dockair.scenarios.table import Table
+
+_T = TypeVar("_T", bound=Table)
+
+
+def plan_names() -> list[str]:
+    """Names of the packaged plans."""
+    return sorted(_packaged())
+
+
+class PlanFile:
+    """A plan and where it was found.
+
+    Args:
+        name_or_path: a name among the packaged plans, or the path of a TOML file.
+        changes: keys of the plan instead of the file's, from the command line.
+        settings: dotted key -> value over every other, from the command line's `--set`; texts are read as TOML.
+
+    Attributes:
+        plan: checked.
+        folder: that holds the file; paths in it begin there.
+        settings: what `--set` says, as values.
+
+    Raises:
+        DockairError: no such plan; not TOML; unknown key, wrong type or value out of range.
+    """
+
+    def __init__(
+        self,
+        name_or_path: str | Path,
+        changes: Mapping[str, object] | None = None,
+        settings: Mapping[str, str] | None = None,
+    ) -> None:
+        path = _find(name_or_path)
+        self.folder = path.parent
+        self._shown = path.name if path.parent == _packaged_folder() else str(path)
+        self.settings = {key: _value(text) for key, text in (settings or {}).items()}
+        table = _read(path)
+        if isinstance(table.get("scenarios"), list):
+            table["scenarios"] = _expanded(table["scenarios"], own_seeds="seeds" not in (changes or {}))
+        self.plan = self._checked(Plan, table | dict(changes or {}), "")
+        self._check_draws()
+        self._check_gate()
+
+    def place(self, key: str) -> str:
+        """Return where a key of the plan was written."""
+        return f"{self._shown}: {key}"
+
+    def _check_draws(self) -> None:
+        plan = self.plan
+        for key, table in plan.draw.items():
+            self._checked(Draw, table, f'draw."{key}"').check(self.place(f'draw."{key}"'))
+            if key in self.settings:
+                raise DockairError(f"--set {key}", expected="a key that the plan does not draw", got=key)
+        if plan.draws is not None and (not plan.draw or plan.sampler == "grid"):
+            expected = "keys to draw at random or by Latin hypercube, or no number of draws"
+            raise DockairError(self.place("draws"), expected=expected, got=plan.draws)
+
+    def _check_gate(self) -> None:
+        for name, table in self.plan.gate.scenarios.items():
+            self._checked(RatesAsked, table, f"gate.scenarios.{name}")
+
+    def _checked(self, model: type[_T], table: Any, owner: str) -> _T:
+        if not isinstance(table, dict):
+            raise DockairError(self.place(owner), expected="a table", got=table)
+        try:
+            return model.model_validate(table)
+        except ValidationError as error:
+            raise refusal(error, model, lambda key: self.place(".".join(filter(None, (owner, key))))) from None
+
+
+def _expanded(entries: list[Any], *, own_seeds: bool) -> list[Any]:
+    """Return the entries with "*" as every scenario of the library; without seeds of their own where all get others."""
+    found: list[Any] = []
+    for entry in entries:
+        table = entry if isinstance(entry, dict) else {"scenario": entry}
+        kept = table if own_seeds else {key: value for key, value in table.items() if key != "seeds"}
+        names = scenario_names() if table.get("scenario") == "*" else [table.get("scenario")]
+        found += [kept | {"scenario": name} for name in names] if "scenario" in table else [entry]
+    return found
+
+
+def _packaged_folder() -> Path:
+    return Path(str(files("dockair.scenarios"))) / "plans"
+
+
+def _packaged() -> dict[str, Path]:
+    return {path.stem: path for path in _packaged_folder().glob("*.toml")}
+
+
+def _find(name_or_path: str | Path) -> Path:
+    path = Path(name_or_path)
+    if isinstance(name_or_path, str) and path.suffix.lower() != ".toml" and os.sep not in name_or_path:
+        if name_or_path not in _packaged():
+            expected = "a packaged plan, or the path of a TOML file"
+            raise DockairError("plan", expected=expected, got=name_or_path, exists=plan_names())
+        return _packaged()[name_or_path]
+    if not path.exists():
+        raise DockairError(str(path), expected="a plan file", got="no such file")
+    return path
+
+
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise DockairError(str(path), expected="TOML", got=str(error)) from None
+    except OSError as error:
+        raise DockairError(str(path), expected="a file that can be read", got=error.strerror) from None
+
+
+def _value(text: str) -> object:
+    try:
+        table = tomllib.loads(f"value = {text}")
+    except tomllib.TOMLDecodeError:
+        return text  # a shell has eaten the quotes, or a name that needs none
+    return table["value"] if len(table) == 1 else text

@@ -1,0 +1,157 @@
+"""What people see of a campaign: how much is done, how fast, how often it docked so far; then a table."""
+
+import time
+from collections.abc import Mapping
+from types import TracebackType
+from typing import Any, Self
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+from rich.table import Table
+
+from dockair.scenarios.campaign.jobs import Job
+from dockair.scenarios.campaign.row import sensing_of
+from dockair.scenarios.statistics import wilson_interval
+
+_LINE_INTERVAL_S = 30.0  # between two lines where stderr is no terminal
+_FILE_WIDTH = 140  # of tables where stdout is none
+
+Row = Mapping[str, Any]
+
+
+class CampaignProgress:
+    """Bars on a terminal, one for each scenario and sensing; else a line every half minute.
+
+    Args:
+        console: where to; stderr by default.
+    """
+
+    def __init__(self, console: Console | None = None) -> None:
+        self._console = console or Console(stderr=True, highlight=False)
+        columns = (
+            TextColumn("{task.description}"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TextColumn("{task.fields[said]}"),
+        )
+        self._bars = Progress(*columns, console=self._console, transient=True)
+        self._tasks: dict[tuple[str, str], Any] = {}
+        self._counts: dict[tuple[str, str], list[int]] = {}  # successes, done
+        self._total = self._earlier = self._now = self._errors = 0
+        self._begun_s = self._next_s = time.monotonic()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        if self._console.is_terminal:
+            self._bars.stop()
+        done = self._earlier + self._now
+        if kind is KeyboardInterrupt:
+            self._console.print(f"{done} of {self._total} flights are done and kept; the same command goes on")
+
+    def begin(self, jobs: list[Job], entries: dict[str, Any]) -> "CampaignProgress":
+        """Take the jobs, and the journal's entries of those that are done."""
+        self._total = len(jobs)
+        for job in jobs:
+            key = (job.scenario.name, sensing_of(job.scenario))
+            if key not in self._tasks:
+                self._counts[key] = [0, 0]
+                self._tasks[key] = self._bars.add_task(f"{key[0]} ({key[1]})", total=0, said="")
+            task = self._bars.tasks[list(self._tasks).index(key)]
+            task.total = (task.total or 0) + 1
+            if job.key in entries:
+                self._earlier += 1
+                self._count(entries[job.key]["row"])
+        if self._earlier:
+            self._console.print(f"{self._earlier} of {self._total} flights were done before")
+        self._overall = self._bars.add_task("all", total=self._total, completed=self._earlier, said="")
+        if self._console.is_terminal:
+            self._bars.start()
+        self._begun_s = time.monotonic()
+        self._next_s = self._begun_s + _LINE_INTERVAL_S
+        return self
+
+    def __call__(self, row: Row | None, wall_time_s: float) -> None:
+        """Take note of a flight that is done, or of the time."""
+        if row is not None:
+            self._now += 1
+            self._count(row)
+            if row["error"]:
+                self._console.print(f"{row['scenario']}, seed {row['seed']}: {row['error']}", soft_wrap=True)
+        said = self._pace()
+        self._bars.update(self._overall, completed=self._earlier + self._now, said=said)
+        if not self._console.is_terminal and time.monotonic() >= self._next_s:
+            self._next_s = time.monotonic() + _LINE_INTERVAL_S
+            done = self._earlier + self._now
+            self._console.print(f"{done} of {self._total} flights, {said}; {self._rates()}", soft_wrap=True)
+
+    def _count(self, row: Row) -> None:
+        key = (row["scenario"], row["sensing"])
+        counts = self._counts[key]
+        counts[0] += bool(row["success"])
+        counts[1] += 1
+        self._errors += bool(row["error"])
+        self._bars.update(self._tasks[key], completed=counts[1], said=docked(*counts))
+
+    def _pace(self) -> str:
+        elapsed_s = time.monotonic() - self._begun_s
+        if not self._now:
+            return "none done yet"
+        left_s = (self._total - self._earlier - self._now) * elapsed_s / self._now
+        errors = f", {self._errors} errors" if self._errors else ""
+        return f"{60.0 * self._now / elapsed_s:.1f} a minute, {_in_words(left_s)} left{errors}"
+
+    def _rates(self) -> str:
+        return "; ".join(f"{key[0]} ({key[1]}) {docked(*counts)}" for key, counts in self._counts.items() if counts[1])
+
+
+def docked(successes: int, flights: int) -> str:
+    """Return "9 of 10 docked (60-98 %)", the interval being Wilson's."""
+    low, high = wilson_interval(successes, flights)
+    return f"{successes} of {flights} docked ({100 * low:.0f}-{100 * high:.0f} %)"
+
+
+def show_campaign(table: Mapping[str, Any]) -> None:
+    """Print what `dockair campaign --json` would."""
+    console = Console(highlight=False)
+    if not console.is_terminal:
+        console.width = _FILE_WIDTH
+    shown = Table(box=None, padding=(0, 1))
+    for heading in ("scenario", "sensing", "first attempt", "success", "offset", "closing", "unsafe", "errors"):
+        shown.add_column(heading, no_wrap=True)
+    for group in table["groups"]:
+        offset, speed = group["radial_offset_m"], group["closure_speed_m_s"]
+        shown.add_row(
+            *(group["scenario"], group["sensing"]),
+            *(_share(group[name], group["flights"]) for name in ("first_attempt", "success")),
+            f"{offset['median']:.3f} m" if offset else "",
+            f"{speed['min']:.2f}-{speed['max']:.2f} m/s" if speed else "",
+            *(str(group[name]) if group[name] else "" for name in ("unsafe", "errors")),
+        )
+    console.print(shown)
+    for group in table["groups"]:
+        for shortfall in group["shortfalls"] or ():
+            where = f"{group['scenario']} ({group['sensing']})"
+            console.print(f"not as claimed: {where}: {shortfall}", style="yellow", soft_wrap=True)
+    _show_gate(console, table["gate"])
+    console.print(f"  {table['folder']}", soft_wrap=True)
+
+
+def _show_gate(console: Console, gate: Mapping[str, Any] | None) -> None:
+    if gate is None:
+        return
+    if gate["passed"]:
+        console.print("gate passed", style="green")
+    for reason in gate["reasons"]:
+        console.print(f"gate failed: {reason}", style="red", soft_wrap=True)
+
+
+def _share(share: Mapping[str, Any], flights: int) -> str:
+    return f"{share['count']}/{flights} ({100 * share['low']:.0f}-{100 * share['high']:.0f} %)"
+
+
+def _in_words(seconds: float) -> str:
+    minutes, seconds = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours} h {minutes} min" if hours else f"{minutes} min {seconds} s" if minutes else f"{seconds} s"

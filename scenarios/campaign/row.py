@@ -1,0 +1,80 @@
+"""A flight as one row: what was asked, what came of it, how good the navigation was; empty where there is nothing.
+
+A flight that could not be flown to its end is a row too: outcome "error", `error` says why, and it is no success.
+"""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import fields
+from typing import Any
+
+from dockair.scenarios.campaign.jobs import Job
+from dockair.scenarios.campaign.worker import Answer
+from dockair.scenarios.metrics import NavigationFigures, Result
+from dockair.scenarios.schema import Scenario
+
+Row = dict[str, Any]
+
+ERROR = "error"  #: the outcome of a flight that could not be flown to its end
+SET = "set."  #: begins the column of a key that the plan draws
+
+_ASKED = ("scenario", "seed", "sensing", "navigator", "controller")
+_CONTACT = {"contact_time_s": "time_s"} | {k: k for k in ("radial_offset_m", "closure_speed_m_s", "angle_deg")}
+#: Fields of the result that are lists of objects: JSON in the table.
+_LISTS = tuple(f.name for f in fields(Result) if f.name in ("attempt_log", "nav_by_range", "timeline"))
+
+#: Column -> "text", "bool", "int" or "float", in the table's order; the drawn keys' columns come after the first five.
+COLUMNS: dict[str, str] = (
+    {name: "int" if name == "seed" else "text" for name in _ASKED}
+    | {"outcome": "text", "attempts": "int", "first_attempt": "bool", "success": "bool", "unsafe": "text"}
+    | {"cause": "text"}
+    | dict.fromkeys(_CONTACT, "float")
+    | {"fuel_kg": "float", "collided_with": "text"}
+    | {f"nav_{f.name}": "int" if f.name == "frames_used" else "float" for f in fields(NavigationFigures)}
+    | {"frames": "int", "duration_s": "float", "background": "text", "error": "text"}
+    | dict.fromkeys(_LISTS, "text")
+    | {"scenario_hash": "text"}
+)
+
+
+def columns_of(result: Result) -> Row:
+    """Return the columns that a flight's result fills."""
+    table = result.to_dict()
+    unsafe = "; ".join(result.unsafe)
+    contact, log = table["contact"] or {}, table["attempt_log"]
+    row: Row = {"outcome": result.outcome, "attempts": result.attempts, "unsafe": unsafe, "cause": result.cause}
+    row["success"] = result.outcome == "contact" and not unsafe
+    row["first_attempt"] = bool(row["success"] and log and log[0]["outcome"] == "contact")
+    row |= {name: contact.get(key) for name, key in _CONTACT.items()}
+    row |= {name: table[name] for name in ("fuel_kg", "collided_with", "frames", "duration_s", "background")}
+    row |= {f"nav_{key}": value for key, value in table["nav"].items()}
+    row |= {name: json.dumps(table[name], allow_nan=False) for name in _LISTS}
+    return row
+
+
+def row_of(job: Job, answer: Answer) -> Row:
+    """Return the whole row of what came of a job."""
+    row: Row = {name: {"text": "", "bool": False}.get(kind) for name, kind in COLUMNS.items()}
+    row |= dict.fromkeys(_LISTS, "[]") | {"outcome": ERROR, "attempts": 0, "error": answer.error}
+    return row | _asked(job) | (answer.columns or {})
+
+
+def _asked(job: Job) -> Row:
+    scenario = job.scenario
+    row: Row = {"scenario": scenario.name, "seed": job.seed, "scenario_hash": job.scenario_hash}
+    row |= {"sensing": sensing_of(scenario), "navigator": scenario.navigation.navigator}
+    row["controller"] = getattr(scenario.guidance, "controller", "predictive")
+    return row | {f"{SET}{key}": value for key, value in job.drawn.items()}
+
+
+def sensing_of(scenario: Scenario) -> str:
+    """Return what the navigation of a scenario sees: "truth", "measurements" or "camera"."""
+    if scenario.navigation.is_truth:
+        return "truth"
+    return "measurements" if scenario.camera.sensing == "measurements" else "camera"
+
+
+def column_names(rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return the table's columns in order, those of the drawn keys among them."""
+    drawn = sorted({name for row in rows for name in row if name.startswith(SET)})
+    return [*_ASKED, *drawn, *(name for name in COLUMNS if name not in _ASKED)]

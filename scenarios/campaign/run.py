@@ -1,0 +1,143 @@
+"""Runs a campaign: what is not done yet is flown, what is done is written down at once, the table comes last."""
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from dockair.errors import DockairError
+from dockair.scenarios.campaign import folder as campaign_folder
+from dockair.scenarios.campaign.gate import Verdict, judge, require_power
+from dockair.scenarios.campaign.jobs import Job, jobs_of, with_background
+from dockair.scenarios.campaign.journal import Journal
+from dockair.scenarios.campaign.manifest import FILE_NAME, manifest_of, read_manifest, require_same, write_json
+from dockair.scenarios.campaign.plan_file import PlanFile
+from dockair.scenarios.campaign.pool import Done, Pool
+from dockair.scenarios.campaign.row import row_of
+from dockair.scenarios.campaign.summary import summary_of
+from dockair.scenarios.campaign.table import write_table
+from dockair.scenarios.campaign.worker import FLIGHT, Answer
+
+#: Called with a row and its wall time as it is done, and with None now and then.
+Watcher = Callable[[dict[str, Any] | None, float], None]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Campaign:
+    """A campaign that is over."""
+
+    name: str
+    folder: Path
+    rows: list[dict[str, Any]]
+    groups: list[dict[str, Any]]  #: see `summary`
+    verdict: Verdict | None  #: of the plan's gate
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what `dockair campaign --json` prints."""
+        return {
+            "campaign": self.name,
+            "folder": str(self.folder),
+            "flights": len(self.rows),
+            "groups": self.groups,
+            "gate": None if self.verdict is None else self.verdict.to_dict(),
+        }
+
+
+def run(
+    source: PlanFile,
+    out: Path,
+    *,
+    workers: int,
+    fresh: bool = False,
+    retry_errors: bool = False,
+    watch: Callable[[list[Job], dict[str, Any]], Watcher] | None = None,
+    flight: str = FLIGHT,
+) -> Campaign:
+    """Fly a plan to its end, or what an earlier run of it has left.
+
+    Args:
+        source: the plan.
+        out: its folder.
+        workers: processes.
+        fresh: forget what was flown there.
+        retry_errors: fly again what ended in an error.
+        watch: from the jobs and the entries that are done already to what is told of every further one.
+        flight: "module:function" that flies an order in a process of its own; see `worker`.
+
+    Raises:
+        DockairError: the plan cannot be flown, or the folder holds something else.
+        MachineError: there is no room; what was flown is kept.
+    """
+    jobs = jobs_of(source)
+    if source.plan.asked is not None:
+        require_power(source.plan.asked, [row_of(job, Answer(columns=None)) for job in jobs], source.place("gate"))
+    now = manifest_of(source.plan, jobs, flight)
+    campaign_folder.prepare(out)
+    with Journal(out) as journal:
+        _begin(journal, out, now, jobs, fresh=fresh)
+        done = {key for key, entry in journal.entries.items() if not (retry_errors and entry["row"]["error"])}
+        left = _seed_by_seed([with_background(job, now["background"]) for job in jobs if job.key not in done])
+        told = watch(jobs, journal.entries) if watch is not None else _silent
+        begun = time.perf_counter()
+        with Pool(min(workers, max(len(left), 1)), source.plan.timeout_s, flight) as pool:
+            for outcome in pool.done(left):
+                if outcome is None:
+                    told(None, 0.0)
+                else:
+                    entry = _entry(outcome)
+                    journal.append(entry)
+                    told(entry["row"], outcome.answer.wall_time_s)
+        timing = {"workers": workers, "flown_last": len(left), "wall_time_last_s": time.perf_counter() - begun}
+        return _finish(source, out, jobs, [journal.entries[job.key] for job in jobs], timing)
+
+
+def _begin(journal: Journal, out: Path, now: dict[str, Any], jobs: Sequence[Job], *, fresh: bool) -> None:
+    """Write the manifest of a new campaign, or of an earlier one that goes on and may have grown."""
+    if fresh:
+        journal.clear()
+        for name in campaign_folder.FILES:
+            if name != journal.path.name:
+                (out / name).unlink(missing_ok=True)
+    if journal.entries:
+        if not (out / FILE_NAME).exists():
+            raise DockairError(
+                f"--out {out}", expected=f"{FILE_NAME} beside {journal.path.name}", got="none (or --fresh)"
+            )
+        earlier = read_manifest(out)
+        require_same(earlier, now, set(journal.entries), jobs, f"--out {out}")
+        now = now | {"begun": earlier["begun"]}
+    write_json(now, out / FILE_NAME)
+
+
+def _seed_by_seed(jobs: list[Job]) -> list[Job]:
+    """Return the jobs so that scenarios take turns: what is shown meanwhile is of all of them."""
+    nth: dict[str, int] = {}
+    order = []
+    for job in jobs:
+        nth[job.scenario_hash] = nth.get(job.scenario_hash, -1) + 1
+        order.append((nth[job.scenario_hash], job.number, job))
+    return [job for _, _, job in sorted(order, key=lambda entry: entry[:2])]
+
+
+def _entry(done: Done) -> dict[str, Any]:
+    job, answer = done.job, done.answer
+    entry = {"key": job.key, "row": row_of(job, answer), "wall_time_s": answer.wall_time_s}
+    return entry | ({"traceback": answer.traceback} if answer.traceback else {})
+
+
+def _finish(
+    source: PlanFile, out: Path, jobs: Sequence[Job], entries: Sequence[dict[str, Any]], timing: dict[str, Any]
+) -> Campaign:
+    """Write the table and what it shows."""
+    rows = [entry["row"] for entry in entries]
+    write_table(rows, out)
+    verdict = None if source.plan.asked is None else judge(source.plan.asked, rows)
+    campaign = Campaign(name=source.plan.name, folder=out, rows=rows, groups=summary_of(rows, jobs), verdict=verdict)
+    write_json(timing | {"wall_times_s": [entry["wall_time_s"] for entry in entries]}, out / campaign_folder.TIMING)
+    write_json(campaign.to_dict() | {"folder": "."}, out / campaign_folder.SUMMARY)
+    return campaign
+
+
+def _silent(row: dict[str, Any] | None, wall_time_s: float) -> None:
+    pass

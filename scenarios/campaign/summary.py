@@ -1,0 +1,56 @@
+"""What a campaign showed, in figures: a line for each group of flights that may be pooled."""
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from dockair.rotations import Array
+from dockair.scenarios.accept import Accept
+from dockair.scenarios.campaign.jobs import Job
+from dockair.scenarios.campaign.row import sensing_of
+from dockair.scenarios.report.groups import Group, Share, groups_of
+
+
+def summary_of(rows: Sequence[Mapping[str, Any]], jobs: Sequence[Job]) -> list[dict[str, Any]]:
+    """Return for each group counts, rates with intervals, spread of the contacts, and what was claimed in vain.
+
+    Args:
+        rows: of all flights.
+        jobs: likewise; their scenarios say what is claimed, where the plan changes nothing of them.
+    """
+    claims = {(job.scenario.name, sensing_of(job.scenario)): job.scenario.accept for job in jobs if job.as_written}
+    return [_group(group, claims.get((group.scenario, group.sensing))) for group in groups_of(rows)]
+
+
+def _group(group: Group, claimed: Accept | None) -> dict[str, Any]:
+    return {
+        "scenario": group.scenario,
+        "sensing": group.sensing,
+        "navigator": group.navigator,
+        "controller": group.controller,
+        "flights": len(group.rows),
+        "first_attempt": _share(group.first_attempt),
+        "success": _share(group.success),
+        "outcomes": dict(Counter(row["outcome"] for row in group.rows).most_common()),
+        "causes": dict(group.causes),
+        "unsafe": len(group.unsafe),
+        "errors": len(group.failed_to_fly),
+        "shortfalls": None if claimed is None else claimed.judge(group.rows),
+        "radial_offset_m": _spread(group.offsets_m),
+        "closure_speed_m_s": _spread(group.closing_m_s),
+    }
+
+
+def _share(share: Share) -> dict[str, Any]:
+    low, high = share.interval
+    return {"count": share.count, "rate": share.value, "low": low, "high": high}
+
+
+def _spread(values: Array) -> dict[str, float] | None:
+    """Return median, 95th percentile, smallest and largest; None of nothing."""
+    if not len(values):
+        return None
+    median, most = np.percentile(values, [50.0, 95.0])
+    return {"median": float(median), "p95": float(most), "min": float(values.min()), "max": float(values.max())}

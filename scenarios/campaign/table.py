@@ -1,0 +1,44 @@
+"""The rows as Parquet: the same rows make the same bytes."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from dockair.scenarios.campaign.row import COLUMNS, column_names
+from dockair.scenarios.campaign.whole_file import write_whole
+
+FILE_NAME = "flights.parquet"
+
+
+def write_table(rows: Sequence[Mapping[str, Any]], folder: Path) -> Path:
+    """Write `flights.parquet` into a folder, whole or not at all, and return its path."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    kinds = {"text": pa.string(), "bool": pa.bool_(), "int": pa.int64(), "float": pa.float64()}
+    columns = {}
+    for name in column_names(rows):
+        values = [row.get(name) for row in rows]
+        columns[name] = pa.array(values, kinds[COLUMNS.get(name) or _kind(values)])
+    data = pa.BufferOutputStream()
+    pq.write_table(pa.table(columns), data, compression="ZSTD")
+    write_whole(folder / FILE_NAME, data.getvalue().to_pybytes())
+    return folder / FILE_NAME
+
+
+def read_table(folder: Path) -> list[dict[str, Any]]:
+    """Return the rows of a folder's `flights.parquet`."""
+    import pyarrow.parquet as pq
+
+    rows: list[dict[str, Any]] = pq.read_table(folder / FILE_NAME).to_pylist()
+    return rows
+
+
+def _kind(values: Sequence[Any]) -> str:
+    """Return the kind of a drawn key's column; whole numbers among others become floats, anything else text."""
+    present = [value for value in values if value is not None]
+    if all(isinstance(value, bool) for value in present):
+        return "bool"
+    if any(isinstance(value, bool | str) for value in present):
+        return "text"
+    return "int" if all(isinstance(value, int) for value in present) else "float"

@@ -1,0 +1,20 @@
+"""Writes a file whole or not at all, whenever the process is killed."""
+
+import os
+from pathlib import Path
+
+PART = ".part"  #: ends the name of a file that is being written
+
+
+def write_whole(path: Path, data: bytes) -> None:
+    """Write a file beside its place, wait for the disk, and put it there."""
+    part = path.with_name(path.name + PART)
+    try:
+        with part.open("wb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(part, path)
+    except OSError:
+        part.unlink(missing_ok=True)  # it takes room, and there may be none
+        raise

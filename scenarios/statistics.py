@@ -1,0 +1,55 @@
+"""What a count of successes says about a rate.
+
+K successes of n flights, z the normal quantile of (1 + confidence) / 2, p = K / n:
+
+    centre = (p + z^2 / 2n) / (1 + z^2 / n)                                          (1)
+    half   = z sqrt(p (1 - p) / n + z^2 / 4n^2) / (1 + z^2 / n)                      (2)
+    P(K <= k | n, p) = sum over i = 0 .. k of C(n, i) p^i (1 - p)^(n - i)            (3)
+
+Source: (1), (2) [Wilson 1927, J. Am. Stat. Assoc. 22, 209].
+"""
+
+import math
+
+from scipy.special import bdtr, ndtri
+
+CONFIDENCE = 0.95  #: of the intervals that are shown
+
+
+def wilson_interval(successes: int, trials: int, confidence: float = CONFIDENCE) -> tuple[float, float]:
+    """Return the lower and upper limit of the rate, Eqs. (1) and (2); 0 and 1 without trials.
+
+    Args:
+        successes: K.
+        trials: n.
+        confidence: that the interval holds the rate, about.
+    """
+    if trials == 0:
+        return 0.0, 1.0
+    z, p = float(ndtri(0.5 + 0.5 * confidence)), successes / trials
+    shrink = 1.0 + z * z / trials
+    centre = (p + 0.5 * z * z / trials) / shrink
+    half = z * math.sqrt(p * (1.0 - p) / trials + 0.25 * (z / trials) ** 2) / shrink
+    low = 0.0 if successes == 0 else centre - half  # exactly, and not by rounding
+    return low, 1.0 if successes == trials else centre + half
+
+
+def probability_of_at_most(successes: int, trials: int, rate: float) -> float:
+    """Return P(K <= successes), Eq. (3).
+
+    Args:
+        successes: k; -1 is none at all.
+        trials: n.
+        rate: p.
+    """
+    if successes < 0:
+        return 0.0
+    return 1.0 if successes >= trials else float(bdtr(successes, trials, rate))
+
+
+def largest_rejected_count(trials: int, rate: float, false_alarm: float) -> int:
+    """Return the largest k for which P(K <= k) < false_alarm under the rate; -1 if there is none."""
+    count = -1
+    while count + 1 < trials and probability_of_at_most(count + 1, trials, rate) < false_alarm:
+        count += 1
+    return count

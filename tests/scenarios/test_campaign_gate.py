@@ -1,0 +1,90 @@
+"""The gate: how often it fails a build that is good, counted out; and that it fails one that is not."""
+
+import itertools
+import math
+
+import pytest
+
+from dockair.errors import DockairError
+from dockair.scenarios.campaign.gate import judge, require_power
+from dockair.scenarios.campaign.plan import Gate
+
+
+def rows(docked: int, flights: int, scenario: str = "light", **changes):
+    common = {"scenario": scenario, "sensing": "camera", "navigator": "n", "controller": "c", "unsafe": "", "error": ""}
+    return [
+        common
+        | {"seed": seed, "success": seed < docked, "first_attempt": seed < docked // 2, "outcome": "contact"}
+        | changes
+        for seed in range(flights)
+    ]
+
+
+def chance(docked: int, flights: int, rate: float) -> float:
+    return math.comb(flights, docked) * rate**docked * (1.0 - rate) ** (flights - docked)
+
+
+@pytest.mark.parametrize("false_alarm", [0.05, 0.001])
+@pytest.mark.parametrize(("flights", "rate"), [(12, 0.9), (20, 0.95), (60, 0.7)])
+def test_a_build_of_the_rate_asked_fails_as_seldom_as_the_gate_says(flights, rate, false_alarm):
+    gate = Gate(success_rate=rate, false_alarm=false_alarm)
+    failed = sum(chance(k, flights, rate) for k in range(flights + 1) if not judge(gate, rows(k, flights)).passed)
+    assert 0.0 < failed < false_alarm
+    worst_passed = min(k for k in range(flights + 1) if judge(gate, rows(k, flights)).passed)
+    assert failed + chance(worst_passed, flights, rate) >= false_alarm  # it could not have been stricter
+
+
+def test_two_scenarios_together_fail_no_more_often_than_the_gate_says():
+    gate, flights, rate = Gate(success_rate=0.8, false_alarm=0.05), 20, 0.8  # one alone 0.032, twice is too often
+    failed = sum(
+        chance(a, flights, rate) * chance(b, flights, rate)
+        for a, b in itertools.product(range(flights + 1), repeat=2)
+        if not judge(gate, rows(a, flights) + rows(b, flights, "severe")).passed
+    )
+    assert 0.0 < failed < 0.05
+
+
+def test_a_build_that_docks_half_the_time_is_noticed():
+    gate = Gate(success_rate=0.95, false_alarm=0.001)
+    noticed = sum(chance(k, 20, 0.5) for k in range(21) if not judge(gate, rows(k, 20)).passed)
+    assert noticed == pytest.approx(0.979, abs=0.001)
+
+
+def test_sensing_kinds_are_never_pooled():
+    gate = Gate(success_rate=0.9, false_alarm=0.01)
+    mixed = rows(20, 20) + rows(8, 20, sensing="truth")
+    verdict = judge(gate, mixed)
+    assert [(test.successes, test.flights) for test in verdict.tests] == [(20, 20), (8, 20)]
+    assert not verdict.passed
+    assert "perfect navigation" in verdict.reasons[0]
+
+
+def test_a_scenario_may_be_asked_for_a_rate_of_its_own():
+    gate = Gate.model_validate({"success_rate": 0.9, "scenarios": {"severe": {"first_attempt_rate": 0.2}}})
+    tests = judge(gate, rows(12, 12) + rows(12, 12, "severe")).tests
+    assert [(test.rate, test.asked, test.successes) for test in tests] == [
+        ("success_rate", 0.9, 12),
+        ("first_attempt_rate", 0.2, 6),
+    ]
+
+
+def test_one_unsafe_contact_fails_the_gate_and_so_does_one_error():
+    gate = Gate()
+    assert judge(gate, rows(5, 5)).passed
+    unsafe = judge(gate, rows(5, 5) + rows(1, 1, unsafe="3.1 m/s"))
+    assert unsafe.reasons == ("1 flights with an unsafe contact, allowed 0",)
+    broken = judge(gate, rows(5, 5) + rows(0, 1, error="ValueError: no", outcome="error"))
+    assert broken.reasons == ("1 flights ended in an error, allowed 0",)
+    assert judge(Gate(errors_max=1), rows(0, 1, error="x", outcome="error")).passed
+
+
+def test_a_flight_that_ends_in_an_error_has_not_docked():
+    gate = Gate(success_rate=0.9, errors_max=100, false_alarm=0.01)
+    assert not judge(gate, rows(6, 6) + rows(6, 6, error="x", outcome="error")).passed
+
+
+def test_a_gate_that_could_never_fail_is_refused_with_the_flights_it_needs():
+    gate = Gate(success_rate=0.7, false_alarm=0.02)
+    with pytest.raises(DockairError, match="gate.success_rate: expected 4 flights or more"):
+        require_power(gate, rows(0, 3), "gate")
+    require_power(gate, rows(0, 4), "gate")

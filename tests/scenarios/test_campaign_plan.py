@@ -1,0 +1,226 @@
+"""Plans: what is flown, in which order, over what; and what is refused with one line."""
+
+from pathlib import Path
+
+import pytest
+
+from dockair.errors import DockairError
+from dockair.scenarios.campaign.jobs import jobs_of, scenario_hash
+from dockair.scenarios.campaign.plan_file import PlanFile, plan_names
+from dockair.scenarios.scenario_file import scenario_names
+from dockair.scenarios.schema import load_scenario
+
+
+@pytest.fixture
+def plan(tmp_path):
+    """Make a plan from TOML, named "p"; `changes` and `settings` as from the command line."""
+
+    def make(text: str, changes=None, settings=None) -> PlanFile:
+        path = tmp_path / "p.toml"
+        path.write_text(f'name = "p"\n{text}', encoding="utf-8")
+        return PlanFile(path, changes, settings)
+
+    return make
+
+
+def refusal_of(plan, text: str, changes=None, settings=None) -> str:
+    with pytest.raises(DockairError) as refused:
+        jobs_of(plan(text, changes, settings))
+    assert "\n" not in str(refused.value)
+    return str(refused.value)
+
+
+def test_jobs_are_scenarios_by_seeds_numbered_in_the_order_of_the_plan(plan):
+    jobs = jobs_of(
+        plan('scenarios = ["still_air", { scenario = "default", seeds = [9, 4] }]\nseeds = 3\nfirst_seed = 10')
+    )
+    assert [(job.number, job.scenario.name, job.seed) for job in jobs] == [
+        (0, "still_air", 10), (1, "still_air", 11), (2, "still_air", 12), (3, "default", 19), (4, "default", 14),
+    ]  # fmt: skip
+
+
+def test_the_star_is_every_scenario_of_the_library(plan):
+    assert sorted(job.scenario.name for job in jobs_of(plan('scenarios = ["*"]'))) == sorted(
+        load_scenario(name).name for name in scenario_names()
+    )
+
+
+def test_the_later_setting_holds_plan_entry_draw_command_line(plan):
+    text = """
+scenarios = ["default", { scenario = "default", set = { "flight.duration_s" = 20.0, start.aft_m = 5.0 } }]
+[set]
+flight.duration_s = 10.0
+"guidance.hold_s" = 1.0
+[draw."start.up_m"]
+values = [1.5]
+"""
+    first, second = (job.scenario for job in jobs_of(plan(text, settings={"guidance.hold_s": "2.0"})))
+    assert (first.flight.duration_s, first.start.aft_m, first.start.up_m, first.guidance.hold_s) == (
+        10.0,
+        4.0,
+        1.5,
+        2.0,
+    )
+    assert (second.flight.duration_s, second.start.aft_m, second.guidance.hold_s) == (20.0, 5.0, 2.0)
+
+
+def test_a_text_of_the_plan_stays_a_text(plan):
+    scenario = jobs_of(plan('scenarios = ["default"]\n[set]\nclaim = "true"'))[0].scenario
+    assert scenario.claim == "true"
+
+
+@pytest.mark.parametrize(
+    ("more", "expected"),
+    [
+        ('sampler = "grid"', 3 * 4),
+        ('sampler = "random"', 4),
+        ('sampler = "latin_hypercube"', 4),
+        ('sampler = "latin_hypercube"\ndraws = 5', 5 * 4),
+    ],
+)
+def test_a_grid_and_a_number_of_draws_meet_every_seed_else_each_seed_has_a_point(plan, more, expected):
+    text = f"""
+scenarios = ["default"]
+seeds = 4
+{more}
+[draw."turbulence.sigma_m_s"]
+low = 0.1
+high = 0.3
+{"points = 3" if "grid" in more else ""}
+"""
+    jobs = jobs_of(plan(text))
+    assert len({job.key for job in jobs}) == len(jobs) == expected
+    for job in jobs:
+        assert job.scenario.turbulence.sigma_m_s == job.drawn["turbulence.sigma_m_s"]
+        assert 0.1 <= job.drawn["turbulence.sigma_m_s"] <= 0.3
+
+
+def test_scenarios_are_flown_with_the_same_points(plan):
+    jobs = jobs_of(plan('scenarios = ["default", "racetrack"]\nseeds = 5\n[draw."start.aft_m"]\nlow = 3.0\nhigh = 5.0'))
+    assert [job.drawn for job in jobs[:5]] == [job.drawn for job in jobs[5:]]
+
+
+def test_the_command_line_replaces_seeds_everywhere_and_the_sampler(plan):
+    text = 'scenarios = [{ scenario = "default", seeds = 9 }]\nseeds = 7\n[draw."start.aft_m"]\nvalues = [3.0, 4.0]'
+    assert len(jobs_of(plan(text, {"seeds": 2}))) == 2
+    assert len(jobs_of(plan(text, {"seeds": 2, "sampler": "grid"}))) == 4
+
+
+def test_the_digest_changes_with_what_decides_the_flight_and_with_nothing_else():
+    digest = scenario_hash(load_scenario("default"))
+    for same in ({"seed": 5}, {"claim": "another"}, {"accept.outcome": "miss"}):
+        assert scenario_hash(load_scenario("default", same)) == digest
+    others = {"turbulence.sigma_m_s": 0.51, "navigation.navigator": "truth", "parameters.reel.tension_gain": 0.6}
+    for key, value in others.items():
+        assert scenario_hash(load_scenario("default", {key: value})) != digest
+
+
+def test_the_digest_sees_into_the_sheets_that_the_scenario_names(tmp_path):
+    sheet = tmp_path / "ring.toml"
+    sheet.write_text("a = 1")
+    scenario = load_scenario("default", {"hardware.ring": str(sheet)})
+    before = scenario_hash(scenario)
+    sheet.write_text("a = 2")
+    assert scenario_hash(scenario) != before
+
+
+@pytest.mark.parametrize("name", plan_names())
+def test_every_packaged_plan_can_be_flown_and_says_what_for(name):
+    source = PlanFile(name)
+    assert source.plan.name == name
+    assert source.plan.claim
+    assert jobs_of(source)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ('scenarios = ["default"]\nseed = 3', "p.toml: seed: expected a known key, got 'seed'; exists: claim, draw"),
+        ("seeds = 3", "p.toml: scenarios: expected a list of scenarios"),
+        ("scenarios = []", "p.toml: scenarios: expected a list of scenarios"),
+        ('scenarios = "default"', "p.toml: scenarios: expected a list of scenarios"),
+        ('scenarios = [{ scenario = "default", sed = 1 }]', "p.toml: scenarios[0].sed: expected a known key"),
+        ("scenarios = [{ seeds = 1 }]", "p.toml: scenarios[0].scenario: expected a string"),
+        ('scenarios = ["defualt"]', "scenarios[0]: scenario: expected a scenario of the library"),
+        ('scenarios = ["mine.toml"]', "mine.toml: expected a scenario file, got 'no such file'"),
+        ('scenarios = ["default", "default"]', "scenarios: expected every flight once, got 'default, seed 0, twice'"),
+        ('scenarios = ["default"]\nseeds = 0', "seeds: expected how many seeds, from 1 to 100000"),
+        ('scenarios = ["default"]\nseeds = [-1]', "seeds[0]: expected how many seeds"),
+        ('scenarios = ["default"]\nseeds = true', "seeds: expected how many seeds"),
+        ('scenarios = ["default"]\nseeds = [1, 1]', "expected every flight once, got 'default, seed 1, twice'"),
+        ('scenarios = ["default"]\nsampler = "sobol"', "exists: grid, random, latin_hypercube"),
+        ('scenarios = ["default"]\ndraws = 3', "draws: expected keys to draw"),
+        (
+            'scenarios = ["default"]\n[set]\n"turbulence.sigma" = 1.0',
+            "p.toml: set.turbulence.sigma: expected a known key",
+        ),
+        (
+            'scenarios = ["default"]\n[set]\nstart.aft_m = -1.0',
+            "p.toml: set.start.aft_m: expected a number from 0.5 to 40.0",
+        ),
+        (
+            'scenarios = [{ scenario = "default", set = { "start.aft_m" = "x" } }]',
+            "p.toml: scenarios[0].set.start.aft_m: expected a number from 0.5 to 40.0, got 'x'",
+        ),
+        (
+            'scenarios = [{ scenario = "default", set = { "start.aft_m" = -1.0 } }]\n[set]\n"start.aft_m" = 3.0',
+            "p.toml: scenarios[0].set.start.aft_m: expected",
+        ),
+        (
+            'scenarios = ["default"]\n[draw."start.aft_m"]\nlow = 0.0\nhigh = 0.1',
+            'p.toml: draw."start.aft_m": expected a number from 0.5 to 40.0',
+        ),
+        (
+            'scenarios = ["default"]\n[draw."start.aft_m"]\nlow = 0.0',
+            'p.toml: draw."start.aft_m": expected low and high, or',
+        ),
+        (
+            'scenarios = ["default"]\n[draw."start.aft_m"]\nlo = 0.0',
+            'p.toml: draw."start.aft_m".lo: expected a known key',
+        ),
+        ('scenarios = ["default"]\n[draw]\nx = 1', 'p.toml: draw."x": expected a table, got 1'),
+        ('scenarios = ["default"]\n[gate]\nsuccess_rate = 1.5', "p.toml: gate.success_rate: expected a number"),
+        (
+            'scenarios = ["default"]\n[gate.scenarios.night]\nsuccess_rate = 0.5',
+            "gate.scenarios: expected a scenario of the",
+        ),
+        (
+            'scenarios = ["default"]\n[gate.scenarios.default]\nrate = 0.5',
+            "gate.scenarios.default.rate: expected a known",
+        ),
+        (
+            'scenarios = ["default"]\n[set]\n"navigation.navigator" = "no_such_module:Navigator"',
+            'navigation.navigator: expected an importable "module:Class", got "No module named',
+        ),
+        (
+            'scenarios = ["default"]\n[set]\n"navigation.navigator" = "dockair.messages:Mine"',
+            'navigation.navigator: expected an importable "module:Class"',
+        ),
+        ("scenarios = [", "p.toml: expected TOML"),
+    ],
+)
+def test_what_cannot_be_flown_is_refused_with_one_line_that_says_where(plan, text, said):
+    assert said in refusal_of(plan, text)
+
+
+def test_what_the_command_line_asks_in_vain_is_said_to_be_its_own(plan):
+    assert refusal_of(plan, 'scenarios = ["default"]', settings={"start.aft_m": "-1"}).startswith(
+        "--set start.aft_m: expected"
+    )
+    text = 'scenarios = ["default"]\n[draw."start.aft_m"]\nvalues = [3.0]'
+    assert "expected a key that the plan does not draw" in refusal_of(plan, text, settings={"start.aft_m": "3"})
+
+
+def test_a_plan_that_does_not_exist_lists_those_that_do():
+    with pytest.raises(DockairError) as refused:
+        PlanFile("level")
+    assert "plan: expected a packaged plan, or the path of a TOML file, got 'level'; exists: " in str(refused.value)
+    assert "levels" in refused.value.exists
+    with pytest.raises(DockairError, match="expected a plan file, got 'no such file'"):
+        PlanFile(Path("no") / "such.toml")
+
+
+def test_scenarios_of_ones_own_lie_beside_the_plan(plan, tmp_path, monkeypatch):
+    (tmp_path / "mine.toml").write_text('name = "my_own"')
+    monkeypatch.chdir("/")
+    assert jobs_of(plan('scenarios = ["mine.toml"]'))[0].scenario.name == "my_own"

@@ -1,0 +1,465 @@
+"""Campaigns run, broken off, gone on with: nothing is lost, nothing is flown twice, nobody else's files are touched."""
+
+import errno
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from dockair.errors import DockairError, MachineError
+from dockair.scenarios import campaign_command, cli
+from dockair.scenarios.campaign import run as run_module
+from dockair.scenarios.campaign.folder import rows_of
+from dockair.scenarios.campaign.journal import Journal
+from dockair.scenarios.campaign.manifest import read_manifest
+from dockair.scenarios.campaign.plan_file import PlanFile
+from dockair.scenarios.campaign.pool import Done
+from dockair.scenarios.campaign.run import run
+from dockair.scenarios.campaign.table import read_table
+from dockair.scenarios.campaign.whole_file import write_whole
+from dockair.scenarios.campaign.worker import Answer, one_line
+from dockair.sim.opengl import Trial
+
+#: Flies nothing: answers after a while that the seed decides, or comes to the end that the seed decides.
+FAKE = """
+import os, signal, time
+
+def quick(job):
+    time.sleep(0.004 * (1 + job.seed % 5))
+    with open(os.environ["FLOWN"], "a") as file:
+        file.write(f"{job.key}\\n")
+    docked = job.seed % 3 > 0
+    return {"outcome": "contact" if docked else "miss", "success": docked, "first_attempt": docked,
+            "attempts": 1 + job.seed % 2, "radial_offset_m": 0.01 * job.seed / 3 if docked else None,
+            "closure_speed_m_s": 1.2 if docked else None}
+
+def deadly(job):
+    if job.seed == 1:
+        raise ValueError("no\\nway")
+    if job.seed == 2:
+        os.kill(os.getpid(), signal.SIGSEGV)
+    if job.seed == 3:
+        os.kill(os.getpid(), signal.SIGKILL)
+    if job.seed == 4:
+        time.sleep(1000.0)
+    if job.seed == 5:
+        raise SystemExit(3)
+    if job.seed == 6:
+        os._exit(7)
+    if job.seed == 7:
+        print("said on stdout")
+    return quick(job)
+
+def sleeper(job):
+    with open(os.environ["FLOWN"], "w") as file:
+        file.write(f"{os.getpid()}\\n")
+    time.sleep(1000.0)
+
+def mortal_once(job):
+    mark = f"{os.environ['FLOWN']}.{job.seed}"
+    if not os.path.exists(mark):
+        open(mark, "w").close()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return quick(job)
+"""
+
+
+@pytest.fixture
+def fakes(tmp_path, monkeypatch):
+    """The functions above as a module that a spawned process can import; returns where they note what they flew."""
+    folder = tmp_path / "modules"
+    folder.mkdir()
+    (folder / "fake_flights.py").write_text(FAKE)
+    monkeypatch.syspath_prepend(str(folder))
+    monkeypatch.setenv("FLOWN", str(tmp_path / "flown"))
+    monkeypatch.setenv("PYTHONPATH", str(folder))
+    return tmp_path / "flown"
+
+
+@pytest.fixture
+def here(fakes, monkeypatch):
+    """Fly in this process: for tests that are not about processes."""
+    import fake_flights
+
+    class Here:
+        def __init__(self, workers, timeout_s, flight):
+            self.fly = getattr(fake_flights, flight.rpartition(":")[2])
+
+        def __enter__(self):
+            return self
+
+        def __exit__(self, *_):
+            pass
+
+        def done(self, jobs):
+            for job in jobs:
+                try:
+                    yield Done(job, Answer(columns=self.fly(job)))
+                except Exception as error:
+                    yield Done(job, Answer(columns=None, error=one_line(error)))
+
+    monkeypatch.setattr(run_module, "Pool", Here)
+    return fakes
+
+
+def plan(folder: Path, seeds: int = 4, more: str = "", scenarios: str = '"truth_navigation"') -> PlanFile:
+    path = folder / "p.toml"
+    path.write_text(f'name = "p"\nscenarios = [{scenarios}]\nseeds = {seeds}\n{more}')
+    return PlanFile(path)
+
+
+def fly(source: PlanFile, out: Path, flight: str = "quick", **options):
+    return run(source, out, workers=2, flight=f"fake_flights:{flight}", **options)
+
+
+def lines(path: Path) -> list[str]:
+    return path.read_text().splitlines() if path.exists() else []
+
+
+def test_a_campaign_that_is_over_is_not_flown_again(here, tmp_path):
+    first = fly(plan(tmp_path), tmp_path / "out")
+    table = (tmp_path / "out/flights.parquet").read_bytes()
+    again = fly(plan(tmp_path), tmp_path / "out")
+    assert len(lines(here)) == 4
+    assert again.rows == first.rows == read_table(tmp_path / "out") == rows_of(tmp_path / "out")
+    assert (tmp_path / "out/flights.parquet").read_bytes() == table
+
+
+def test_a_line_that_was_torn_is_flown_again_and_no_other(here, tmp_path):
+    undisturbed = fly(plan(tmp_path), tmp_path / "whole")
+    fly(plan(tmp_path), tmp_path / "out")
+    journal = tmp_path / "out/journal.jsonl"
+    whole = journal.read_bytes()
+    for cut in (1, 50, len(whole.splitlines(keepends=True)[-1]) - 1):
+        journal.write_bytes(whole[:-cut])
+        here.unlink()
+        assert fly(plan(tmp_path), tmp_path / "out").rows == undisturbed.rows
+        assert [key[-2:] for key in lines(here)] == [":3"]
+        assert fly(plan(tmp_path), tmp_path / "out").rows == undisturbed.rows
+        assert len(lines(here)) == 1  # what was written after the torn line can be read again
+
+
+def test_damage_in_the_middle_is_refused_and_left_as_it_is(here, tmp_path):
+    fly(plan(tmp_path), tmp_path / "out")
+    journal = tmp_path / "out/journal.jsonl"
+    parts = journal.read_bytes().splitlines(keepends=True)
+    damaged = b"".join([parts[0], b"\0" * 30 + b"\n", *parts[2:]])
+    journal.write_bytes(damaged)
+    with pytest.raises(DockairError, match=r"journal.jsonl:2: expected an entry of a campaign"):
+        fly(plan(tmp_path), tmp_path / "out")
+    assert journal.read_bytes() == damaged
+
+
+def test_a_plan_may_grow_and_what_was_flown_is_kept(here, tmp_path):
+    fly(plan(tmp_path, 3), tmp_path / "out")
+    more = fly(plan(tmp_path, 5, scenarios='"still_air", "truth_navigation"'), tmp_path / "out")
+    keys = lines(here)
+    assert len(keys) == len(set(keys)) == 10
+    assert [row["seed"] for row in more.rows] == [*range(5), *range(5)]
+    assert read_manifest(tmp_path / "out")["seeds"] == ["0-4"]
+
+
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        ({"seeds": 2}, "another plan: 1 of 3 flights that are done are not part of it"),
+        ({"more": "[set]\nguidance.hold_s = 1.0"}, "another plan: 3 of 3 flights that are done are not part of it"),
+    ],
+)
+def test_another_plan_in_the_same_folder_is_refused_and_fresh_begins_anew(here, tmp_path, changed, said):
+    fly(plan(tmp_path, 3), tmp_path / "out")
+    journal = (tmp_path / "out/journal.jsonl").read_bytes()
+    with pytest.raises(DockairError) as refused:
+        fly(plan(tmp_path, **({"seeds": 3} | changed)), tmp_path / "out")
+    assert said in str(refused.value) and "--fresh" in str(refused.value)
+    assert (tmp_path / "out/journal.jsonl").read_bytes() == journal
+    anew = fly(plan(tmp_path, **({"seeds": 3} | changed)), tmp_path / "out", fresh=True)
+    assert len(anew.rows) == changed.get("seeds", 3)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "said"),
+    [("code_digest", "f00", "another code (of commit"), ("versions", {"numpy": "0.9"}, "other versions:")],
+)
+def test_another_code_is_refused_for_its_rows_are_another_campaign(here, tmp_path, monkeypatch, name, value, said):
+    fly(plan(tmp_path), tmp_path / "out")
+    monkeypatch.setattr(f"dockair.scenarios.campaign.manifest.{name}", lambda: value)
+    with pytest.raises(DockairError) as refused:
+        fly(plan(tmp_path), tmp_path / "out")
+    assert said in str(refused.value)
+
+
+def test_a_background_left_to_the_machine_is_the_same_in_every_process(here, tmp_path, monkeypatch):
+    import fake_flights
+
+    monkeypatch.setattr("dockair.sim.opengl._trial", lambda: Trial("", "none here"))
+    seen = []
+    monkeypatch.setattr(fake_flights, "quick", lambda job: seen.append(job.scenario.camera.background) or {})
+    source = plan(tmp_path, 2, '[set]\ncamera.background = "auto"', '"default"')
+    fly(source, tmp_path / "out")
+    assert seen == ["analytic", "analytic"]
+    monkeypatch.setattr("dockair.sim.opengl._trial", lambda: Trial("somebody"))
+    with pytest.raises(DockairError, match="other background: analytic, now mujoco"):
+        fly(source, tmp_path / "out")
+
+
+def test_an_error_is_a_row_and_is_flown_again_only_when_asked(here, tmp_path):
+    first = fly(plan(tmp_path, 2), tmp_path / "out", "deadly")
+    assert [(row["outcome"], row["error"], row["success"]) for row in first.rows] == [
+        ("miss", "", False),
+        ("error", "ValueError: no way", False),
+    ]
+    again = fly(plan(tmp_path, 2), tmp_path / "out", "quick")
+    assert again.rows == first.rows
+    mended = fly(plan(tmp_path, 2), tmp_path / "out", "quick", retry_errors=True)
+    assert [row["error"] for row in mended.rows] == ["", ""]
+    assert [key[-2:] for key in lines(here)] == [":0", ":1"]
+
+
+def test_drawn_keys_are_columns_with_their_own_type(here, tmp_path):
+    more = (
+        'sampler = "grid"\n[draw."start.aft_m"]\nvalues = [3, 4.5]\n[draw."hardware.imu"]\nvalues = ["mti", "tactical"]'
+    )
+    fly(plan(tmp_path, 1, more), tmp_path / "out")
+    rows = read_table(tmp_path / "out")
+    assert [(row["set.start.aft_m"], row["set.hardware.imu"]) for row in rows] == [
+        (3.0, "mti"),
+        (3.0, "tactical"),
+        (4.5, "mti"),
+        (4.5, "tactical"),
+    ]
+
+
+@pytest.mark.parametrize("number", [errno.ENOSPC, errno.EDQUOT])
+def test_a_full_disk_is_one_line_and_the_earlier_rows_stay(here, tmp_path, monkeypatch, number):
+    real = os.write
+
+    def write(file, data):
+        if b'"seed": 2' in data:
+            real(file, data[:20])  # what still fits
+            raise OSError(number, os.strerror(number))
+        return real(file, data)
+
+    monkeypatch.setattr(os, "write", write)
+    with pytest.raises(MachineError, match="expected room to write; make some .* 2 flights are kept"):
+        fly(plan(tmp_path), tmp_path / "out")
+    monkeypatch.undo()
+    assert [row["seed"] for row in rows_of(tmp_path / "out")] == [0, 1]
+    assert (tmp_path / "out/journal.jsonl").read_bytes().endswith(b"\n")
+
+
+def test_a_file_is_written_whole_or_stays_as_it_was(tmp_path, monkeypatch):
+    path = tmp_path / "file"
+    write_whole(path, b"before")
+
+    def no_room(file):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(os, "fsync", no_room)
+    with pytest.raises(OSError, match="No space left"):
+        write_whole(path, b"after")
+    assert path.read_bytes() == b"before"
+    assert [found.name for found in tmp_path.iterdir()] == ["file"]
+
+
+def test_one_campaign_at_a_time_writes_a_folder(here, tmp_path):
+    (tmp_path / "out").mkdir()
+    with Journal(tmp_path / "out"), pytest.raises(DockairError, match="expected a folder in which no campaign is runn"):
+        fly(plan(tmp_path), tmp_path / "out")
+    assert len(fly(plan(tmp_path), tmp_path / "out").rows) == 4
+
+
+def test_other_peoples_files_are_refused_untouched(here, tmp_path):
+    folder = tmp_path / "thesis"
+    folder.mkdir()
+    (folder / "thesis.tex").write_text("mine")
+    for options in ({}, {"fresh": True}):
+        with pytest.raises(DockairError, match="got 'a folder with thesis.tex'"):
+            fly(plan(tmp_path), folder, **options)
+    with pytest.raises(DockairError, match="got 'a file'"):
+        fly(plan(tmp_path), folder / "thesis.tex")
+    assert [path.name for path in folder.iterdir()] == ["thesis.tex"]
+
+
+def test_a_folder_that_cannot_be_written_is_refused(here, tmp_path):
+    with pytest.raises(DockairError, match="--out /proc/campaign: expected a folder that can be written"):
+        fly(plan(tmp_path), Path("/proc/campaign"))
+
+
+def test_a_journal_without_its_manifest_is_refused(here, tmp_path):
+    fly(plan(tmp_path), tmp_path / "out")
+    (tmp_path / "out/manifest.json").unlink()
+    with pytest.raises(DockairError, match=r"expected manifest.json beside journal.jsonl"):
+        fly(plan(tmp_path), tmp_path / "out")
+
+
+def test_a_gate_that_could_not_fail_is_refused_before_anything_is_flown(here, tmp_path):
+    with pytest.raises(DockairError, match=r"p.toml: gate.success_rate: expected 7 flights or more"):
+        fly(plan(tmp_path, 6, "[gate]\nsuccess_rate = 0.65"), tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.fixture
+def command(monkeypatch, capfd, fakes, tmp_path):
+    """Run `dockair campaign` on fake flights; return its exit status, stdout and stderr."""
+    monkeypatch.chdir(tmp_path)
+    real = run_module.run
+    monkeypatch.setattr(run_module, "run", lambda *a, **k: real(*a, **k, flight="fake_flights:quick"))
+
+    def command(*arguments: str) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["dockair", "campaign", *arguments])
+        with pytest.raises(SystemExit) as ended:
+            cli.main()
+        said = capfd.readouterr()
+        return ended.value.code, said.out, said.err
+
+    return command
+
+
+def test_the_exit_status_is_that_of_the_gate_and_json_is_one_object(command, here, tmp_path):
+    plan(tmp_path, 12)
+    status, out, _ = command("p.toml", "--json", "--workers", "1")
+    assert (status, json.loads(out)["groups"][0]["success"]["count"]) == (0, 8)
+    assert (tmp_path / "out/campaigns/p/summary.json").is_file()
+    plan(tmp_path, 12, "[gate]\nsuccess_rate = 0.99")
+    status, out, _ = command("p.toml", "--workers", "1")
+    assert status == 1
+    assert "gate failed: truth_navigation: perfect navigation" in out
+    plan(tmp_path, 12, "[gate]\nsuccess_rate = 0.7")
+    assert command("p.toml")[0] == 0
+
+
+def test_without_a_plan_the_packaged_ones_are_listed_with_their_claims(command):
+    status, out, _ = command("--json")
+    assert status == 0
+    assert {"ci", "levels", "levels_truth", "levels_fast", "library"} <= json.loads(out)["plans"].keys()
+    assert "by camera in light, moderate and severe" in command()[1]
+
+
+def test_claims_are_judged_where_the_plan_changes_nothing_of_the_scenario(here, tmp_path):
+    claimed = fly(plan(tmp_path, 3), tmp_path / "out").groups[0]["shortfalls"]
+    assert any("2 of 3" in line for line in claimed)
+    assert fly(plan(tmp_path, 3, "[set]\nguidance.hold_s = 1.0"), tmp_path / "b").groups[0]["shortfalls"] is None
+
+
+def test_mistakes_are_one_line_and_status_two(command, here, tmp_path):
+    for arguments in (("no_such_plan",), ("p.toml", "--set", "start.aft=1"), ("p.toml", "--out", "p.toml")):
+        plan(tmp_path)
+        status, out, err = command(*arguments)
+        assert (status, out) == (2, "")
+        assert err.startswith("dockair: ") and err.count("\n") == 1
+
+
+def test_the_samplers_of_the_command_line_are_those_of_the_plan():
+    from typing import get_args
+
+    from dockair.scenarios.campaign.draws import SamplerName
+
+    assert [member.value for member in campaign_command.Sampler] == list(get_args(SamplerName))
+
+
+@pytest.mark.slow
+def test_a_flight_that_breaks_its_process_is_a_row_and_not_the_end(fakes, tmp_path, capfd):
+    rows = fly(plan(tmp_path, 9, "timeout_s = 1.5"), tmp_path / "out", "deadly").rows
+    assert [row["error"] for row in rows] == [
+        "",
+        "ValueError: no way",
+        "process ended by SIGSEGV, 2 times",
+        "process ended by SIGKILL, as when memory runs out, 2 times",
+        "no result within 1.5 s",
+        "SystemExit: 3",
+        "process ended with status 7, 2 times",
+        "",
+        "",
+    ]
+    assert "said on stdout" not in capfd.readouterr().out
+    assert [row["outcome"] for row in read_table(tmp_path / "out")].count("error") == 6
+    journal = [json.loads(line) for line in lines(tmp_path / "out/journal.jsonl")]
+    assert sum("raise ValueError" in entry.get("traceback", "") for entry in journal) == 1
+
+
+@pytest.mark.slow
+def test_a_process_that_dies_once_is_no_error(fakes, tmp_path):
+    assert [row["error"] for row in fly(plan(tmp_path, 1), tmp_path / "out", "mortal_once").rows] == [""]
+
+
+@pytest.mark.slow
+def test_a_function_that_cannot_be_imported_is_said_once(fakes, tmp_path):
+    with pytest.raises(DockairError, match="expected a function that flies an order, got 'fake_flights:none"):
+        fly(plan(tmp_path, 50), tmp_path / "out", "none")
+
+
+#: Imports once, then runs the campaign in a child for each line it reads; the child leads a process group of its own.
+SERVER = """
+import os, sys
+from pathlib import Path
+from dockair.scenarios.campaign.plan_file import PlanFile
+from dockair.scenarios.campaign.run import run
+
+if __name__ == "__main__":
+    for line in sys.stdin:
+        child = os.fork()
+        if child == 0:
+            os.setpgid(0, 0)
+            run(PlanFile(sys.argv[1]), Path(sys.argv[2]), workers=2, flight=sys.argv[3])
+            os._exit(0)
+        print(child, flush=True)
+        print(os.waitpid(child, 0)[1], flush=True)
+"""
+
+
+@pytest.mark.slow
+def test_a_campaign_killed_ten_times_at_random_makes_the_table_of_an_undisturbed_one(fakes, tmp_path):
+    seeds, kills, out = 80, 10, tmp_path / "out"
+    source = plan(tmp_path, seeds, scenarios='"truth_navigation", "still_air"')
+    (tmp_path / "server.py").write_text(SERVER)
+    command = [sys.executable, str(tmp_path / "server.py"), str(tmp_path / "p.toml"), str(out), "fake_flights:quick"]
+    chance = random.Random(11)
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as server:
+        assert server.stdin is not None and server.stdout is not None
+        for kill in range(kills):
+            server.stdin.write("go\n")
+            server.stdin.flush()
+            child = int(server.stdout.readline())
+            wanted = len(lines(out / "journal.jsonl")) + chance.randrange(15)  # 160 flights outlast ten times 14
+            while len(lines(out / "journal.jsonl")) < wanted:
+                time.sleep(0.001)
+            time.sleep(chance.uniform(0.0, 0.03))
+            os.killpg(child, signal.SIGKILL) if kill % 2 else os.kill(child, signal.SIGKILL)
+            assert int(server.stdout.readline()) == signal.SIGKILL
+        server.stdin.write("go\n")
+        server.stdin.close()
+        server.stdout.readline()
+        assert int(server.stdout.readline()) == 0
+    undisturbed = fly(source, tmp_path / "whole")
+    assert (out / "flights.parquet").read_bytes() == (tmp_path / "whole/flights.parquet").read_bytes()
+    keys = [json.loads(line)["key"] for line in lines(out / "journal.jsonl")]
+    assert len(keys) == len(set(keys)) == 2 * seeds == len(undisturbed.rows)
+
+
+@pytest.mark.slow
+def test_when_a_campaign_is_killed_its_processes_end_in_the_middle_of_their_flights(fakes, tmp_path):
+    plan(tmp_path, 1)
+    (tmp_path / "server.py").write_text(SERVER)
+    command = [sys.executable, str(tmp_path / "server.py"), str(tmp_path / "p.toml"), str(tmp_path / "out")]
+    with subprocess.Popen([*command, "fake_flights:sleeper"], stdin=subprocess.PIPE, stdout=subprocess.PIPE) as server:
+        assert server.stdin is not None and server.stdout is not None
+        server.stdin.write(b"go\n")
+        server.stdin.close()
+        child = int(server.stdout.readline())
+        while not lines(fakes):
+            time.sleep(0.01)
+        os.kill(child, signal.SIGKILL)
+        server.stdout.readline()
+        asleep = Path("/proc") / lines(fakes)[0]
+        for _ in range(1000):
+            if not asleep.exists() or "\nState:\tZ" in (asleep / "status").read_text():
+                return
+            time.sleep(0.01)
+    pytest.fail("it sleeps on")
