@@ -1,0 +1,1 @@
+"""One page of evidence from campaigns: rows, groups of flights that may be pooled, figures, the page."""

@@ -1,0 +1,37 @@
+"""What a group's scenario claims, and what it lacks of the figures that it is held to."""
+
+from collections.abc import Sequence
+
+from dockair.errors import DockairError
+from dockair.scenarios.report.groups import Group
+from dockair.scenarios.schema import Scenario, load_scenario
+
+
+def scenario_of(group: Group) -> Scenario | None:
+    """Return the library's scenario of the group's name; None where the library has none."""
+    try:
+        return load_scenario(group.scenario)
+    except DockairError:
+        return None
+
+
+def claim_of(group: Group) -> str:
+    """Return the sentence that the scenario is there to show; "" where there is none."""
+    scenario = scenario_of(group)
+    return "" if scenario is None else scenario.claim.rstrip(".")
+
+
+def shortfalls_of(group: Group) -> Sequence[str] | None:
+    """Return what the group lacks; None where nothing is asked of it.
+
+    A scenario that flies by camera claims nothing of perfect navigation or of the baseline controller.
+    """
+    scenario = scenario_of(group)
+    if scenario is None or not scenario.accept.claims_figures:
+        return None
+    as_written = (
+        scenario.navigation.navigator == group.navigator
+        and scenario.guidance.controller == group.controller
+        and (scenario.camera.sensing == "measurements") == (group.sensing == "measurements")
+    )
+    return scenario.accept.judge(group.rows) if as_written else None

@@ -1,0 +1,69 @@
+"""The small table that a repository keeps of campaigns: counts, intervals, spread, causes, how to fly them again."""
+
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from dockair.rotations import Array
+from dockair.scenarios.report.acceptance import shortfalls_of
+from dockair.scenarios.report.folders import Campaign
+from dockair.scenarios.report.groups import Group, Share, groups_of, paired
+
+_MANIFEST = ("plan", "flights", "seeds", "commit", "uncommitted_changes", "code", "versions", "begun")
+
+
+def evidence_of(campaigns: Sequence[Campaign]) -> dict[str, Any]:
+    """Return the table; every number is None where there is nothing to take it from."""
+    groups = groups_of([row for campaign in campaigns for row in campaign.rows])
+    return {
+        "groups": [_group(group, groups) for group in groups],
+        "campaigns": [{key: campaign.manifest.get(key) for key in _MANIFEST} for campaign in campaigns],
+    }
+
+
+def as_text(table: Mapping[str, Any]) -> str:
+    """Return it as JSON, one group a few lines."""
+    return json.dumps(table, indent=1, allow_nan=False) + "\n"
+
+
+def _group(group: Group, groups: Sequence[Group]) -> dict[str, Any]:
+    pair = paired(group, groups)
+    shortfalls = shortfalls_of(group)
+    return {
+        "scenario": group.scenario,
+        "sensing": group.sensing,
+        "navigator": group.navigator,
+        "controller": group.controller,
+        "flights": len(group.rows),
+        "errors": len(group.failed_to_fly),
+        "first_attempt": _share(group.first_attempt),
+        "success": _share(group.success),
+        "inside_capture_radius": _share(group.inside_capture_radius),
+        "closing_1_0_to_1_5_m_s": _share(group.in_closing_band),
+        "radial_offset_median_m": _quantile(group.offsets_m, 0.5),
+        "radial_offset_90_m": _quantile(group.offsets_m, 0.9),
+        "closure_speed_max_m_s": _quantile(group.closing_m_s, 1.0),
+        "unsafe_seeds": [row["seed"] for row in group.unsafe],
+        "outcomes": dict(group.outcomes),
+        "causes_of_failed_attempts": dict(group.causes),
+        "failed_seeds": [row["seed"] for row in group.flown if not row["first_attempt"]],
+        "beside_perfect_navigation": None
+        if pair is None
+        else {"seeds": pair.seeds, "ours": pair.ours, "perfect": pair.truth, "ratio": _finite(pair.ratio)},
+        "shortfalls": None if shortfalls is None else list(shortfalls),
+    }
+
+
+def _share(share: Share) -> dict[str, Any]:
+    low, high = share.interval
+    return {"count": share.count, "of": share.of, "low": _finite(low), "high": _finite(high)}
+
+
+def _quantile(values: Array, share: float) -> float | None:
+    return round(float(np.quantile(values, share)), 4) if len(values) else None
+
+
+def _finite(value: float) -> float | None:
+    return round(value, 4) if np.isfinite(value) else None

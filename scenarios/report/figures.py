@@ -1,0 +1,175 @@
+"""The pictures of a report, as SVG text that stands inside the page; the same rows make the same bytes."""
+
+import io
+import json
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle
+
+from dockair.scenarios.report.groups import CAPTURE_M, CLOSING_BAND_M_S, Group, Share
+
+RIM_M = 0.25  # the LED ring's radius
+CLOSING_LIMIT_M_S = 2.6
+_TIMELINES = 40  # flights whose phases are drawn
+_PHASE_COLOURS = {
+    "join_up": "#d9d9d9",
+    "pre_contact": "#9ecae1",
+    "approach": "#3182bd",
+    "contact": "#a1d99b",
+    "hold": "#31a354",
+    "disconnect": "#c7c0e4",
+    "back_off": "#fdae6b",
+    "breakaway": "#de2d26",
+    "clear": "#636363",
+}
+_STYLE: dict[Any, Any] = {
+    "svg.hashsalt": "dockair",
+    "svg.fonttype": "none",
+    "font.size": 8.5,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.titlesize": 9.5,
+    "axes.titlelocation": "left",
+}
+
+
+def overview(groups: Sequence[Group]) -> str:
+    """Success of every group at the first attempt and within all, with Wilson's intervals."""
+    with mpl.rc_context(_STYLE):
+        figure = Figure(figsize=(12.0, 1.0 + 0.36 * len(groups)), layout="constrained")
+        ax = figure.subplots()
+        for k, group in enumerate(groups):
+            _share(ax, k - 0.13, group.success, "tab:blue", "o", "any attempt" if k == 0 else None)
+            _share(ax, k + 0.13, group.first_attempt, "tab:orange", "s", "first attempt" if k == 0 else None)
+        ax.set_yticks(range(len(groups)), [f"{g.scenario} ({g.sensing}, {g.controller})" for g in groups])
+        ax.invert_yaxis()
+        ax.set_xlim(-2.0, 102.0)
+        ax.set_xlabel("contact inside the limits [%], 95 % interval")
+        ax.grid(axis="x", alpha=0.3)
+        ax.legend(loc="lower left", frameon=False)
+        return _svg(figure)
+
+
+def panels(group: Group) -> str:
+    """Six panels on one group."""
+    with mpl.rc_context(_STYLE):
+        figure = Figure(figsize=(12.0, 7.4), layout="constrained")
+        axes = figure.subplots(2, 3)
+        _scatter(axes[0, 0], group)
+        _closing(axes[0, 1], group)
+        _by_attempt(axes[0, 2], group)
+        _navigation(axes[1, 0], group)
+        _causes(axes[1, 1], group)
+        _timelines(axes[1, 2], group)
+        return _svg(figure)
+
+
+def _share(ax: Axes, y: float, share: Share, colour: str, marker: str, label: str | None) -> None:
+    low, high = share.interval
+    ax.plot([100 * low, 100 * high], [y, y], color=colour, linewidth=1.5)
+    ax.plot(100 * share.value, y, marker, color=colour, markersize=5, label=label)
+
+
+def _scatter(ax: Axes, group: Group) -> None:
+    ax.set_title("where the tip crossed the ring's plane")
+    for outcome, colour, label in (("contact", "tab:blue", "contact"), (None, "tab:red", "no contact")):
+        chosen = [a for a in group.attempts if (a["outcome"] == "contact") == (outcome is not None)]
+        places = np.array([[_number(a.get("left_m")), _number(a.get("up_m"))] for a in chosen]).reshape(-1, 2)
+        ax.scatter(-places[:, 0], places[:, 1], s=12, color=colour, alpha=0.6, linewidths=0, label=label)
+    ax.add_patch(Circle((0.0, 0.0), CAPTURE_M, fill=False, color="tab:green", linestyle="--"))
+    ax.add_patch(Circle((0.0, 0.0), RIM_M, fill=False, color="black"))
+    ax.set(xlim=(-0.6, 0.6), ylim=(-0.6, 0.6), aspect="equal", xlabel="right [m], seen from behind", ylabel="up [m]")
+    ax.legend(loc="upper right", frameon=False)
+
+
+def _closing(ax: Axes, group: Group) -> None:
+    ax.set_title("closing speed of the contacts")
+    ax.axvspan(*CLOSING_BAND_M_S, color="tab:green", alpha=0.12)
+    ax.axvline(CLOSING_LIMIT_M_S, color="tab:red", linestyle="--")
+    ax.hist(group.closing_m_s, bins=list(np.arange(0.0, 2.85, 0.05)), color="tab:blue")
+    ax.set(xlabel="[m/s]; band of practice, limit", ylabel="contacts", xlim=(0.0, 2.8))
+
+
+def _by_attempt(ax: Axes, group: Group) -> None:
+    ax.set_title("contact inside the limits within n attempts")
+    most = max((row["attempts"] for row in group.flown), default=1)
+    for n in range(1, max(most, 1) + 1):
+        share = group.first_attempt if n == 1 else group.within(n)
+        low, high = share.interval
+        ax.plot([n, n], [100 * low, 100 * high], color="tab:blue")
+        ax.plot(n, 100 * share.value, "o", color="tab:blue")
+    ax.set(xlabel="n", ylabel="[%]", ylim=(-2.0, 102.0), xlim=(0.5, max(most, 1) + 0.5))
+    ax.set_xticks(range(1, max(most, 1) + 1))
+    ax.grid(axis="y", alpha=0.3)
+
+
+def _navigation(ax: Axes, group: Group) -> None:
+    ax.set_title("navigation error (lines), expected (dashed)")
+    bins = group.by_range
+    if not bins:
+        _say(ax, "no frames were used")
+        return
+    middle = [0.5 * (entry["low_m"] + entry["high_m"]) for entry in bins]
+    for name, colour in (("range", "tab:blue"), ("lateral", "tab:orange")):
+        ax.plot(middle, [1e3 * entry[f"{name}_rmse_m"] for entry in bins], "o-", color=colour, label=name, markersize=3)
+        ax.plot(middle, [1e3 * entry[f"{name}_sigma_m"] for entry in bins], "--", color=colour)
+    ax.set(xlabel="range from the camera [m]", ylabel="RMS [mm]", xscale="log", yscale="log")
+    ax.set_xticks([2, 3, 5, 7, 10, 20], ["2", "3", "5", "7", "10", "20"])
+    ax.set_yticks([0.3, 1, 3, 10, 30, 100], ["0.3", "1", "3", "10", "30", "100"])
+    ax.minorticks_off()
+    ax.grid(alpha=0.3)
+    ax.legend(frameon=False)
+
+
+def _causes(ax: Axes, group: Group) -> None:
+    ax.set_title("why attempts failed")
+    if not group.causes:
+        _say(ax, "none failed")
+        return
+    names, counts = zip(*reversed(group.causes), strict=True)
+    bars = ax.barh([name.replace("_", " ") for name in names], counts, color="tab:red", alpha=0.7)
+    ax.bar_label(bars, padding=2)
+    ax.set_xlabel("attempts")
+
+
+def _timelines(ax: Axes, group: Group) -> None:
+    shown = group.flown[:_TIMELINES]
+    ax.set_title("phases" if len(shown) == len(group.flown) else f"phases of the first {len(shown)} flights")
+    seen: set[str] = set()
+    for k, row in enumerate(shown):
+        entries = json.loads(row.get("timeline") or "[]")
+        ends = [entry["begun_s"] for entry in entries[1:]] + [row["duration_s"]]
+        for entry, end_s in zip(entries, ends, strict=True):
+            phase = entry["phase"]
+            label = phase.replace("_", " ") if phase not in seen else None
+            seen.add(phase)
+            colour = _PHASE_COLOURS.get(phase, "black")
+            ax.barh(k, end_s - entry["begun_s"], left=entry["begun_s"], height=0.85, color=colour, label=label)
+    if not seen:
+        _say(ax, "not recorded")
+        return
+    ax.set(xlabel="[s]", ylabel="flight")
+    ax.invert_yaxis()
+    ax.legend(ncols=3, frameon=False, fontsize=7, loc="upper center", bbox_to_anchor=(0.5, -0.16))
+
+
+def _say(ax: Axes, text: str) -> None:
+    ax.text(0.5, 0.5, text, transform=ax.transAxes, ha="center", color="grey")
+    ax.set_axis_off()
+
+
+def _number(value: Any) -> float:
+    return math.nan if value is None else float(value)
+
+
+def _svg(figure: Figure) -> str:
+    buffer = io.StringIO()
+    figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
+    text = buffer.getvalue()
+    return text[text.index("<svg") :]

@@ -1,0 +1,206 @@
+"""Flights that may be pooled: same scenario, same sensing, same navigator, same controller.
+
+Perfect navigation, the measurement model and the camera never share a group: what one shows says nothing of the other
+until both stand side by side. Where a group on the truth has flown the same seeds, `paired` puts it there.
+"""
+
+import json
+import math
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from dockair.rotations import Array
+from dockair.scenarios.statistics import wilson_interval
+
+Row = Mapping[str, Any]
+
+CLOSING_BAND_M_S = (1.0, 1.5)  # service practice
+CAPTURE_M = 0.15  # of the tip from the ring's centre, inside which a contact is asked for
+SENSING_IN_WORDS = {"camera": "camera", "measurements": "measurement model", "truth": "perfect navigation"}
+
+
+@dataclass(frozen=True, slots=True)
+class Share:
+    """So many of so many, with Wilson's 95 % interval."""
+
+    count: int
+    of: int
+
+    @property
+    def value(self) -> float:
+        """The share itself; NaN of nothing."""
+        return self.count / self.of if self.of else math.nan
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Lower and upper end."""
+        return wilson_interval(self.count, self.of) if self.of else (math.nan, math.nan)
+
+    def __str__(self) -> str:
+        if not self.of:
+            return "–"
+        low, high = self.interval
+        return f"{self.count}/{self.of} = {100 * self.value:.1f} % ({100 * low:.1f}–{100 * high:.1f})"
+
+
+@dataclass(frozen=True)
+class Group:
+    """Rows that may be pooled."""
+
+    scenario: str
+    sensing: str
+    navigator: str
+    controller: str
+    rows: tuple[Row, ...]
+
+    @property
+    def anchor(self) -> str:
+        """Its id on the page."""
+        return "-".join([self.scenario, self.sensing, self.controller, self.navigator.rpartition(":")[2]])
+
+    @property
+    def title(self) -> str:
+        """What it is, in words."""
+        return f"{self.scenario}: {SENSING_IN_WORDS.get(self.sensing, self.sensing)}, {self.controller} controller"
+
+    @cached_property
+    def flown(self) -> list[Row]:
+        """Rows without an error."""
+        return [row for row in self.rows if not row["error"]]
+
+    @cached_property
+    def failed_to_fly(self) -> list[Row]:
+        """Rows that say why there was no flight to the end."""
+        return [row for row in self.rows if row["error"]]
+
+    @property
+    def first_attempt(self) -> Share:
+        """Contact inside the limits at the first attempt; a flight that crashed is none."""
+        return Share(sum(bool(row["first_attempt"]) for row in self.flown), len(self.rows))
+
+    @property
+    def success(self) -> Share:
+        """Contact inside the limits at any attempt."""
+        return Share(sum(bool(row["success"]) for row in self.flown), len(self.rows))
+
+    @cached_property
+    def contacts(self) -> list[Row]:
+        """Rows that ended in a contact."""
+        return [row for row in self.flown if row["outcome"] == "contact"]
+
+    @cached_property
+    def offsets_m(self) -> Array:
+        """Radial offsets at the ring's plane of the contacts."""
+        return _numbers(self.contacts, "radial_offset_m")
+
+    @cached_property
+    def closing_m_s(self) -> Array:
+        """Closing speeds of the contacts."""
+        return _numbers(self.contacts, "closure_speed_m_s")
+
+    @property
+    def in_closing_band(self) -> Share:
+        """Contacts at the closing speeds of service practice."""
+        low, high = CLOSING_BAND_M_S
+        return Share(int(((self.closing_m_s >= low) & (self.closing_m_s <= high)).sum()), len(self.contacts))
+
+    @property
+    def inside_capture_radius(self) -> Share:
+        """Contacts within the distance from the basket's centre that a docking is asked for."""
+        return Share(int((self.offsets_m <= CAPTURE_M).sum()), len(self.contacts))
+
+    @property
+    def outcomes(self) -> list[tuple[str, int]]:
+        """How the flights ended, the most frequent first."""
+        return Counter(str(row["outcome"]) for row in self.rows).most_common()
+
+    @property
+    def unsafe(self) -> list[Row]:
+        """Flights with an unsafe contact."""
+        return [row for row in self.flown if row["unsafe"]]
+
+    @cached_property
+    def attempts(self) -> list[Mapping[str, Any]]:
+        """Every attempt of every flight."""
+        return [attempt for row in self.flown for attempt in json.loads(row["attempt_log"])]
+
+    def within(self, count: int) -> Share:
+        """Contact inside the limits within so many attempts."""
+        good = sum(bool(row["success"]) and row["attempts"] <= count for row in self.flown)
+        return Share(good, len(self.rows))
+
+    @cached_property
+    def causes(self) -> list[tuple[str, int]]:
+        """Causes of the attempts that failed, the most frequent first."""
+        return Counter(a["cause"] or "not said" for a in self.attempts if a["outcome"] != "contact").most_common()
+
+    @cached_property
+    def by_range(self) -> list[dict[str, float]]:
+        """Errors of the navigation in bins of range, pooled over the flights by their counts."""
+        return _pooled([entry for row in self.flown for entry in json.loads(row.get("nav_by_range") or "[]")])
+
+
+def groups_of(rows: Sequence[Row]) -> list[Group]:
+    """Return the groups, by scenario and then by sensing."""
+    kinds: dict[tuple[str, str, str, str], list[Row]] = {}
+    for row in sorted(rows, key=lambda row: int(row["seed"])):
+        kind = str(row["scenario"]), str(row["sensing"]), str(row["navigator"]), str(row["controller"])
+        kinds.setdefault(kind, []).append(row)
+    return [Group(*kind, tuple(kinds[kind])) for kind in sorted(kinds)]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Paired:
+    """A group beside perfect navigation on the same seeds."""
+
+    seeds: int
+    ours: int  #: successes
+    truth: int
+    only_ours: int  #: seeds at which only ours succeeded
+    only_truth: int
+
+    @property
+    def ratio(self) -> float:
+        """Successes of ours over those on the truth; NaN without any."""
+        return self.ours / self.truth if self.truth else math.nan
+
+
+def paired(group: Group, groups: Sequence[Group]) -> Paired | None:
+    """Return the comparison at the first attempt, None where the truth has not flown these seeds."""
+    for other in groups:
+        if other.sensing == "truth" != group.sensing and other.scenario == group.scenario:
+            truth = {row["seed"]: bool(row["first_attempt"]) for row in other.rows if not row["error"]}
+            both = [(bool(r["first_attempt"]), truth[r["seed"]]) for r in group.flown if r["seed"] in truth]
+            if both and other.controller == group.controller:
+                a, b = np.array(both).T
+                return Paired(
+                    seeds=len(both), ours=int(a.sum()), truth=int(b.sum()),
+                    only_ours=int((a & ~b).sum()), only_truth=int((~a & b).sum()),
+                )  # fmt: skip
+    return None
+
+
+def _numbers(rows: Sequence[Row], name: str) -> Array:
+    values = np.array([math.nan if row[name] is None else row[name] for row in rows], dtype=float)
+    return np.asarray(values[np.isfinite(values)])
+
+
+def _pooled(entries: Sequence[Mapping[str, Any]]) -> list[dict[str, float]]:
+    pooled = []
+    for low, high in sorted({(entry["low_m"], entry["high_m"]) for entry in entries}):
+        mine = [entry for entry in entries if entry["low_m"] == low]
+        counts = np.array([entry["count"] for entry in mine], dtype=float)
+        row = {"low_m": low, "high_m": high, "count": float(counts.sum())}
+        for name in mine[0]:
+            values = np.array([math.nan if e[name] is None else e[name] for e in mine], dtype=float)
+            if name.endswith(("_rmse_m", "_rmse_deg", "_sigma_m", "_sigma_deg")):
+                row[name] = float(np.sqrt(np.nansum(counts * values**2) / counts.sum()))
+            elif name.endswith("_bias_m"):
+                row[name] = float(np.nansum(counts * values) / counts.sum())
+        pooled.append(row)
+    return pooled

@@ -1,0 +1,97 @@
+"""The page: overview, what vision costs, a section a group, how it was made; one HTML file that needs no other."""
+
+import json
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+
+from dockair.rotations import Array
+from dockair.scenarios.report import figures
+from dockair.scenarios.report.acceptance import claim_of, shortfalls_of
+from dockair.scenarios.report.folders import Campaign
+from dockair.scenarios.report.groups import Group, Row, groups_of, paired
+
+LIMITS = "held by the coupling, nothing unsafe in the whole flight"
+
+
+def page(title: str, campaigns: Sequence[Campaign]) -> str:
+    """Return the HTML text.
+
+    Args:
+        title: of the page.
+        campaigns: whose flights are pooled where they may be.
+    """
+    rows = [row for campaign in campaigns for row in campaign.rows]
+    groups = groups_of(rows)
+    environment = Environment(
+        loader=PackageLoader("dockair.scenarios.report", ""), autoescape=True, undefined=StrictUndefined,
+        trim_blocks=True, lstrip_blocks=True,
+    )  # fmt: skip
+    environment.filters["quantile"] = _quantile
+    pairs = [(group, pair) for group in groups if (pair := paired(group, groups)) is not None]
+    return environment.get_template("page.html.jinja").render(
+        title=title,
+        flights=len(rows),
+        crashed=sum(len(group.failed_to_fly) for group in groups),
+        limits=LIMITS,
+        groups=groups,
+        pairs=pairs,
+        overview=Markup(figures.overview(groups)),
+        panels={group.anchor: Markup(figures.panels(group)) for group in groups},
+        shortfalls={group.anchor: shortfalls_of(group) for group in groups},
+        claims={group.anchor: claim_of(group) for group in groups},
+        failures={group.anchor: _failures(group) for group in groups},
+        manifests=[_manifest(campaign) for campaign in campaigns],
+    )
+
+
+def _manifest(campaign: Campaign) -> dict[str, Any]:
+    entries = [
+        (key, value if isinstance(value, str) else json.dumps(value, ensure_ascii=False))
+        for key, value in campaign.manifest.items()
+    ]
+    return {"name": campaign.name, "entries": entries}
+
+
+def _failures(group: Group) -> list[dict[str, Any]]:
+    """Flights that did not succeed at the first attempt, or did something unsafe."""
+    return [
+        {
+            "seed": row["seed"],
+            "outcome": row["outcome"] or "error",
+            "attempts": row["attempts"],
+            "cause": (row["cause"] or "").replace("_", " "),
+            "story": row["error"] or "; ".join(filter(None, [_story(row), row["unsafe"]])),
+            "command": row.get("command") or "",
+        }
+        for row in group.rows
+        if row["error"] or row["unsafe"] or not row["first_attempt"]
+    ]
+
+
+def _story(row: Row) -> str:
+    parts = []
+    for attempt in json.loads(row["attempt_log"] or "[]"):
+        offset = attempt["radial_offset_m"]
+        where = "" if offset is None or not math.isfinite(offset) else f" {offset:.2f} m off"
+        why = ", ".join(filter(None, [attempt["cause"].replace("_", " "), attempt["reason"]]))
+        parts.append(
+            f"{attempt['number']}: {attempt['outcome'].replace('_', ' ')}{where}" + (f" ({why})" if why else "")
+        )
+    return "; ".join(parts)
+
+
+def _quantile(values: Array, share: float) -> str:
+    return f"{float(np.quantile(values, share)):.3f} m" if len(values) else "–"
+
+
+def write_text(text: str, path: Path) -> Path:
+    """Write a file and return its path."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text, encoding="utf-8")
+    return path

@@ -1,0 +1,34 @@
+"""The command `dockair report`."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from dockair.scenarios.cli_options import Json, print_json
+
+
+def report(
+    folders: Annotated[list[Path], typer.Argument(metavar="FOLDER...", help="Folders of campaigns, over or not.")],
+    out: Annotated[Path | None, typer.Option(help="HTML file; by default report.html in the first folder.")] = None,
+    title: Annotated[str | None, typer.Option(help="Of the page; by default the campaigns' names.")] = None,
+    evidence: Annotated[
+        Path | None, typer.Option(help="A small JSON table beside it: counts, intervals, manifests; for a repository.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Make one self-contained HTML page of campaigns: rates with intervals, scatter, errors, causes of failure."""
+    from dockair.scenarios.report import evidence as table
+    from dockair.scenarios.report.folders import read_campaigns
+    from dockair.scenarios.report.page import page, write_text
+
+    campaigns = read_campaigns(folders)
+    title = title or ", ".join(campaign.name for campaign in campaigns)
+    path = write_text(page(title, campaigns), out or folders[0] / "report.html")
+    found = table.evidence_of(campaigns)
+    if evidence is not None:
+        write_text(table.as_text(found), evidence)
+    if as_json:
+        print_json(found | {"out": str(path)})
+    else:
+        typer.echo(str(path))

@@ -1,0 +1,163 @@
+"""The report: what may be pooled, what it counts, that the page needs no other file and says how to fly again."""
+
+import json
+import re
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+
+from dockair.errors import DockairError
+from dockair.scenarios.campaign import manifest as manifests
+from dockair.scenarios.campaign import table
+from dockair.scenarios.campaign.row import COLUMNS
+from dockair.scenarios.report.evidence import evidence_of
+from dockair.scenarios.report.folders import Campaign, read_campaigns
+from dockair.scenarios.report.groups import Share, groups_of, paired
+from dockair.scenarios.report.page import page
+from dockair.scenarios.statistics import wilson_interval
+
+OUR_NAVIGATOR = "dockair.nav.navigator:Navigator"
+
+
+def _attempt(number, outcome="contact", offset_m=0.05, cause=""):
+    return {
+        "number": number, "begun_s": 5.0 + 20 * number, "ended_s": 12.0 + 20 * number, "outcome": outcome,
+        "radial_offset_m": offset_m, "left_m": offset_m, "up_m": 0.0, "closure_speed_m_s": 1.2, "angle_deg": 3.0,
+        "cause": cause, "reason": "",
+    }  # fmt: skip
+
+
+def _row(seed, *, scenario="light_gusts", sensing="camera", attempts=None, **changes):
+    log = attempts or [_attempt(1)]
+    held = log[-1]["outcome"] == "contact"
+    values = {
+        "scenario": scenario, "seed": seed, "sensing": sensing,
+        "navigator": "truth" if sensing == "truth" else OUR_NAVIGATOR, "controller": "predictive",
+        "outcome": log[-1]["outcome"], "attempts": len(log), "first_attempt": held and len(log) == 1, "success": held,
+        "unsafe": "", "cause": log[0]["cause"], "contact_time_s": 30.0 if held else None,
+        "radial_offset_m": log[-1]["radial_offset_m"] if held else None, "closure_speed_m_s": 1.2 if held else None,
+        "angle_deg": 3.0, "duration_s": 60.0, "error": "", "attempt_log": json.dumps(log), "timeline": "[]",
+        "nav_by_range": "[]", "scenario_hash": f"{scenario}-{sensing}",
+    }  # fmt: skip
+    return dict.fromkeys(COLUMNS) | values | changes
+
+
+def _campaign(rows):
+    return Campaign(name="made", manifest={"plan": {"name": "made"}, "commit": "abc"}, rows=rows)
+
+
+class _Page(HTMLParser):
+    def __init__(self, text):
+        super().__init__()
+        self.links, self.ids, self.stack = [], set(), []
+        self.feed(text)
+
+    def handle_starttag(self, tag, attrs):
+        values = dict(attrs)
+        self.ids.add(values.get("id"))
+        self.links += [values[key] for key in ("href", "src", "xlink:href") if key in values]
+
+
+def test_sensing_is_never_pooled():
+    rows = [_row(seed, sensing=kind) for seed in range(3) for kind in ("camera", "truth", "measurements")]
+    groups = groups_of(rows)
+    assert [(group.sensing, len(group.rows)) for group in groups] == [("camera", 3), ("measurements", 3), ("truth", 3)]
+
+
+def test_a_flight_that_crashed_is_no_success_and_still_counts():
+    rows = [_row(0), _row(1, error="ValueError: x", outcome="error", success=False, first_attempt=False)]
+    (group,) = groups_of(rows)
+    assert (group.first_attempt.count, group.first_attempt.of) == (1, 2)
+    assert (group.success.count, group.success.of) == (1, 2)
+
+
+def test_success_within_attempts_grows_and_ends_at_all():
+    rows = [_row(k, attempts=[_attempt(i, "rim_strike", 0.3, "gust") for i in range(1, n)] + [_attempt(n)])
+            for k, n in enumerate((1, 1, 2, 3))]  # fmt: skip
+    (group,) = groups_of(rows)
+    assert [group.within(n).count for n in (1, 2, 3)] == [2, 3, 4]
+    assert group.causes == [("gust", 3)]
+
+
+def test_intervals_are_wilsons():
+    assert Share(7, 10).interval == wilson_interval(7, 10)
+    assert str(Share(0, 0)) == "–"
+
+
+def test_what_vision_costs_is_counted_on_common_seeds_only():
+    bad = [_attempt(1, "miss", 0.4, "gust")]
+    camera = [_row(0), _row(1, attempts=bad), _row(2), _row(9)]
+    truth = [_row(0, sensing="truth"), _row(1, sensing="truth"), _row(2, sensing="truth", attempts=bad)]
+    groups = groups_of(camera + truth)
+    pair = paired(groups[0], groups)
+    assert (pair.seeds, pair.ours, pair.truth, pair.only_ours, pair.only_truth) == (3, 2, 2, 1, 1)
+    assert paired(groups[1], groups) is None
+
+
+def test_errors_by_range_are_pooled_by_their_squares():
+    """3 frames of 1 mm and 1 of 3 mm: sqrt((3 * 1 + 9) / 4) = sqrt 3 mm; bias (3 * 1 - 3) / 4 = 0."""
+
+    def entry(count, size):
+        sizes = dict.fromkeys(("range_rmse_m", "lateral_rmse_m", "range_sigma_m", "lateral_sigma_m"), size)
+        return {"low_m": 2.0, "high_m": 3.0, "count": count, "range_bias_m": size if count > 1 else -size,
+                "attitude_rmse_deg": size, "attitude_sigma_deg": size} | sizes  # fmt: skip
+
+    rows = [_row(k, nav_by_range=json.dumps([entry(*e)])) for k, e in enumerate(((3, 1e-3), (1, 3e-3)))]
+    (bin_,) = groups_of(rows)[0].by_range
+    assert bin_["range_rmse_m"] == pytest.approx(np.sqrt(3.0) * 1e-3)
+    assert bin_["range_bias_m"] == pytest.approx(0.0, abs=1e-12)
+    assert bin_["count"] == 4
+
+
+def test_the_page_needs_no_other_file_and_its_links_lead_somewhere():
+    rows = [_row(k, attempts=[_attempt(1, "miss", 0.4, "gust")]) for k in range(3)] + [_row(5)]
+    text = page("made", [_campaign(rows)])
+    parsed = _Page(text)
+    assert not re.search(r"(?:src|href)=\"https?:", text)
+    assert all(link.startswith("#") and link[1:] in parsed.ids for link in parsed.links)
+
+
+def test_every_flight_that_failed_says_how_to_fly_it_again():
+    rows = [_row(0), _row(7, attempts=[_attempt(1, "miss", 0.4, "gust")], command="dockair fly light_gusts --seed 7")]
+    text = page("made", [_campaign(rows)])
+    assert "dockair fly light_gusts --seed 7" in text
+    assert "0.40 m off (gust)" in text
+
+
+def test_text_of_a_flight_cannot_become_markup():
+    text = page("made", [_campaign([_row(0, error="<script>alert(1)</script>")])])
+    assert "<script>alert" not in text
+
+
+def test_the_same_rows_make_the_same_page():
+    rows = [_row(k) for k in range(4)]
+    assert page("made", [_campaign(rows)]) == page("made", [_campaign(rows)])
+
+
+def test_evidence_is_plain_json_with_counts_of_every_group():
+    rows = [_row(0), _row(1, attempts=[_attempt(1, "miss", 0.4, "gust")]), _row(0, sensing="truth")]
+    table_ = evidence_of([_campaign(rows)])
+    json.dumps(table_, allow_nan=False)
+    camera, truth = table_["groups"]
+    assert camera["first_attempt"]["count"] == 1 and camera["failed_seeds"] == [1]
+    assert camera["causes_of_failed_attempts"] == {"gust": 1}
+    assert truth["shortfalls"] is None
+
+
+def test_a_flight_in_two_campaigns_is_refused(tmp_path):
+    folders = []
+    for name in ("a", "b"):
+        folder = tmp_path / name
+        folder.mkdir()
+        manifests.write_json({"plan": {"name": name}}, folder / manifests.FILE_NAME)
+        table.write_table([_row(0)], folder)
+        folders.append(folder)
+    assert len(read_campaigns(folders[:1])[0].rows) == 1
+    with pytest.raises(DockairError, match="seed 0, in a and b"):
+        read_campaigns(folders)
+
+
+def test_a_folder_without_a_campaign_is_one_clear_line(tmp_path):
+    with pytest.raises(DockairError, match="manifest of a campaign"):
+        read_campaigns([tmp_path])
