@@ -1,6 +1,6 @@
 """Dock with a controller of one's own, in the gymnasium environment, camera in the loop.
 
-    python examples/own_controller.py [SCENARIO] [SEED]
+    python examples/own_controller.py [SCENARIO] [SEED] [ENVIRONMENT]
 
 The controller steers the ring, as the navigation sees it in body axes, onto the probe's line, and closes when it is
 there. Its command is an increment of velocity; because the receiver's own velocity drifts, the command is integrated
@@ -13,7 +13,7 @@ import gymnasium
 import numpy as np
 
 import dockair  # noqa: F401 - makes the environments known
-from dockair.scenarios.envs import OBSERVATION
+from dockair.scenarios.envs_tables import OBSERVATION
 
 INDEX = {entry.name: k for k, entry in enumerate(OBSERVATION)}
 STAND_OFF_M, CLOSING_M_S = 4.0, 1.2
@@ -30,37 +30,45 @@ class Controller:
         Args:
             step_s: length of a step of the environment.
         """
-        self._step_s, self._velocity, self._lined_up_s, self._closing = step_s, np.zeros(3), 0.0, False
+        self._step_s, self._velocity, self._lined_up_s, self.closing = step_s, np.zeros(3), 0.0, False
 
-    def step(self, observation: np.ndarray) -> np.ndarray:
-        """Return the action for an observation."""
-        p, v = (observation[INDEX[name] : INDEX[name] + 3] for name in ("p_PD_B_x", "v_PD_B_x"))
-        rate = v - np.cross(observation[INDEX["gyro_x"] : INDEX["gyro_x"] + 3], p)  # in turning axes
-        if not observation[INDEX["valid"]]:
-            return self._action(np.zeros(3))
+    def step(self, p: np.ndarray, rate: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return velocity and acceleration to command.
+
+        Args:
+            p: (3,) ring from the probe's tip, body axes [m].
+            rate: (3,) its change in these axes [m/s].
+        """
         steady = np.hypot(p[1], p[2]) < LINED_UP_M and np.linalg.norm(rate) < LINED_UP_M_S
         self._lined_up_s = self._lined_up_s + self._step_s if steady else 0.0
-        self._closing = self._closing or self._lined_up_s > LINED_UP_S
+        self.closing = self.closing or self._lined_up_s > LINED_UP_S
         wanted = POSITION_GAIN * p + RATE_GAIN * rate
-        if self._closing:
+        if self.closing:
             wanted[0] = RATE_GAIN * (rate[0] + CLOSING_M_S)
         else:
             wanted[0] = POSITION_GAIN * (p[0] - STAND_OFF_M) + RATE_GAIN * rate[0]
-        return self._action(np.clip(wanted, -1.0, 1.0))
-
-    def _action(self, acceleration: np.ndarray) -> np.ndarray:
+        acceleration = np.clip(wanted, -1.0, 1.0)
         self._velocity = np.clip(self._velocity + acceleration * self._step_s, -2.5, 2.5)
-        return np.concatenate([self._velocity, acceleration]).astype(np.float32)
+        return self._velocity, acceleration
 
 
-def main(scenario: str = "default", seed: str = "0") -> None:
+def action_for(controller: Controller, observation: np.ndarray) -> np.ndarray:
+    """Return the action for an observation."""
+    p, v, gyro = (observation[INDEX[name] : INDEX[name] + 3] for name in ("p_PD_B_x", "v_PD_B_x", "gyro_x"))
+    rate = v - np.cross(gyro, p)  # in turning axes
+    if not observation[INDEX["valid"]]:
+        p, rate = np.array([STAND_OFF_M, 0.0, 0.0]), np.zeros(3)  # nothing to steer to: hold the velocity
+    return np.concatenate(controller.step(p, rate)).astype(np.float32)
+
+
+def main(scenario: str = "default", seed: str = "0", environment: str = "dockair/Dock-v0") -> None:
     """Fly one episode and say how it ended."""
-    env = gymnasium.make("dockair/Dock-v0", scenario=scenario)
+    env = gymnasium.make(environment, scenario=scenario)
     controller = Controller(step_s=0.01)
     observation, info = env.reset(seed=int(seed))
     total, over = 0.0, False
     while not over:
-        observation, reward, terminated, truncated, info = env.step(controller.step(observation))
+        observation, reward, terminated, truncated, info = env.step(action_for(controller, observation))
         total, over = total + float(reward), terminated or truncated
     truth = info["truth"]
     print(f"{info['outcome']} after {truth['time_s']:.1f} s, sum of rewards {total:.2f}")

@@ -1,31 +1,84 @@
-"""What a flight must show for its scenario's claim to hold."""
+"""What one flight, and what a campaign of many, must show for its scenario's claim to hold.
 
-from typing import Literal
+Of a campaign's rows (one a flight: dockair/scenarios/campaign) a flight that crashed counts as flown without success.
+
+| key                        | of a campaign                                                                          |
+|----------------------------|----------------------------------------------------------------------------------------|
+| first_attempt_rate_min     | part of the flights whose first attempt ended in a contact inside the limits           |
+| success_rate_min           | part of the flights with such a contact in any of their attempts                       |
+| clean_rate_min             | part of the flights that ended in such a contact, or went away without touching        |
+| closure_rate_min           | part of the contacts whose speed lies between closure_speed_min_m_s and _max_m_s       |
+| radial_offset_median_max_m | median over the contacts                                                               |
+| unsafe_max                 | flights in which anything was unsafe, 0 if not said                                    |
+
+Where no rate is asked for, every flight has to show what one flight must.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field
 
+from dockair.errors import DockairError
 from dockair.scenarios.table import Table
 
 OutcomeName = Literal["contact", "miss", "rim_strike", "abort", "collision", "timeout", "diverged"]
 
+Row = Mapping[str, Any]
+_Rate = Annotated[float | None, Field(ge=0.0, le=1.0)]
+_UNTOUCHED = ("abort", "miss")  # outcomes of a flight that ended clear without having touched anything
+
 
 class Accept(Table):
-    """What a flight must show for its claim to hold; empty when the scenario claims nothing in figures."""
+    """What must be shown for the claim to hold; empty when the scenario claims nothing in figures."""
 
     outcome: OutcomeName | None = None
     radial_offset_max_m: float | None = Field(default=None, gt=0.0)
     closure_speed_min_m_s: float | None = Field(default=None, ge=0.0)
     closure_speed_max_m_s: float | None = Field(default=None, gt=0.0)
+    first_attempt_rate_min: _Rate = None
+    success_rate_min: _Rate = None
+    clean_rate_min: _Rate = None
+    closure_rate_min: _Rate = None
+    radial_offset_median_max_m: float | None = Field(default=None, gt=0.0)
+    unsafe_max: int = Field(default=0, ge=0)
 
     @property
     def claims_figures(self) -> bool:
         """Whether anything is asked for."""
-        return any(value is not None for value in self.model_dump().values())
+        return any(value is not None for key, value in self.model_dump().items() if key != "unsafe_max")
 
-    def shortfalls(self, outcome: str, radial_offset_m: float | None, closure_speed_m_s: float | None) -> list[str]:
-        """Return a line for each figure that the flight did not reach; the two figures are None without contact."""
-        lines = []
+    @property
+    def claims_rates(self) -> bool:
+        """Whether anything is asked for that only a campaign can show."""
+        return any(
+            getattr(self, key) is not None for key in (*_RATES, "closure_rate_min", "radial_offset_median_max_m")
+        )
+
+    @property
+    def in_words(self) -> str:
+        """What is asked for, in one line; "" where nothing is."""
+        low, high = self.closure_speed_min_m_s, self.closure_speed_max_m_s
+        parts = [] if self.outcome is None else [self.outcome.replace("_", " ")]
+        parts += [f"{100.0 * rate:g} % {words}" for key, words in _IN_WORDS.items() if (rate := getattr(self, key))]
+        if self.radial_offset_max_m is not None:
+            parts.append(f"within {self.radial_offset_max_m:g} m")
+        if self.radial_offset_median_max_m is not None:
+            parts.append(f"median offset {self.radial_offset_median_max_m:g} m")
+        if low is not None or high is not None:
+            speeds = f"{low or 0.0:g} to {high:g} m/s" if high is not None else f"from {low:g} m/s on"
+            share = "" if self.closure_rate_min is None else f"{100.0 * self.closure_rate_min:g} % "
+            parts.append(f"{share}at {speeds}")
+        if parts and self.unsafe_max:
+            parts.append(f"unsafe in at most {self.unsafe_max}")
+        return ", ".join(parts)
+
+    def shortfalls(
+        self, outcome: str, radial_offset_m: float | None, closure_speed_m_s: float | None, unsafe: Sequence[str] = ()
+    ) -> list[str]:
+        """Return a line for each figure that one flight did not reach; the two figures are None without contact."""
+        lines = [f"unsafe: {what}" for what in unsafe]
         if self.outcome is not None and outcome != self.outcome:
             lines.append(f"outcome {outcome}, wanted {self.outcome}")
         limits = (
@@ -39,3 +92,85 @@ class Accept(Table):
             if not low <= value <= high:  # also when the value is NaN
                 lines.append(f"{label} {value:.3f} {unit}, wanted {low:g} to {high:g}")
         return lines
+
+    def judge(self, rows: Sequence[Row]) -> list[str]:
+        """Return a line for each figure that a campaign did not reach.
+
+        Args:
+            rows: one scenario's flights, one a row.
+
+        Raises:
+            DockairError: no rows, or flights with and without a camera mixed.
+        """
+        _check(rows)
+        unsafe = [row["seed"] for row in rows if row["unsafe"]]
+        lines = []
+        if len(unsafe) > self.unsafe_max:
+            lines.append(
+                f"unsafe in {len(unsafe)} of {len(rows)} flights, wanted at most {self.unsafe_max}: {_some(unsafe)}"
+            )
+        if not self.claims_rates:
+            return lines + self._each(rows)
+        for key, (label, holds) in _RATES.items():
+            lines += _rate(label, sum(bool(holds(row)) for row in rows), len(rows), getattr(self, key))
+        return lines + self._of_contacts([row for row in rows if row["outcome"] == "contact"])
+
+    def _of_contacts(self, contacts: Sequence[Row]) -> list[str]:
+        lines = []
+        if self.closure_rate_min is not None:
+            low, high = self.closure_speed_min_m_s or 0.0, self.closure_speed_max_m_s or np.inf
+            inside = sum(low <= row["closure_speed_m_s"] <= high for row in contacts)
+            lines += _rate(f"contacts at {low:g} to {high:g} m/s", inside, len(contacts), self.closure_rate_min)
+        if self.radial_offset_median_max_m is not None and contacts:
+            median_m = float(np.median([row["radial_offset_m"] for row in contacts]))
+            if not median_m <= self.radial_offset_median_max_m:
+                wanted = self.radial_offset_median_max_m
+                lines.append(f"median radial offset {median_m:.3f} m, wanted at most {wanted:g}")
+        return lines
+
+    def _each(self, rows: Sequence[Row]) -> list[str]:
+        """Hold every flight against what one flight must show."""
+        short = []
+        for row in rows:
+            contact = row["outcome"] == "contact"
+            offset, speed = (row["radial_offset_m"], row["closure_speed_m_s"]) if contact else (None, None)
+            if row["error"] or self.shortfalls(row["outcome"], offset, speed):
+                short.append(row["seed"])
+        return [f"{len(short)} of {len(rows)} flights fall short: {_some(short)}"] if short else []
+
+
+def is_clean(row: Row) -> bool:
+    """Return whether a flight made contact inside the limits or went away without touching, and nothing was unsafe."""
+    return not row["error"] and not row["unsafe"] and bool(row["success"] or row["outcome"] in _UNTOUCHED)
+
+
+#: Key -> what it counts, and whether a row counts.
+_RATES: dict[str, tuple[str, Callable[[Row], bool]]] = {
+    "first_attempt_rate_min": ("contacts at the first attempt", lambda row: not row["error"] and row["first_attempt"]),
+    "success_rate_min": ("contacts in any attempt", lambda row: not row["error"] and row["success"]),
+    "clean_rate_min": ("contacts or clean departures", is_clean),
+}
+_IN_WORDS = {
+    "first_attempt_rate_min": "at the first attempt",
+    "success_rate_min": "within all",
+    "clean_rate_min": "contact or clean departure",
+}
+
+
+def _check(rows: Sequence[Row]) -> None:
+    if not rows:
+        raise DockairError("rows", expected="at least one flight", got=0)
+    kinds = sorted({str(row["sensing"]) for row in rows if not row["error"]})
+    if len(kinds) > 1:
+        raise DockairError("rows", expected="flights that are comparable: one kind of sensing", got=kinds)
+
+
+def _rate(label: str, count: int, of: int, wanted: float | None) -> list[str]:
+    if wanted is None or (of > 0 and count >= wanted * of):
+        return []
+    return [f"{label} {count} of {of}, wanted at least {100.0 * wanted:g} %"]
+
+
+def _some(seeds: Sequence[int]) -> str:
+    shown = ", ".join(str(seed) for seed in seeds[:5])
+    return f"seeds {shown}" + (", ..." if len(seeds) > 5 else "")

@@ -21,8 +21,8 @@ PARTS: dict[str, tuple[str, str]] = {
     "physics": ("dockair.sim.world", "World.step"),
     "render": ("dockair.sim.camera.background", "Background.electrons"),
     "sensor": ("dockair.sim.camera.camera", "NearInfraredCamera.expose"),
-    "detect": ("dockair.nav.navigator", "detect"),
-    "identify": ("dockair.nav.navigator", "identify"),
+    "detect": ("dockair.nav.ring_finder", "detect"),
+    "identify": ("dockair.nav.ring_finder", "identify"),
     "pose": ("dockair.nav.navigator", "solve_pose"),
     "navigation": ("dockair.nav.navigator", "Navigator.step"),
 }

@@ -6,27 +6,31 @@ from typing import TypeVar
 
 import numpy as np
 
-from dockair.calibration import Camera, GyroSheet, LedRing, Mounting, NavigationSheets, StartGeometry
+from dockair.calibration import Camera, LedRing, Mounting, NavigationSheets
 from dockair.clock import Clock
 from dockair.errors import DockairError
 from dockair.messages import Navigates
 from dockair.nav.guidance.approach import GuidanceSettings
+from dockair.nav.guidance.bow_wave_push import BowWavePush
 from dockair.nav.guidance.phases import PhaseLimits
 from dockair.nav.navigator import Navigator, NavigatorSettings
 from dockair.parameters import load_parameters
 from dockair.rotations import Array, matrix_from_yaw_pitch_roll
 from dockair.scenarios import build_receiver
 from dockair.scenarios.build_air import air_motion
+from dockair.scenarios.build_measured import measured_leds
 from dockair.scenarios.exact_json import name_of
+from dockair.scenarios.measured_leds import MeasuredLeds
 from dockair.scenarios.message_log import NavigatorRecipe
+from dockair.scenarios.nominal_sheets import nominal_sheets
 from dockair.scenarios.schema import Scenario
 from dockair.scenarios.truth_navigation import TruthNavigator
 from dockair.sim.air.atmosphere import Air, standard_atmosphere
+from dockair.sim.air.bow_wave import BowWaveParameters, bow_wave_coefficients
 from dockair.sim.aircraft.announcer import Announcer, TankerSheet
 from dockair.sim.aircraft.flight_control import FlightControlParameters
 from dockair.sim.aircraft.receiver import Receiver
 from dockair.sim.aircraft.tanker import TankerPath, TankerPathParameters
-from dockair.sim.aircraft.trim import level_trim
 from dockair.sim.as_built import AsBuilt, AsBuiltParameters, draw_as_built
 from dockair.sim.basket import place_leds
 from dockair.sim.camera.camera import CameraNoise, NearInfraredCamera
@@ -38,13 +42,14 @@ from dockair.sim.hose.chain import DrogueParameters, HoseParameters
 from dockair.sim.hose.coupling import CouplingParameters
 from dockair.sim.hose.fuel import FuelParameters
 from dockair.sim.hose.reel import ReelParameters
-from dockair.sim.hose.rest import rest_shape
 from dockair.sim.imu import Imu, ImuParameters
 from dockair.sim.outlines import TankerParameters
 from dockair.sim.world import World, WorldParameters, WorldStart
 from dockair.streams import random_stream
 
 SETTLE_S = 12.0  # hose and gusts run this long before the flight: several periods of the drogue's swing
+ATTEMPT_S = 15.0  # before a flight's time is over: an approach begun then still ends, with the probe clear again
+STAND_OFF_M = 4.0  # pre-contact: procedures say 3-5 m behind the drogue
 SUN_OVERHEAD = np.array([0.0, 0.0, 1.0])  # lights the scene of a scenario without Sun
 
 T = TypeVar("T")
@@ -79,11 +84,11 @@ class Parts:
     """What a flight is made of."""
 
     world: World
-    camera: NearInfraredCamera | None  #: None where the truth navigates
+    camera: NearInfraredCamera | MeasuredLeds | None  #: None where the truth navigates
     imu: Imu
     faults: Faults
     navigator: Navigates
-    recipe: NavigatorRecipe | None  #: how to make that navigator again, for a replay; None for the truth
+    recipe: NavigatorRecipe | None  #: how to make that navigator again, for a replay; None where frames are not its own
     sheets: NavigationSheets
     as_built: AsBuilt
     clock: Clock
@@ -116,7 +121,7 @@ def build(scenario: Scenario, seed: int) -> Parts:
         rng=random_stream(seed, "inertial_velocity"),
     )
     parameters = _world_parameters(scenario, air, mounting)
-    sheets = _navigation_sheets(scenario, parameters)
+    sheets = nominal_sheets(scenario, parameters, _imu_parameters(scenario))
     _check_ring(sheets.ring, parameters.drogue)
     faults = Faults([table.fault for table in scenario.faults], sheets.ring.count)
     offset = scenario.start.sigma_p_m * random_stream(seed, "start").normal(size=3)
@@ -136,10 +141,12 @@ def build(scenario: Scenario, seed: int) -> Parts:
     place_leds(world.model, world.data, sheets.ring)
     as_built = _as_built(scenario, seed, sheets)
     if scenario.navigation.is_truth:
-        camera, recipe = None, None
+        camera: NearInfraredCamera | MeasuredLeds | None = None
+        recipe = None
         navigator: Navigates = TruthNavigator(sheets, guidance_settings(scenario))
     else:
-        camera = _camera(scenario, seed, as_built, faults, world)
+        measured = scenario.camera.sensing == "measurements"
+        camera = (measured_leds if measured else _camera)(scenario, seed, as_built, faults, world)
         recipe = _recipe(scenario, sheets)
         navigator = recipe.build()
         if isinstance(navigator, TruthNavigator):  # its results would not be marked
@@ -156,7 +163,7 @@ def build(scenario: Scenario, seed: int) -> Parts:
         faults=faults,
         as_built=as_built,
         navigator=navigator,
-        recipe=recipe,
+        recipe=None if isinstance(camera, MeasuredLeds) else recipe,
         sheets=sheets,
         clock=clock,
         periods=periods,
@@ -165,10 +172,27 @@ def build(scenario: Scenario, seed: int) -> Parts:
 
 
 def guidance_settings(scenario: Scenario) -> GuidanceSettings:
-    """Return the guidance that the scenario asks for."""
+    """Return the guidance that the scenario asks for, with what the nominal sheets say of the receiver."""
     g = scenario.guidance
-    limits = PhaseLimits(stabilise_s=g.stabilise_s, take_in_m=g.take_in_m, hold_s=g.hold_s)
-    return GuidanceSettings(stand_off_m=scenario.start.aft_m, closure_speed_m_s=g.closure_speed_m_s, limits=limits)
+    mounting = load_parameters(scenario.hardware.receiver_sheet("mounting"), MountingParameters)
+    bow_wave = load_parameters("bow_wave", BowWaveParameters)
+    source_B = bow_wave_coefficients(bow_wave, mounting.probe_tip_m, scenario.flight.airspeed_m_s)[:3]
+    x, y, z = (float(value) for value in source_B - mounting.probe_tip_m)
+    limits = PhaseLimits(
+        attempts_max=g.attempts_max,
+        slot_s=max(scenario.flight.duration_s - ATTEMPT_S, 0.5 * scenario.flight.duration_s),
+        stabilise_s=g.stabilise_s,
+        capture_radius_m=g.capture_radius_m,
+        take_in_m=g.take_in_m,
+        hold_s=g.hold_s,
+    )
+    return GuidanceSettings(
+        controller=g.controller,
+        stand_off_m=STAND_OFF_M,
+        closure_speed_m_s=g.closure_speed_m_s,
+        bow_wave=BowWavePush(source_from_tip_m=(x, y, z), radius_m=bow_wave.radius_m),
+        limits=limits,
+    )
 
 
 def _sheet(scenario: Scenario, name: str, cls: type[T]) -> T:
@@ -183,7 +207,7 @@ def _world_parameters(scenario: Scenario, air: Air, mounting: Mounting) -> World
         reel=_sheet(scenario, "reel", ReelParameters),
         coupling=_sheet(scenario, "coupling", CouplingParameters),
         fuel=_sheet(scenario, "fuel", FuelParameters),
-        tanker=_sheet(scenario, "tanker", TankerParameters),
+        tanker=_sheet(scenario, "tanker", TankerParameters).at_pod(scenario.tanker.pod),
         mounting=mounting,
         air=air,
         airspeed_m_s=scenario.flight.airspeed_m_s,
@@ -209,31 +233,6 @@ def _tanker_path(scenario: Scenario, seed: int, world: WorldParameters) -> tuple
     return path, Announcer(path, sheet, random_stream(seed, "announcement"))
 
 
-def _navigation_sheets(scenario: Scenario, world: WorldParameters) -> NavigationSheets:
-    """Nominal values only: nothing that is drawn, or changed in hose, drogue and airframe, for this flight goes in."""
-    wind_W = np.array([-world.airspeed_m_s, 0.0, 0.0])
-    hose, drogue = load_parameters("hose", HoseParameters), load_parameters("drogue", DrogueParameters)
-    rest = rest_shape(hose, drogue, wind_W, world.air.density_kg_m3, world.air.kinematic_viscosity_m2_s)
-    trim = level_trim(build_receiver.airframe(scenario, {}), world.airspeed_m_s, world.air)
-    camera, ring = scenario.hardware.camera, scenario.hardware.ring
-    start = StartGeometry(
-        p_PD_B=scenario.start.p_PD_B,
-        sigma_p_m=scenario.start.sigma_p_m,
-        R_BD=trim.R_WB.T @ _attitude_along(rest.t_D_W),
-        sigma_R_rad=scenario.start.sigma_R_rad,
-    )
-    return NavigationSheets(
-        camera=Camera() if camera is None else Camera.from_toml(camera),
-        ring=LedRing() if ring is None else LedRing.from_toml(ring),
-        mounting=world.mounting,
-        start=start,
-        gyro=_gyro_sheet(scenario),
-        camera_rate_hz=scenario.rates.camera_hz,
-        control_rate_hz=scenario.rates.control_hz,
-        coupling_depth_m=world.coupling.depth_m,
-    )
-
-
 def _check_ring(ring: LedRing, drogue: DrogueParameters) -> None:
     """The LEDs sit on the rim that the drogue's sheet describes."""
     if ring.diameter_m != drogue.ring_diameter_m:
@@ -241,28 +240,8 @@ def _check_ring(ring: LedRing, drogue: DrogueParameters) -> None:
         raise DockairError(where, expected=f"{expected} (hardware.ring)", got=drogue.ring_diameter_m)
 
 
-def _attitude_along(x_W: Array) -> Array:
-    """(3, 3) R_WD without roll of a body whose x axis points along a unit vector (3,)."""
-    yaw, pitch = np.arctan2(x_W[1], x_W[0]), -np.arcsin(x_W[2])
-    return matrix_from_yaw_pitch_roll(float(yaw), float(pitch), 0.0)
-
-
 def _imu_parameters(scenario: Scenario) -> ImuParameters:
     return _sheet(scenario, f"imu_{scenario.hardware.imu}", ImuParameters)
-
-
-def _gyro_sheet(scenario: Scenario) -> GyroSheet:
-    imu = _imu_parameters(scenario)
-    return GyroSheet(
-        rate_hz=scenario.rates.gyro_hz,
-        noise_density_rad_s_rthz=imu.gyro_noise_density_rad_s_rthz,
-        bias_sigma_rad_s=imu.gyro_turn_on_bias_sigma_rad_s,
-        bias_walk_rad_s_rts=imu.gyro_bias_walk_rad_s_rts,
-        scale_factor_sigma=imu.gyro_scale_factor_sigma + imu.gyro_misalignment_sigma_rad,
-        range_rad_s=imu.gyro_range_rad_s,
-        accelerometer_noise_density_m_s2_rthz=imu.accelerometer_noise_density_m_s2_rthz,
-        accelerometer_bias_sigma_m_s2=imu.accelerometer_turn_on_bias_sigma_m_s2,
-    )
 
 
 def _imu(scenario: Scenario, seed: int, mounting: Mounting) -> Imu:

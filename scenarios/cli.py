@@ -1,8 +1,8 @@
-"""The command line, `dockair`: `fly`, `scenarios`, `replay`, `reproduce`, `bench`, `design-ring`, `allan`, `doctor`.
+"""The command line, `dockair`: flights, campaigns of flights, what they are judged by and compared with.
 
-Exit status: 0 done as asked, whatever the flight's outcome; 1 a replay that was not identical; 2 bad input;
-3 the machine lacks something. With `--json` one object goes to stdout and nothing else; progress and errors go to
-stderr. Modules that are slow to import are imported by the command that needs them.
+Exit status: 0 done as asked, whatever the flight's outcome; 1 a replay that was not identical, or a campaign whose gate
+has failed; 2 bad input; 3 the machine lacks something. With `--json` one object goes to stdout and nothing else;
+progress and errors go to stderr. Modules that are slow to import are imported by the command that needs them.
 """
 
 import errno
@@ -18,6 +18,7 @@ import typer
 import dockair
 from dockair.errors import DockairError
 from dockair.scenarios.allan_command import allan
+from dockair.scenarios.campaign_command import campaign
 from dockair.scenarios.cli_options import Json, ScenarioName, Seed, Settings, overrides, print_json
 from dockair.scenarios.design_ring_command import design_ring
 
@@ -76,28 +77,38 @@ def fly(
     from dockair.scenarios.loop import fly as fly_scenario
 
     with FlightProgress(chosen.flight.duration_s) as progress:
-        result = fly_scenario(chosen, seed, folder, record=record.value, progress=progress)
+        result = fly_scenario(chosen, seed, folder, record=record.value, progress=progress, overlap=True)
     contact = result.contact
     offset, speed = (contact.radial_offset_m, contact.closure_speed_m_s) if contact else (None, None)
-    shortfalls = chosen.accept.shortfalls(result.outcome, offset, speed)
+    shortfalls = chosen.accept.shortfalls(result.outcome, offset, speed, result.unsafe)
     if as_json:
         print_json(result.to_dict())
     else:
-        show_result(result.to_dict(), shortfalls if chosen.accept.claims_figures else None, folder)
+        show_result(result.to_dict(), shortfalls if shortfalls or chosen.accept.claims_figures else None, folder)
 
 
 @app.command()
-def scenarios(as_json: Json = False) -> None:
-    """List the library's scenarios and what each is there to show."""
-    from dockair.scenarios.output import show_scenarios
+def scenarios(
+    name: Annotated[str | None, typer.Argument(metavar="[NAME]", help="What to show whole; without, the list.")] = None,
+    as_json: Json = False,
+) -> None:
+    """List the library's scenarios, what each is there to show and what it is held to; or show one whole."""
+    from dockair.scenarios import library_output
     from dockair.scenarios.scenario_file import scenario_names
     from dockair.scenarios.schema import load_scenario
 
+    if name is not None:
+        chosen = load_scenario(name)
+        if as_json:
+            print_json(chosen.model_dump(mode="json"))
+        else:
+            library_output.show_scenario(name, chosen)
+        return
     library = [load_scenario(name) for name in scenario_names()]
     if as_json:
         print_json({"scenarios": [scenario.model_dump(mode="json") for scenario in library]})
     else:
-        show_scenarios(library)
+        library_output.show_scenarios(library)
 
 
 @app.command()
@@ -149,6 +160,7 @@ class BenchSubject(Enum):
     """What `bench` measures."""
 
     FLIGHT = "flight"
+    LOOP = "loop"
     SENSORS = "sensors"
     IMAGE = "image"
     POSE = "pose"
@@ -160,15 +172,16 @@ def bench(
     scenario: ScenarioName = "default",
     settings: Settings = None,
     seconds: Annotated[float, typer.Option(min=1.0, max=600.0, help="Simulated time at most.")] = 20.0,
-    subject: Annotated[BenchSubject, typer.Option("--of", help="The closed loop, or the stages of one part.")] = (
+    subject: Annotated[BenchSubject, typer.Option("--of", help="A flight, the loop in all its ways, or one part.")] = (
         BenchSubject.FLIGHT
     ),
     as_json: Json = False,
 ) -> None:
     """Say how fast the closed loop runs here and where its time goes; or how fast the stages of one part are.
 
-    The parts are the sensors, the image stages and the pose solvers, these two beside OpenCV's, and the world beside a
-    bare step of MuJoCo; only flight and sensors depend on the scenario.
+    The loop's ways: windowed, recorded, with full frames, at 180 Hz, two flights at once and others. The parts are the
+    sensors, the image stages and the pose solvers, these two beside OpenCV's, and the world beside a bare step of
+    MuJoCo; only flight and sensors depend on the scenario.
     """
     from dockair.scenarios.bench import bench as bench_scenario
     from dockair.scenarios.bench import bench_stages
@@ -194,6 +207,7 @@ def bench(
 
 app.command("design-ring")(design_ring)
 app.command()(allan)
+app.command()(campaign)
 
 
 @app.command()

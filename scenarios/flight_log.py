@@ -12,7 +12,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from dockair.messages import CameraFrame, ImuSample, NavSolution
+from dockair.messages import CameraFrame, ImuSample, LedObservation, NavSolution
 from dockair.rotations import Array, quaternion_from_matrix
 from dockair.scenarios.metrics import true_relative_state
 from dockair.sim.truth import Truth
@@ -39,7 +39,7 @@ _TRUTH_VECTORS = {
 _TRUTH_ROTATIONS = ("R_WB", "R_WD", "R_WT")
 _TRUTH_SCALARS = (
     "reel_position_m reel_rate_m_s root_tension_n drogue_tension_n airspeed_m_s angle_of_attack_rad sideslip_rad "
-    "throttle latched coupling_force_n probe_touches_drogue receiver_touches"
+    "throttle latched coupling_force_n fuel_kg fuel_flow_kg_s probe_touches_drogue receiver_touches"
 ).split()
 
 
@@ -53,12 +53,18 @@ class FlightLog:
         self.exposures_s: list[float] = []  #: of the frame that arrived, NaN where none did
         self.frames = 0
 
-    def append(self, truth: Truth, imu: Sequence[ImuSample], frame: CameraFrame | None, solution: NavSolution) -> None:
+    def append(
+        self,
+        truth: Truth,
+        imu: Sequence[ImuSample],
+        frame: CameraFrame | LedObservation | None,
+        solution: NavSolution,
+    ) -> None:
         """Take one control tick; of the frame, that there was one and how long it was exposed."""
         self.truths.append(truth)
         self.imu.append(tuple(imu))
         self.solutions.append(solution)
-        self.exposures_s.append(float("nan") if frame is None else frame.exposure_s)
+        self.exposures_s.append(frame.exposure_s if isinstance(frame, CameraFrame) else float("nan"))
         self.frames += frame is not None
 
     def columns(self) -> dict[str, Any]:
@@ -97,7 +103,9 @@ class FlightLog:
         columns: dict[str, Any] = {
             "nav_time_stamp_s": [s.time_stamp_s for s in solutions],
             "nav_valid": [s.valid for s in solutions],
+            "nav_contact_usable": [s.contact_usable for s in solutions],
             "nav_phase": [s.phase for s in solutions],
+            "nav_phase_reason": [s.phase_reason for s in solutions],
             "nav_status": [s.status for s in solutions],
             "nav_frame_time_stamp_s": [s.frame_time_stamp_s for s in solutions],
             "nav_candidates": [len(s.candidates_px) for s in solutions],

@@ -38,6 +38,8 @@ class Weather(Table):
 class CameraOptions(Table):
     """How the camera is run and simulated."""
 
+    sensing: Literal["frames", "measurements"] = "frames"  #: "measurements": no picture, LEDs with fitted errors
     filter: Literal["long_pass", "band_pass"] = "long_pass"
     exposure: Literal["auto", "fixed"] = "auto"  #: "fixed": sheet `exposure`, exposure_s
-    background: Literal["auto", "mujoco", "analytic"] = "auto"  #: "auto": MuJoCo where the machine has OpenGL
+    #: "analytic" is quicker and the same on every machine; "auto": MuJoCo's where the machine has OpenGL
+    background: Literal["auto", "mujoco", "analytic"] = "analytic"

@@ -5,20 +5,21 @@ A frame reaches the navigation when it has been exposed, read out and transferre
 """
 
 import time
-from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from dockair.messages import CameraFrame, ImuSample, NavSolution, ReceiverCommand, TankerAnnouncement
+from dockair.messages import ImuSample, NavSolution, ReceiverCommand, TankerAnnouncement
+from dockair.scenarios.attempts import RefereeLimits
 from dockair.scenarios.build import build
+from dockair.scenarios.camera_process import OverlappedExposures, can_overlap
+from dockair.scenarios.exposures import Exposures, ExposuresInTurn, Frame
 from dockair.scenarios.message_log import announce_to
 from dockair.scenarios.metrics import Result
 from dockair.scenarios.recorder import Recorder
 from dockair.scenarios.referee import Outcome, Referee
 from dockair.scenarios.schema import Scenario
 from dockair.scenarios.truth_navigation import TruthNavigator
-from dockair.sim.camera.camera import NearInfraredCamera
 from dockair.sim.truth import Truth
 from dockair.sim.world import DivergedError
 
@@ -31,7 +32,7 @@ class Tick:
 
     truth: Truth
     imu: tuple[ImuSample, ...]
-    frame: CameraFrame | None
+    frame: Frame | None
     solution: NavSolution
     outcome: Outcome | None
     announcement: TankerAnnouncement | None = None
@@ -44,19 +45,22 @@ class Flight:
         scenario: what to fly.
         seed: of every random stream.
         full_frames: read the whole sensor whatever window the navigation asks for.
+        overlap: let the camera work in a process of its own where it can (`camera_process`); no bit depends on it.
     """
 
-    def __init__(self, scenario: Scenario, seed: int, *, full_frames: bool = False) -> None:
+    def __init__(self, scenario: Scenario, seed: int, *, full_frames: bool = False, overlap: bool = False) -> None:
         parts = build(scenario, seed)
         self.scenario, self.clock, self.sheets = scenario, parts.clock, parts.sheets
         self.world, self.camera, self.imu, self.navigator = parts.world, parts.camera, parts.imu, parts.navigator
         self.as_built, self._faults, self._announcer = parts.as_built, parts.faults, parts.announcer
-        self.referee = Referee()
+        self.referee = Referee(RefereeLimits(rim_radius_m=0.5 * parts.sheets.ring.diameter_m))
         self._full_frames = full_frames
         self._periods = parts.periods
         self._command = self._next_command = ReceiverCommand()
         self._window = parts.sheets.camera.full_window
-        self._in_transfer: deque[tuple[float, CameraFrame]] = deque()
+        self._exposures: Exposures | None = None  # made at the first: whoever wants may change the camera until then
+        if overlap and can_overlap(self.camera):
+            self._exposures = OverlappedExposures(self.camera, self.world.model)
         self._frame_number = 0
         self.recipe = parts.recipe
 
@@ -84,17 +88,23 @@ class Flight:
             if truth.tick % self._periods.gyro == 0:
                 imu += self._sampled(truth)
             if self.camera is not None and truth.tick % self._periods.camera == 0:
-                self._expose(self.camera, truth.time_s)
-        frame = self._delivered(truth.time_s)
+                self._expose(truth.time_s)
+        frame = None if self._exposures is None else self._exposures.delivered(truth.time_s)
         if isinstance(self.navigator, TruthNavigator):
             self.navigator.truth = truth
         announcement = self._announcer.due(truth.time_s)
         if announcement is not None:
             announce_to(self.navigator, announcement)
-        solution = self.navigator.step(tuple(imu), frame)
+        solution = self.navigator.step(tuple(imu), frame)  # type: ignore[arg-type]  # LEDs only where they are asked for
         self._next_command = solution.command
         self._window = solution.window or self.sheets.camera.full_window
-        outcome = self.referee.judge(truth, solution.phase, self.scenario.flight.duration_s)
+        outcome = self.referee.judge(
+            truth,
+            solution.phase,
+            self.scenario.flight.duration_s,
+            usable=solution.valid and solution.contact_usable,
+            reason=solution.phase_reason,
+        )
         if diverged:
             outcome = Outcome.DIVERGED
         return Tick(
@@ -102,7 +112,9 @@ class Flight:
         )
 
     def close(self) -> None:
-        """Free the camera's off-screen context."""
+        """Free the camera's off-screen context, end its process."""
+        if self._exposures is not None:
+            self._exposures.close()
         if self.camera is not None:
             self.camera.close()
 
@@ -112,18 +124,13 @@ class Flight:
         sample = self.imu.step(truth.time_s, truth.w_WB_B, truth.alpha_WB_B, truth.specific_force_B, fault)
         return [] if sample is None else [sample]
 
-    def _expose(self, camera: NearInfraredCamera, time_s: float) -> None:
+    def _expose(self, time_s: float) -> None:
+        if self._exposures is None:
+            assert self.camera is not None
+            self._exposures = ExposuresInTurn(self.camera)
         window = None if self._full_frames else self._window
-        frame = camera.expose(self.world.data, time_s, self._frame_number, window)
+        self._exposures.begin(self.world.data, time_s, self._frame_number, window)
         self._frame_number += 1
-        if frame is not None:
-            self._in_transfer.append((time_s + camera.latency_s(frame), frame))
-
-    def _delivered(self, time_s: float) -> CameraFrame | None:
-        """Return the oldest frame if its transfer is over: jitter of the transfer delays the frames behind it too."""
-        if self._in_transfer and self._in_transfer[0][0] <= time_s:
-            return self._in_transfer.popleft()[1]
-        return None
 
 
 def fly(
@@ -133,6 +140,7 @@ def fly(
     *,
     record: str = "window",
     progress: Progress | None = None,
+    overlap: bool = False,
 ) -> Result:
     """Fly a scenario to its end.
 
@@ -143,10 +151,11 @@ def fly(
         record: "window" keeps exactly the pixels that `nav` received, "full" makes the camera read whole frames,
             "none" keeps no frame.
         progress: called at every control tick.
+        overlap: let the camera work in a process of its own where it can, unless other flights use the cores.
     """
     seed = scenario.seed if seed is None else seed
     begun = time.perf_counter()
-    flight = Flight(scenario, seed, full_frames=record == "full")
+    flight = Flight(scenario, seed, full_frames=record == "full", overlap=overlap)
     try:
         with Recorder(flight, out, record) as recorder:
             while (tick := flight.step()).outcome is None:

@@ -24,7 +24,10 @@ import numpy as np
 from dockair.calibration import Mounting
 from dockair.messages import NavSolution
 from dockair.rotations import Array, log
-from dockair.scenarios.referee import Contact
+from dockair.scenarios.attempts import Attempt, first_attempt_succeeded, succeeded
+from dockair.scenarios.causes import Flown, cause_of_flight, with_cause
+from dockair.scenarios.hold import Disconnect, Hold, hold_of
+from dockair.scenarios.referee import Contact, Outcome, Referee
 from dockair.sim.truth import Truth
 
 SCHEMA_VERSION = 1
@@ -47,22 +50,6 @@ class NavigationFigures:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Hold:
-    """The time between contact and release."""
-
-    duration_s: float
-    take_in_max_m: float  #: most hose that was wound in
-    coupling_force_max_n: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Disconnect:
-    """How the probe left the coupling."""
-
-    time_s: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Result:
     """One flight; the fields are the keys of `result.json`."""
 
@@ -70,11 +57,18 @@ class Result:
     scenario: str
     seed: int
     outcome: str
+    success: bool  #: contact inside the limits in some attempt
+    first_attempt: bool  #: in the first
+    cause: str  #: of the last attempt that failed; "" if none did
+    unsafe: tuple[str, ...]  #: what was unsafe; empty when all was safe
     attempts: int
+    attempt_log: tuple[Attempt, ...]
     contact: Contact | None
     hold: Hold | None
     disconnect: Disconnect | None
+    fuel_kg: float  #: that was taken on
     collided_with: str
+    sensing: str  #: what the navigation saw: "camera", "measurements" or "truth"
     truth_navigation: bool
     background: str  #: who drew what the camera saw, "mujoco" or "analytic"; "" without a camera
     nav: NavigationFigures
@@ -103,6 +97,8 @@ class Result:
 def _plain(value: Any) -> Any:
     if isinstance(value, Mapping):
         return {key: _plain(entry) for key, entry in value.items()}
+    if isinstance(value, (tuple, list)):
+        return [_plain(entry) for entry in value]
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value
@@ -202,39 +198,16 @@ def availability(valid: Sequence[bool]) -> float:
     return sum(rest) / len(rest)
 
 
-def attempts(phases: Sequence[str]) -> int:
-    """Return how often an approach was begun."""
-    return sum(now == "approach" != before for before, now in zip(["", *phases], phases, strict=False))
-
-
-def hold_of(truths: Sequence[Truth]) -> tuple[Hold | None, Disconnect | None]:
-    """Return what happened while the probe was held, and how it came free (None: it did not)."""
-    held = [k for k, truth in enumerate(truths) if truth.latched]
-    if not held:
-        return None, None
-    first, last = held[0], held[-1]
-    during = truths[first : last + 1]
-    hold = Hold(
-        duration_s=truths[last].time_s - truths[first].time_s,
-        take_in_max_m=max(truth.reel_position_m for truth in during),
-        coupling_force_max_n=max(truth.coupling_force_n for truth in during),
-    )
-    released = truths[last + 1] if last + 1 < len(truths) else None
-    return hold, Disconnect(time_s=released.time_s) if released is not None else None
-
-
 def summarise(
     *,
     scenario: str,
     seed: int,
     outcome: str,
-    contact: Contact | None,
-    collided_with: str,
-    truths: Sequence[Truth],
-    solutions: Sequence[NavSolution],
+    referee: Referee,
+    flown: Flown,
     frames: int,
     mounting: Mounting,
-    truth_navigation: bool,
+    sensing: str,
     background: str,
     wall_time_s: float,
     out_dir: str | Path | None,
@@ -245,31 +218,39 @@ def summarise(
         scenario: its name.
         seed: that was flown.
         outcome: of the referee.
-        contact: of the referee, None if there was none.
-        collided_with: name of what the receiver struck, "" for nothing.
-        truths: one a control tick.
-        solutions: likewise.
+        referee: that watched the flight.
+        flown: truth and belief, one a control tick.
         frames: that were delivered to the navigation.
         mounting: where the navigation believes its camera to be.
-        truth_navigation: the truth stood in place of `nav`.
+        sensing: what the navigation saw: "camera", "measurements", or "truth" in place of `nav`.
         background: who drew what the camera saw, "" without a camera.
         wall_time_s: that the flight took.
         out_dir: where the flight was written.
     """
+    truths = flown.truths
     hold, disconnect = hold_of(truths)
     duration_s = truths[-1].time_s if truths else 0.0
+    log = referee.attempt_log(duration_s, Outcome(outcome))
+    attempts = tuple(with_cause(attempt, flown) for attempt in log)
     return Result(
         scenario=scenario,
         seed=seed,
         outcome=outcome,
-        attempts=attempts([solution.phase for solution in solutions]),
-        contact=contact,
+        success=succeeded(attempts),
+        first_attempt=first_attempt_succeeded(attempts),
+        cause=cause_of_flight(attempts, flown),
+        unsafe=referee.unsafe,
+        attempts=len(attempts),
+        attempt_log=attempts,
+        contact=referee.contact,
         hold=hold,
         disconnect=disconnect,
-        collided_with=collided_with,
-        truth_navigation=truth_navigation,
+        fuel_kg=truths[-1].fuel_kg if truths else 0.0,
+        collided_with=referee.collided_with,
+        sensing=sensing,
+        truth_navigation=sensing == "truth",
         background=background,
-        nav=navigation_figures(solutions, truths, mounting),
+        nav=navigation_figures(flown.solutions, truths, mounting),
         frames=frames,
         duration_s=duration_s,
         real_time_factor=duration_s / wall_time_s if wall_time_s > 0.0 else float("nan"),

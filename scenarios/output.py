@@ -17,7 +17,6 @@ if TYPE_CHECKING:  # the progress of a flight is told in these; importing them h
     from dockair.messages import NavSolution
     from dockair.scenarios.bench import BenchReport
     from dockair.scenarios.doctor import Check
-    from dockair.scenarios.schema import Scenario
     from dockair.sim.truth import Truth
 
 _PLAIN_INTERVAL_S = 5.0  # of simulated time between two lines where stderr is no terminal
@@ -98,6 +97,9 @@ def show_result(result: Mapping[str, Any], shortfalls: Sequence[str] | None, fol
     console.print(
         f"[bold {colour}]{result['outcome']}[/]  {result['scenario']}, seed {result['seed']}{mark}", soft_wrap=True
     )
+    for attempt in result.get("attempt_log", ()):
+        if attempt["cause"]:
+            console.print(_failed_attempt(attempt), style="yellow", soft_wrap=True)
     table = Table(show_header=False, box=None, padding=(0, 1))
     table.add_column()
     table.add_column(justify="right")
@@ -116,22 +118,11 @@ def show_result(result: Mapping[str, Any], shortfalls: Sequence[str] | None, fol
         console.print(f"look at it: {viewer} --bind 127.0.0.1 {folder / 'episode.rrd'}", soft_wrap=True)
 
 
-def show_scenarios(scenarios: Sequence["Scenario"]) -> None:
-    """Print the library."""
-    table = Table(box=None, padding=(0, 1))
-    for heading in ("scenario", "gusts", "claim"):
-        table.add_column(heading)
-    for scenario in scenarios:
-        table.add_row(scenario.name, gusts_in_words(scenario), scenario.claim)
-    Console(highlight=False).print(table)
-
-
-def gusts_in_words(scenario: "Scenario") -> str:
-    """Return "still", the standard deviation, or the intensity's name."""
-    turbulence = scenario.turbulence
-    if turbulence.model == "none":
-        return "still"
-    return turbulence.intensity or f"{turbulence.sigma_m_s:g} m/s"
+def _failed_attempt(attempt: Mapping[str, Any]) -> str:
+    offset_m, reason = attempt["radial_offset_m"], attempt["reason"]
+    off = "" if offset_m is None else f", {offset_m:.2f} m off"
+    why = f" ({reason})" if reason else ""
+    return f"attempt {attempt['number']}: {attempt['outcome'].replace('_', ' ')}{off}{why}; cause: {attempt['cause']}"
 
 
 def show_checks(checks: Sequence["Check"], versions: Mapping[str, str]) -> None:
@@ -203,6 +194,10 @@ def _figure(value: Any) -> str:
 def show_stages_bench(figures: Mapping[str, Any]) -> None:
     """Print the times of the stages, their ratios, and what each of them found."""
     console = Console(highlight=False)
+    if "flights" in figures:
+        flights = figures["flights"].items()
+        console.print(_bench_table({what: {key: f"{x:.2f}" for key, x in row.items()} for what, row in flights}))
+        console.print(_bench_table({what: {"steps/s": f"{n:.1f}"} for what, n in figures["steps_per_second"].items()}))
     for unit, short in (("milliseconds", "ms"), ("microseconds", "µs")):
         if unit in figures:
             console.print(_bench_table({what: {short: f"{t:.3f}"} for what, t in figures[unit].items()}))

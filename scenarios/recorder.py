@@ -6,6 +6,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
 from dockair.errors import DockairError
+from dockair.scenarios.causes import flown_of
 from dockair.scenarios.flight_log import FlightLog
 from dockair.scenarios.message_log import MessageLog, read_messages
 from dockair.scenarios.metrics import Result, summarise
@@ -71,13 +72,11 @@ class Recorder:
             scenario=flight.scenario.name,
             seed=seed,
             outcome=outcome.value,
-            contact=flight.referee.contact,
-            collided_with=flight.referee.collided_with,
-            truths=log.truths,
-            solutions=log.solutions,
+            referee=flight.referee,
+            flown=flown_of(flight.scenario, flight.sheets.mounting, log.truths, log.solutions),
             frames=log.frames,
             mounting=flight.sheets.mounting,
-            truth_navigation=flight.scenario.navigation.is_truth,
+            sensing=flight.scenario.sensing,
             background="" if flight.camera is None else flight.camera.background,
             wall_time_s=wall_time_s,
             out_dir=self._folder,

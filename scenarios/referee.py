@@ -1,23 +1,24 @@
-"""Says from the truth how a flight ended.
+"""Says from the truth how a flight ended, attempt by attempt, and what about it was unsafe.
 
 contact: the coupling held the probe. miss: the tip passed the ring's plane, was not held and touched nothing.
-rim_strike: the probe touched the drogue and was not held. abort: the navigation broke away before the ring's plane.
+rim_strike: the probe touched the drogue and was not held. abort: the navigation cleared without any of these.
 collision: anything of the receiver but its probe touched something. timeout: none of these. diverged: the simulation
-broke down; the loop says so, not the referee.
+broke down; the loop says so, not the referee. A flight goes on after a miss: it ends when the navigation is clear, when
+the receiver collides, when time is over.
 
 Radial offset and closure speed are taken where the tip crosses the ring's plane from behind (the last crossing before
 the coupling holds); the angle between probe and drogue axis when it holds.
+
+Unsafe is a touch at more than 2.6 m/s, one with the tip outside the rim, a contact while the navigation itself marked
+its solution unusable (as the tip entered the basket or as it was held), and any collision.
 """
 
 from dataclasses import dataclass
 from enum import Enum
 
-import numpy as np
-
-from dockair.sim.hose.chain import cross
+from dockair.rotations import Array
+from dockair.scenarios.attempts import ATTEMPTING, Attempt, AttemptOutcome, OpenAttempt, Passing, RefereeLimits, passing
 from dockair.sim.truth import Truth
-
-PASSED_M = 1.0  # a tip this far ahead of the ring's plane without being held has missed for good
 
 
 class Outcome(Enum):
@@ -42,64 +43,139 @@ class Contact:
     angle_deg: float
 
 
-@dataclass(frozen=True, slots=True)
-class _Crossing:
-    radial_m: float
-    closure_m_s: float
-
-
 class Referee:
-    """Watches the truth tick by tick."""
+    """Watches the truth tick by tick.
 
-    def __init__(self) -> None:
+    Args:
+        limits: beyond which a touch is unsafe.
+    """
+
+    def __init__(self, limits: RefereeLimits | None = None) -> None:
+        self._limits = limits or RefereeLimits()
         self._previous_x: float | None = None
-        self._crossing: _Crossing | None = None
-        self._touched = False
+        self._phase, self._usable = "", True
+        self._over: list[Attempt] = []
+        self._open: OpenAttempt | None = None
+        self._entered_usable = True
+        self._outside_m = 0.0  # farthest that the tip was off the axis when it touched beyond the rim
+        self._unsafe: list[str] = []
         self.contact: Contact | None = None
         self.collided_with = ""
 
     def watch(self, truth: Truth) -> None:
         """Take note of one physics tick."""
         p_DP = truth.p_DP
-        v_DP_D = truth.R_WD.T @ (truth.v_WP - truth.v_WD) - cross(truth.w_WD_D, p_DP)
-        if self._previous_x is not None and self._previous_x < 0.0 <= p_DP[0]:
-            self._crossing = _Crossing(float(np.hypot(p_DP[1], p_DP[2])), float(v_DP_D[0]))
-        self._previous_x = float(p_DP[0])
-        self._touched = self._touched or truth.probe_touches_drogue
-        self.collided_with = self.collided_with or truth.receiver_touches
-        if truth.latched and self.contact is None:
-            self.contact = self._contact(truth)
+        x = float(p_DP[0])
+        if self._previous_x is not None and self._previous_x < 0.0 <= x:
+            self._enter(truth)
+        self._previous_x = x
+        if truth.probe_touches_drogue:
+            self._touch(truth, p_DP)
+        if truth.receiver_touches and not self.collided_with:
+            self.collided_with = truth.receiver_touches
+            self._unsafe.append(f"collision with {self.collided_with}")
+        if truth.latched and self._attempt(truth).latched is None:
+            self._latch(truth)
+        elif self._open is not None and self._open.latched is None:
+            self._open.watch(truth, p_DP)
 
-    def _contact(self, truth: Truth) -> Contact:
-        crossing = self._crossing or _Crossing(float("nan"), float("nan"))
-        cosine = float((truth.R_WB[:, 0] @ truth.R_WD[:, 0]).clip(-1.0, 1.0))
-        return Contact(
-            time_s=truth.time_s,
-            radial_offset_m=crossing.radial_m,
-            closure_speed_m_s=crossing.closure_m_s,
-            angle_deg=float(np.degrees(np.arccos(cosine))),
-        )
-
-    def judge(self, truth: Truth, phase: str, duration_s: float) -> Outcome | None:
+    def judge(
+        self, truth: Truth, phase: str, duration_s: float, *, usable: bool = True, reason: str = ""
+    ) -> Outcome | None:
         """Return the outcome once the flight is over, None before.
 
         Args:
             truth: now.
             phase: the navigation's own phase; "clear" ends a flight.
             duration_s: the longest a flight may take.
+            usable: whether the navigation says that contact may be flown on its solution.
+            reason: the navigation's own, why it entered the phase.
         """
+        self._follow(truth, phase, reason)
+        self._usable = usable
         if self.collided_with:
             return Outcome.COLLISION
-        passed = truth.p_DP[0] > PASSED_M and not truth.latched
-        if phase == "clear" or passed or truth.time_s >= duration_s:
-            return self._outcome(phase)
+        if phase == "clear" or truth.time_s >= duration_s:
+            return self._outcome(truth, phase)
         return None
 
-    def _outcome(self, phase: str) -> Outcome:
+    def attempt_log(self, now_s: float, outcome: Outcome | None) -> tuple[Attempt, ...]:
+        """Return all attempts.
+
+        Args:
+            now_s: when the flight ended, if it has.
+            outcome: of the flight; None while it goes on.
+        """
+        if self._open is None:
+            return tuple(self._over)
+        if outcome is Outcome.DIVERGED:
+            self._open.leave(now_s, AttemptOutcome.DIVERGED, "")
+        return (*self._over, self._open.settled(now_s, bool(self.collided_with)))
+
+    @property
+    def unsafe(self) -> tuple[str, ...]:
+        """What was unsafe; empty when all was safe."""
+        if self._outside_m > 0.0:
+            return (*self._unsafe, f"touch outside the rim, {self._outside_m:.2f} m off the axis")
+        return tuple(self._unsafe)
+
+    def _attempt(self, truth: Truth) -> OpenAttempt:
+        if self._open is None:
+            self._open = OpenAttempt(len(self._over) + 1, truth)
+        return self._open
+
+    def _follow(self, truth: Truth, phase: str, reason: str) -> None:
+        """Begin and end attempts with the phases."""
+        begins = phase == "approach" and self._phase not in ATTEMPTING
+        if self._open is not None and (begins or phase not in ATTEMPTING):
+            broke_away = phase == "breakaway"
+            ended_as = AttemptOutcome.BREAKAWAY if broke_away else AttemptOutcome.GIVEN_UP
+            self._open.leave(truth.time_s, ended_as, reason)
+        if begins:
+            if self._open is not None:
+                self._over.append(self._open.settled(truth.time_s, collided=False))
+            self._open = OpenAttempt(len(self._over) + 1, truth)
+        self._phase = phase
+
+    def _enter(self, truth: Truth) -> None:
+        attempt = self._attempt(truth)
+        if attempt.latched is None:  # a probe that has been let go may swing to and fro
+            attempt.cross(passing(truth))
+            self._entered_usable = self._usable
+
+    def _touch(self, truth: Truth, p_DP: Array) -> None:
+        attempt = self._attempt(truth)
+        if attempt.latched is not None:
+            return
+        now = passing(truth)
+        if not attempt.touched and now.closure_speed_m_s > self._limits.closure_speed_m_s:
+            self._unsafe.append(f"touch at {now.closure_speed_m_s:.2f} m/s")
+        attempt.touched = True
+        if now.radial_offset_m > self._limits.rim_radius_m:
+            self._outside_m = max(self._outside_m, now.radial_offset_m)
+
+    def _latch(self, truth: Truth) -> None:
+        attempt, held = self._attempt(truth), passing(truth)
+        attempt.latch(held)
+        if not (self._usable and self._entered_usable):
+            self._unsafe.append("contact on a solution marked unusable")
+        if self.contact is None:
+            self.contact = _contact(attempt.last_crossing, held)
+
+    def _outcome(self, truth: Truth, phase: str) -> Outcome:
         if self.contact is not None:
             return Outcome.CONTACT
-        if self._touched:
-            return Outcome.RIM_STRIKE
-        if self._crossing is not None:
-            return Outcome.MISS
+        outcomes = {attempt.outcome for attempt in self.attempt_log(truth.time_s, None)}
+        for worst in (Outcome.RIM_STRIKE, Outcome.MISS):
+            if worst.value in outcomes:
+                return worst
         return Outcome.ABORT if phase == "clear" else Outcome.TIMEOUT
+
+
+def _contact(crossing: Passing | None, held: Passing) -> Contact:
+    return Contact(
+        time_s=held.time_s,
+        radial_offset_m=float("nan") if crossing is None else crossing.radial_offset_m,
+        closure_speed_m_s=float("nan") if crossing is None else crossing.closure_speed_m_s,
+        angle_deg=held.angle_deg,
+    )

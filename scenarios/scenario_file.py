@@ -11,11 +11,24 @@ from dockair.errors import DockairError
 
 #: Setting the one replaces the other, which the file may have given.
 _ALTERNATIVES = {"turbulence.sigma_m_s": "intensity", "turbulence.intensity": "sigma_m_s"}
+_PATHS = ("camera", "ring")  # keys of [hardware] that name a file
 
 
 def scenario_names() -> list[str]:
     """Names in the library, the default first."""
     return sorted(_library(), key=lambda name: (name != "default", name))
+
+
+def scenario_text(name_or_path: str | Path) -> str:
+    """Return a scenario's file as it was written.
+
+    Args:
+        name_or_path: a name in the library, or the path of a TOML file.
+
+    Raises:
+        DockairError: no such scenario.
+    """
+    return _find(name_or_path).read_text(encoding="utf-8")
 
 
 class ScenarioFile:
@@ -82,7 +95,8 @@ def _resolve_hardware(table: dict[str, Any], folder: Path) -> None:
     """Take the file's paths from its own folder; those of `--set` are taken from where one stands."""
     hardware = table.get("hardware")
     if isinstance(hardware, dict):
-        hardware.update({key: str(folder / path) for key, path in hardware.items() if isinstance(path, str)})
+        paths = {key: hardware[key] for key in _PATHS if isinstance(hardware.get(key), str)}
+        hardware.update({key: str(folder / path) for key, path in paths.items()})
 
 
 def _value(text: str) -> object:

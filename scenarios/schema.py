@@ -96,6 +96,13 @@ class Scenario(Table):
         return f"imu_{self.hardware.imu}", f"filter_{self.camera.filter}", *receiver
 
     @property
+    def sensing(self) -> Literal["camera", "measurements", "truth"]:
+        """What the navigation sees; flights of different kinds are never pooled."""
+        if self.navigation.is_truth:
+            return "truth"
+        return "measurements" if self.camera.sensing == "measurements" else "camera"
+
+    @property
     def sun_W(self) -> Array | None:
         """(3,) unit vector toward the Sun in W, None without Sun or at night."""
         return None if self.weather.night else self.sun.direction_W

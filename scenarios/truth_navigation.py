@@ -37,9 +37,11 @@ class TruthNavigator:
         rate_PD_B = v_PD_B - np.cross(truth.w_WB_B, p_PD_B)
         state = RelativeState(
             usable=True,
+            contact_usable=True,
             p_PD_B=p_PD_B,
             rate_PD_B=rate_PD_B,
             p_PK_B=p_PD_B + R_BD[:, 0] * self._sheets.coupling_depth_m,
+            w_WB_B=truth.w_WB_B,
             sigma_lateral_m=0.0,
         )
         command = self._guidance.step(state)
@@ -57,6 +59,7 @@ class TruthNavigator:
             frame_time_stamp_s=float("nan"),
             candidates_px=np.empty((0, 2)),
             led_pixels_px=_not_seen(len(self._sheets.ring.positions_D)),
+            phase_reason=self._guidance.phase_reason,
         )
 
 

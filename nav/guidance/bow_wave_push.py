@@ -1,15 +1,15 @@
-"""How the receiver's own bow wave moves the drogue across as the probe comes near, as guidance believes it.
+"""How the receiver's own bow wave pushes the drogue across as the probe comes near, as guidance believes it.
 
-    b(x) = b_0 / (1 + x/L)^2                                                              (1)
+A source behind the nose makes a half-body of radius R and sends out, at r from it in a stream V,
 
-x is the distance from the probe's tip to the ring, b_0 the push at contact (left, up), L its reach. What lies ahead of
-the receiver by its own response is b at a later x; the difference to now is where the drogue is going to be besides its
-swing, and its rate the velocity with which it will go there.
+    u / V = R^2/4  r/|r|^3,         b = c u/V  across                                                     (1)
 
-Valid for the closing speeds of an approach; the drogue's lag behind the push is in b_0 and L.
-Not modelled: the push along x, its change with the place of the nose about the drogue.
-Source: fitted to approaches of the simulated fighter in still air with and without the bow wave: 0.11 m at contact,
-0.042 m at 1 m, 0.019 m at 2 m, away from the nose.
+A drogue in a stream that has been turned by u/V is accelerated across by c u/V: c is its drag per mass that moves along,
+as long as it hangs where it hung. An attempt that missed tells what (1) did not know: a share of the miss is added to
+where the next one aims.
+
+Not modelled: the push along the way, the turning of the source with the body, the hose in the same flow.
+Source: potential flow about a Rankine half-body; c from the swing, omega^2 times the hose's length.
 """
 
 from dataclasses import dataclass
@@ -21,24 +21,30 @@ from dockair.rotations import Array
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BowWavePush:
-    """Eq. (1)."""
+    """Eq. (1); the defaults push nothing."""
 
-    at_contact_m: tuple[float, float] = (-0.11, 0.013)  # b_0: to the right, where the probe stands right of the nose
-    reach_m: float = 1.5  # L
-    lead_s: float = 0.5  # tau and the lag of the drogue's filter
+    source_from_tip_m: tuple[float, float, float] = (-1.575, 0.9, -0.65)  # of the probe, body axes
+    radius_m: float = 0.0  # R; 0: no bow wave
+    side_acceleration_m_s2: float = 60.0  # c: (2 pi 0.32 Hz)^2 times 15 m
+    learning_share: float = 0.4  # of a miss that the next attempt corrects; the rest is taken for chance
+    learnt_max_m: float = 0.15  # a miss beyond this was not the bow wave's
 
-    def ahead(self, distance_m: float, closing_m_s: float) -> tuple[Array, Array]:
-        """(2,) way [m] and change of velocity [m/s] that the push adds within the lead time; left, up.
+    def at(self, p_PD_m: Array) -> Array:
+        """(3,) b with the ring's centre at p_PD (3,) from the probe's tip, forward left up [m/s^2]."""
+        r = p_PD_m - np.array(self.source_from_tip_m)
+        distance = max(float(np.linalg.norm(r)), 0.5 * self.radius_m)
+        if distance == 0.0:
+            return np.zeros(3)
+        b = self.side_acceleration_m_s2 * 0.25 * self.radius_m**2 * r / distance**3
+        b[0] = 0.0
+        return np.asarray(b)
 
-        Args:
-            distance_m: x, now.
-            closing_m_s: with which it shrinks.
-        """
-        if distance_m <= 0.0 or closing_m_s <= 0.0:
-            return np.zeros(2), np.zeros(2)
-        later_m = max(distance_m - closing_m_s * self.lead_s, 0.0)
-        b_0 = np.array(self.at_contact_m)
-        here, there = 1.0 + distance_m / self.reach_m, 1.0 + later_m / self.reach_m
-        way = b_0 * (there**-2 - here**-2)
-        rate = b_0 * (2.0 * closing_m_s / self.reach_m) * (there**-3 - here**-3)
-        return way, rate
+    def learnt(self, aim_m: Array, miss_m: Array) -> Array:
+        """(2,) where to aim off the predicted place next, after a miss (2,): ring centre from the tip, left and up."""
+        miss = _no_longer_than(miss_m, self.learnt_max_m)
+        return _no_longer_than(aim_m + self.learning_share * miss, self.learnt_max_m)
+
+
+def _no_longer_than(v: Array, limit: float) -> Array:
+    norm = float(np.hypot(*v))
+    return v if norm <= limit else v * (limit / norm)

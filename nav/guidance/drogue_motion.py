@@ -1,89 +1,136 @@
-"""Where the drogue will be in a moment: its swing across the probe's line, estimated on the receiver's own scale.
+"""Where the drogue will be in a moment: its swing, estimated on the receiver's own scale (`own_path`).
 
-The receiver's velocity in W is unknown, but what it was told to do is not: after its response time it flies u. With
-y_r the integral of u so delayed, y_D = e + y_r is the drogue's place on a scale that drifts steadily with the bias of
-the receiver's inertial velocity. Each axis of y_D is modelled as drift plus a swing that the gusts drive:
+With y_r the receiver's place by its commands, y_D = p + y_r is the drogue's place on a scale that drifts steadily with
+the bias of the receiver's inertial velocity. Each axis of y_D is modelled as drift plus a swing that coloured gusts g
+and the receiver's bow wave b drive:
 
-    m' = d,   d' = noise;     s'' = -omega^2 s - 2 zeta omega s' + noise;     y_D = m + s             (1)
+    m' = d,   d' = noise;     s'' = -omega^2 s - 2 zeta omega s' + g + b;     g' = -g/T + noise           (1)
+    y_D = m + s
 
-A Kalman filter of constant gain (the Riccati equation solved once) follows (m, d, s, s') from e and its rate. Its
-prediction over the response time is what a command given now can still meet.
+A Kalman filter follows (m, d, s, s', g) from p and its rate; its gains, which depend on nothing that is seen, are
+worked out beforehand until they stay the same. Its prediction over the response time is what a command given now can
+still meet.
 
-Not modelled: the bow wave, coupling of the axes, the change of frequency with the hose's length.
-Settings: a 15 m hose with a 20 kg drogue at 180 m/s swings near 0.33 Hz across and 0.4 Hz up and down, in the
-simulated hose as in the peers' (research on hose-drogue dynamics gives 0.2-0.5 Hz).
+Not modelled: coupling of the axes, another frequency for another length of hose or airspeed. Over a response time of
+a quarter second neither matters: the frequency may be off by a third.
+Settings: fitted to the simulated drogue (15 m of hose, 20 kg) at 180 m/s in moderate gusts, as one would to a record of
+flight; the peers' hoses and research on hose-drogue dynamics give 0.2-0.5 Hz.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import expm, solve_discrete_are
+from scipy.linalg import expm, solve_continuous_lyapunov, solve_discrete_are
 
 from dockair.rotations import Array
+
+_STATES, _GUST_INPUT = 5, 3
+_H = np.array([[1.0, 0.0, 1.0, 0.0, 0.0], [0.0, 1.0, 0.0, 1.0, 0.0]])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SwingSettings:
-    """Model of the drogue's motion; (2,) values are left and up."""
+    """Model of the drogue's motion; (3,) values are forward, left, up."""
 
-    frequency_hz: tuple[float, float] = (0.33, 0.40)
-    damping: float = 0.15  # of the swing, between its bare pendulum and what the gusts' own spectrum adds
-    swing_acceleration_density: float = 0.15  # [m/s^2/sqrt(Hz)], excursion of some 0.07 m at 0.33 Hz
-    drift_acceleration_density: float = 0.05  # [m/s^2/sqrt(Hz)], gusts slower than the swing
-    position_sigma_m: float = 0.01  # of the fused relative position, its error being correlated over frames
-    rate_sigma_m_s: float = 0.06  # of its rate, likewise
+    frequency_hz: tuple[float, float, float] = (0.44, 0.31, 0.45)
+    damping: tuple[float, float, float] = (0.2, 0.05, 0.12)
+    gust_time_s: tuple[float, float, float] = (0.6, 0.7, 1.2)  # T
+    gust_density: tuple[float, float, float] = (0.5, 1.3, 3.0)  # of g' [m/s^3/sqrt(Hz)]
+    drift_sigma_m_s: float = 0.4  # of d at the start: the inertial velocity's bias, twice its 0.2 m/s
+    learning_s: float = 12.0  # after which the gains stay the same: drift and swing are told apart within a few periods
+    drift_density: float = 0.03  # of d' [m/s^2/sqrt(Hz)]: the inertial velocity's drift, gusts far below the swing
+    position_sigma_m: float = 0.02  # of the place: what the tip does besides its commands is in it, and must not be chased
+    rate_sigma_m_s: float = 0.10  # of its rate, likewise; the camera itself knows it to 0.025 m/s
 
 
 class DrogueMotion:
-    """Filter of Eq. (1) for the axes left and up.
+    """Filter of Eq. (1) for three axes.
 
     Args:
         settings: the model.
         step_s: control period [s].
-        lead_s: how far ahead `ahead` predicts: the receiver's response time [s].
+        lead_s: (3,) how far ahead `ahead` predicts: the receiver's response times [s].
     """
 
-    def __init__(self, settings: SwingSettings, step_s: float, lead_s: float) -> None:
-        H = np.array([[1.0, 0.0, 1.0, 0.0], [0.0, 1.0, 0.0, 1.0]])
-        noise = np.diag([settings.position_sigma_m, settings.rate_sigma_m_s]) ** 2
-        self._H = H
-        self._x = np.zeros((2, 4))
-        self._F, self._K, self._lead, self._rates = [], [], [], []
-        for frequency_hz in settings.frequency_hz:
-            omega = 2.0 * np.pi * frequency_hz
-            A = np.zeros((4, 4))
-            A[0, 1] = A[2, 3] = 1.0
-            A[3, 2:] = -(omega**2), -2.0 * settings.damping * omega
-            F = expm(A * step_s)
-            drive = [0.0, settings.drift_acceleration_density**2, 0.0, settings.swing_acceleration_density**2]
-            P = solve_discrete_are(F.T, H.T, np.diag(drive) * step_s, noise)
-            self._F.append(F)
-            self._K.append(P @ H.T @ np.linalg.inv(H @ P @ H.T + noise))
-            self._lead.append(expm(A * lead_s))
-            self._rates.append(A)
+    def __init__(self, settings: SwingSettings, step_s: float, lead_s: Array) -> None:
+        self._lead_s = np.asarray(lead_s)
+        self._A = np.stack([_dynamics(settings, axis) for axis in range(3)])
+        self._F = np.stack([expm(A * step_s) for A in self._A])
+        self._lead = np.stack([expm(A * lead) for A, lead in zip(self._A, self._lead_s, strict=True)])
+        self._K = np.stack([_gains(settings, axis, self._A[axis], step_s) for axis in range(3)], axis=1)
+        self._ticks = 0
+        self._pushed = np.stack([_held(A, step_s) for A in self._A])
+        self._x: Array = np.zeros((3, _STATES))
 
-    def start(self, position_m: Array, rate_m_s: Array) -> None:
-        """Begin anew with everything taken for drift; (2,) each, left and up."""
-        self._x = np.column_stack([position_m, rate_m_s, np.zeros((2, 2))])
+    def start(self, place_m: Array, velocity_m_s: Array) -> None:
+        """Begin anew, at rest but for the swing; (3,) each."""
+        self._x, self._ticks = np.zeros((3, _STATES)), 0
+        self._x[:, 0], self._x[:, 3] = place_m, velocity_m_s
 
-    def step(self, position_m: Array | None, rate_m_s: Array | None) -> None:
-        """Advance by one control period; (2,) place and velocity on the receiver's scale, or None if not seen."""
-        for axis in range(2):
-            x = self._F[axis] @ self._x[axis]
-            if position_m is not None and rate_m_s is not None:
-                innovation = np.array([position_m[axis], rate_m_s[axis]]) - self._H @ x
-                x = x + self._K[axis] @ innovation
-            self._x[axis] = x
+    def step(self, place_m: Array | None, velocity_m_s: Array | None, push_m_s2: Array) -> None:
+        """Advance by one control period.
+
+        Args:
+            place_m: (3,) on the receiver's scale, None if not seen.
+            velocity_m_s: (3,) likewise.
+            push_m_s2: (3,) b.
+        """
+        x = np.einsum("aij,aj->ai", self._F, self._x) + self._pushed * push_m_s2[:, np.newaxis]
+        if place_m is not None and velocity_m_s is not None:
+            innovation = np.column_stack([place_m, velocity_m_s]) - x @ _H.T
+            x = x + np.einsum("aij,aj->ai", self._K[min(self._ticks, len(self._K) - 1)], innovation)
+            self._ticks += 1
+        self._x = x
 
     @property
     def drift_m_s(self) -> Array:
-        """(2,) velocity without the swing."""
+        """(3,) velocity without the swing."""
         return self._x[:, 1].copy()
 
-    def ahead(self) -> tuple[Array, Array, Array]:
-        """(2,) place [m], velocity [m/s] and acceleration [m/s^2] after the lead time."""
-        x = [lead @ now for lead, now in zip(self._lead, self._x, strict=True)]
-        derivative = [A @ later for A, later in zip(self._rates, x, strict=True)]
-        place = np.array([self._H @ later for later in x])
-        change = np.array([self._H[1] @ d for d in derivative])
-        return place[:, 0], place[:, 1], change
+    def ahead(self, push_m_s2: Array, push_then_m_s2: Array) -> tuple[Array, Array, Array]:
+        """(3,) place [m], velocity [m/s] and acceleration [m/s^2] after the lead time.
+
+        Args:
+            push_m_s2: (3,) b now; until then it changes steadily, and the swing does not answer to it yet.
+            push_then_m_s2: (3,) b after the lead time.
+        """
+        x = np.einsum("aij,aj->ai", self._lead, self._x)
+        change = np.einsum("aij,aj->ai", self._A, x)
+        lead, place, velocity = self._lead_s, x @ _H[0], x @ _H[1]
+        place = place + lead**2 * (push_m_s2 / 3.0 + push_then_m_s2 / 6.0)
+        velocity = velocity + 0.5 * lead * (push_m_s2 + push_then_m_s2)
+        return place, velocity, change @ _H[1] + push_then_m_s2
+
+
+def _dynamics(settings: SwingSettings, axis: int) -> Array:
+    """(5, 5) A of Eq. (1), b apart."""
+    omega = 2.0 * np.pi * settings.frequency_hz[axis]
+    A = np.zeros((_STATES, _STATES))
+    A[0, 1] = A[2, 3] = A[_GUST_INPUT, 4] = 1.0
+    A[3, 2:4] = -(omega**2), -2.0 * settings.damping[axis] * omega
+    A[4, 4] = -1.0 / settings.gust_time_s[axis]
+    return A
+
+
+def _held(A: Array, step_s: float) -> Array:
+    """(5,) what an acceleration of one, held for a step, adds to the state."""
+    augmented = np.zeros((_STATES + 1, _STATES + 1))
+    augmented[:_STATES, :_STATES], augmented[_GUST_INPUT, _STATES] = A, 1.0
+    return np.asarray(expm(augmented * step_s)[:_STATES, _STATES])
+
+
+def _gains(settings: SwingSettings, axis: int, A: Array, step_s: float) -> Array:
+    """(n, 5, 2) gains of the Kalman filter tick by tick, the last one for good; the step's noise by Van Loan's matrix."""
+    drive = np.diag([0.0, settings.drift_density**2, 0.0, 0.0, settings.gust_density[axis] ** 2])
+    loan = expm(np.block([[-A, drive], [np.zeros_like(A), A.T]]) * step_s)
+    F = loan[_STATES:, _STATES:].T
+    Q, R = F @ loan[:_STATES, _STATES:], np.diag([settings.position_sigma_m, settings.rate_sigma_m_s]) ** 2
+    P, gains = np.zeros((_STATES, _STATES)), []
+    P[2:, 2:] = solve_continuous_lyapunov(A[2:, 2:], -drive[2:, 2:])  # any moment of the swing
+    P[0, 0], P[1, 1] = P[2, 2], settings.drift_sigma_m_s**2
+    for _ in range(round(settings.learning_s / step_s)):
+        gains.append(P @ _H.T @ np.linalg.inv(_H @ P @ _H.T + R))
+        P = F @ (P - gains[-1] @ _H @ P) @ F.T + Q
+    P = solve_discrete_are(F.T, _H.T, 0.5 * (Q + Q.T), R)
+    gains.append(P @ _H.T @ np.linalg.inv(_H @ P @ _H.T + R))
+    return np.array(gains)

@@ -1,19 +1,7 @@
-"""The phases of a docking and what leads from one to the next.
+"""The phases of a docking and what leads from one to the next: the table of docs/guidance.md, in code.
 
-| from        | to          | when                                                                          |
-|-------------|-------------|-------------------------------------------------------------------------------|
-| PRE_CONTACT | APPROACH    | steady behind the drogue for `stabilise_s`, the relative state is usable      |
-| APPROACH    | CONTACT     | the probe's tip has come to the coupling                                      |
-| APPROACH    | BREAKAWAY   | lost, too fast, or too far off the drogue's axis close to it                  |
-| CONTACT     | HOLD        | nine tenths of `take_in_m` are pushed in and the drogue has come along        |
-| CONTACT     | BREAKAWAY   | the drogue has not come along: the probe is not held                          |
-| HOLD        | DISCONNECT  | `hold_s` are over                                                             |
-| HOLD        | BREAKAWAY   | the drogue has left the probe                                                 |
-| DISCONNECT  | CLEAR       | the drogue is `clear_m` ahead again                                           |
-| BREAKAWAY   | CLEAR       | the drogue is `clear_m` ahead again, or `breakaway_s` are over                |
-
-Approach and limits as in service practice: pre-contact 3-5 m behind the drogue, closing at 1.0-1.5 m/s and never over
-2.6 m/s (5 kt). Not here yet: joining up from afar, and a second attempt after a breakaway.
+Phases and limits as in service practice: pre-contact 3-5 m behind the drogue, closing at 1.0-1.5 m/s and never over
+2.6 m/s (5 kt), breakaway on a lost track, on too much speed, far off the drogue's axis close to it, beside the basket.
 """
 
 from collections.abc import Callable
@@ -24,32 +12,40 @@ from enum import Enum
 class Phase(Enum):
     """What the receiver is doing."""
 
+    JOIN_UP = "join_up"
     PRE_CONTACT = "pre_contact"
     APPROACH = "approach"
     CONTACT = "contact"
     HOLD = "hold"
     DISCONNECT = "disconnect"
-    CLEAR = "clear"
+    BACK_OFF = "back_off"
     BREAKAWAY = "breakaway"
+    CLEAR = "clear"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PhaseLimits:
     """When one phase gives way to the next. Defaults: service procedures, or assumed where marked."""
 
-    stabilise_s: float = 3.0  # assumed: a few periods of the drogue's motion
-    steady_offset_m: float = 0.35  # assumed: about twice the drogue's excursion in light gusts
-    steady_rate_m_s: float = 0.4  # assumed, likewise
+    attempts_max: int = 3  # assumed: what a patient tanker grants
+    slot_s: float = float("inf")  # after this no approach is begun; the tanker's time is not one's own
+    stabilise_s: float = 3.0  # assumed: a period of the drogue's swing
+    station_m: float = 0.5  # assumed: astern, that is near enough to the stand-off point
+    steady_along_m: float = 0.35  # assumed: twice the way that moderate gusts push receiver and drogue apart
     steady_sigma_m: float = 0.05  # assumed: a third of the 0.15 m that a contact may be off
+    capture_radius_m: float = 0.10  # assumed: a spread of 0.10 m leaves 2 % of the tips outside the rim's 0.19 m
+    waiting_s: float = 8.0  # assumed: two or three swings short of the basket without a good moment are enough
     coupling_reached_m: float = 0.05  # assumed: the coupling takes the tip within 0.03 m, the range errs by 0.02 m
     come_along_m: float = 0.2  # assumed: a drogue farther from the tip than this is not held by it
     take_in_m: float = 1.5  # inside the refuelling range 0.5-6 m (KDC-10 procedures)
+    taken_in: float = 0.9  # of that way when holding begins: the receiver comes to rest on the remaining tenth
     hold_s: float = 5.0  # assumed: long enough to see that the drogue stays on the probe
     clear_m: float = 3.0  # procedures: pre-contact is 3-5 m behind the drogue
     lost_s: float = 0.5  # breakaway practice: track lost for 0.5 s ...
     lost_range_m: float = 2.0  # ... within 2 m
     off_axis_m: float = 1.0  # breakaway practice: 1 m off ...
     off_axis_range_m: float = 1.0  # ... within 1 m
+    rim_m: float = 0.25  # radius of the ring: a tip past its plane and farther out is beside the basket
     closure_limit_m_s: float = 2.6  # 5 kt, service limit
     breakaway_s: float = 10.0  # assumed: backing off at 1 m/s clears any attempt in this time
 
@@ -58,56 +54,118 @@ class PhaseLimits:
 class Situation:
     """What the transitions look at, from the navigation's own estimate."""
 
-    in_phase_s: float  #: time since the phase began
-    steady_s: float  #: time for which the drogue has been steady ahead
+    time_s: float  #: since the guidance began
+    in_phase_s: float  #: since the phase began
+    steady_s: float  #: time for which the receiver has been steady astern of the drogue
+    spread_m: float  #: root mean square of the error across over the last swing
+    waiting_s: float  #: time for which the approach has stood still for want of a good moment
     unusable_s: float  #: time for which the relative state has been unusable
-    ahead_m: float  #: coupling ahead of the probe's tip, body x
-    ring_ahead_m: float  #: ring centre ahead of the probe's tip, body x
+    doubtful_s: float  #: time for which the integrity monitor has not claimed that contact may be flown
+    station_m: float  #: probe's tip from the stand-off point
+    ahead_m: float  #: coupling ahead of the probe's tip
+    ring_ahead_m: float  #: ring centre ahead of the probe's tip
     lateral_m: float  #: ring centre off the probe's line
-    closing_m_s: float  #: rate at which `ahead_m` shrinks
+    closing_m_s: float  #: rate at which `ring_ahead_m` shrinks
     pushed_in_m: float  #: way flown toward the tanker since the coupling was reached
+    attempts: int  #: approaches begun
 
-
-def _must_break_away(limits: PhaseLimits, s: Situation) -> bool:
-    lost = s.unusable_s > limits.lost_s and s.ahead_m < limits.lost_range_m
-    off_axis = s.lateral_m > limits.off_axis_m and s.ahead_m < limits.off_axis_range_m
-    return lost or off_axis or s.closing_m_s > limits.closure_limit_m_s
-
-
-def _drogue_left(limits: PhaseLimits, s: Situation) -> bool:
-    return abs(s.ahead_m) > limits.come_along_m or s.unusable_s > limits.lost_s
-
-
-_TAKEN_IN = 0.9  # of the way at which holding begins: the receiver comes to rest on the remaining tenth
 
 _Condition = Callable[[PhaseLimits, Situation], bool]
 
-#: The table of the module's first lines; the first condition that holds decides.
-TRANSITIONS: dict[Phase, tuple[tuple[_Condition, Phase], ...]] = {
-    Phase.PRE_CONTACT: ((lambda limits, s: s.steady_s >= limits.stabilise_s, Phase.APPROACH),),
+
+def _lost(limits: PhaseLimits, s: Situation) -> bool:
+    return s.unusable_s > limits.lost_s and s.ahead_m < limits.lost_range_m
+
+
+def _doubtful(limits: PhaseLimits, s: Situation) -> bool:
+    return s.doubtful_s > limits.lost_s and s.ahead_m < limits.lost_range_m
+
+
+def _off_axis(limits: PhaseLimits, s: Situation) -> bool:
+    return s.lateral_m > limits.off_axis_m and s.ring_ahead_m < limits.off_axis_range_m
+
+
+def _beside(limits: PhaseLimits, s: Situation) -> bool:
+    return s.ring_ahead_m < 0.0 and s.lateral_m > limits.rim_m
+
+
+def _left(limits: PhaseLimits, s: Situation) -> bool:
+    return abs(s.ahead_m) > limits.come_along_m or s.unusable_s > limits.lost_s
+
+
+def _far_enough(limits: PhaseLimits, s: Situation) -> bool:
+    return s.ring_ahead_m >= limits.clear_m or s.in_phase_s >= limits.breakaway_s
+
+
+@dataclass(frozen=True, slots=True)
+class Transition:
+    """A row of the table: where to, when, and the condition in words."""
+
+    to: Phase
+    reason: str
+    holds: _Condition
+
+
+_TOO_FAST = Transition(
+    Phase.BREAKAWAY, "closing too fast", lambda limits, s: s.closing_m_s > limits.closure_limit_m_s
+)
+_AWAY = (
+    Transition(
+        Phase.CLEAR,
+        "no attempts left",
+        lambda limits, s: _far_enough(limits, s) and s.attempts >= limits.attempts_max,
+    ),
+    Transition(Phase.PRE_CONTACT, "far enough to try again", _far_enough),
+)
+_SLOT_OVER = Transition(Phase.CLEAR, "time slot over", lambda limits, s: s.time_s >= limits.slot_s)
+
+#: The first condition that holds decides.
+TRANSITIONS: dict[Phase, tuple[Transition, ...]] = {
+    Phase.JOIN_UP: (
+        _SLOT_OVER,
+        Transition(Phase.PRE_CONTACT, "at the stand-off point", lambda limits, s: s.station_m <= limits.station_m),
+    ),
+    Phase.PRE_CONTACT: (
+        _SLOT_OVER,
+        Transition(
+            Phase.APPROACH,
+            "steady",
+            lambda limits, s: s.steady_s >= limits.stabilise_s and s.spread_m <= limits.capture_radius_m,
+        ),
+    ),
     Phase.APPROACH: (
-        (_must_break_away, Phase.BREAKAWAY),
-        (lambda limits, s: s.ahead_m <= limits.coupling_reached_m, Phase.CONTACT),
+        _TOO_FAST,
+        Transition(Phase.BREAKAWAY, "track lost", _lost),
+        Transition(Phase.BREAKAWAY, "integrity lost", _doubtful),
+        Transition(Phase.BREAKAWAY, "far off axis", _off_axis),
+        Transition(Phase.BREAKAWAY, "beside the basket", _beside),
+        Transition(Phase.BACK_OFF, "no good moment to close", lambda limits, s: s.waiting_s >= limits.waiting_s),
+        Transition(Phase.CONTACT, "coupling reached", lambda limits, s: s.ahead_m <= limits.coupling_reached_m),
     ),
     Phase.CONTACT: (
-        (_drogue_left, Phase.BREAKAWAY),
-        (lambda limits, s: s.pushed_in_m >= _TAKEN_IN * limits.take_in_m, Phase.HOLD),
+        _TOO_FAST,
+        Transition(Phase.BREAKAWAY, "beside the basket", _beside),
+        Transition(Phase.BACK_OFF, "drogue has not come along", _left),
+        Transition(
+            Phase.HOLD, "in the refuelling range", lambda limits, s: s.pushed_in_m >= limits.taken_in * limits.take_in_m
+        ),
     ),
     Phase.HOLD: (
-        (_drogue_left, Phase.BREAKAWAY),
-        (lambda limits, s: s.in_phase_s >= limits.hold_s, Phase.DISCONNECT),
+        Transition(Phase.BREAKAWAY, "drogue has left the probe", _left),
+        Transition(Phase.DISCONNECT, "refuelled", lambda limits, s: s.in_phase_s >= limits.hold_s),
     ),
-    Phase.DISCONNECT: ((lambda limits, s: s.ring_ahead_m >= limits.clear_m, Phase.CLEAR),),
-    Phase.BREAKAWAY: (
-        (lambda limits, s: s.ring_ahead_m >= limits.clear_m or s.in_phase_s >= limits.breakaway_s, Phase.CLEAR),
+    Phase.DISCONNECT: (
+        Transition(Phase.CLEAR, "drogue well ahead", lambda limits, s: s.ring_ahead_m >= limits.clear_m),
     ),
+    Phase.BACK_OFF: _AWAY,
+    Phase.BREAKAWAY: _AWAY,
     Phase.CLEAR: (),
 }
 
 
-def next_phase(phase: Phase, limits: PhaseLimits, situation: Situation) -> Phase:
-    """Return the phase that follows; the same one when no condition of the table holds."""
-    for condition, successor in TRANSITIONS[phase]:
-        if condition(limits, situation):
-            return successor
-    return phase
+def next_phase(phase: Phase, limits: PhaseLimits, situation: Situation) -> Transition | None:
+    """Return the row of the table that applies now, None where the phase goes on."""
+    for transition in TRANSITIONS[phase]:
+        if transition.holds(limits, situation):
+            return transition
+    return None

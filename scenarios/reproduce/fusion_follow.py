@@ -78,8 +78,7 @@ def _offer(filter_: RelativeFilter, flown: Flown, watching: Watching, tick: int,
     if count == 0:
         return False, False
     R_CD, p_CD, _ = filter_.predicted_pose(time_s)
-    misplaced_px = sheets.camera.focal_length_px * watching.settings.led_place_sigma_m / p_CD[0]
-    sigma_px = np.full(len(pixels), np.hypot(watching.sigma_px, misplaced_px))
+    sigma_px = np.full(len(pixels), watching.sigma_px)
     points_D = sheets.ring.positions_D
     if count < 4:
         return filter_.update_leds(pixels[:count], points_D[:count], sigma_px[:count], time_s), True

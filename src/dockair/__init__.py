@@ -12,7 +12,11 @@ from types import ModuleType
 
 __version__ = "0.1.0"
 
-ENVIRONMENTS = {"dockair/Dock-v0": "dockair.scenarios.envs:DockEnv"}
+ENVIRONMENTS = {
+    "dockair/Dock-v0": "dockair.scenarios.envs:DockEnv",
+    "dockair/DockFast-v0": "dockair.scenarios.envs:DockFastEnv",
+    "dockair/DockPixels-v0": "dockair.scenarios.envs:DockPixelsEnv",
+}
 
 
 def _register_environments() -> None:

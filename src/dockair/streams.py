@@ -24,6 +24,7 @@ STREAM_NAMES = (
     "hot_pixels",
     "inertial_velocity",
     "announcement",
+    "measurements",
 )
 
 

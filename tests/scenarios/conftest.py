@@ -1,7 +1,7 @@
 """A flight made by hand: no world, no sensors' errors, no navigation; for tests of what is done with a flight."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 import pytest
@@ -125,6 +125,22 @@ class HandMadeFlight:
     def ticks(self, count: int) -> Sequence[tuple[Truth, tuple[ImuSample, ...], CameraFrame | None, NavSolution]]:
         """The first control ticks."""
         return [self.tick(k) for k in range(1, count + 1)]
+
+
+def bare_truth(time_s: float, **values: object) -> Truth:
+    """Everything at rest at the world's origin, level; but for what is given."""
+    zero = np.zeros(3)
+    vectors = ("p_", "v_", "w_", "a_", "alpha_", "specific_force_", "gust")
+    state: dict[str, object] = {f.name: zero if f.name.startswith(vectors) else 0.0 for f in fields(Truth)}
+    state |= {"R_WB": np.eye(3), "R_WD": np.eye(3), "R_WT": np.eye(3), "p_WH": np.zeros((2, 3))}
+    state |= {"tick": round(time_s * 1000), "time_s": time_s}
+    state |= {"latched": False, "probe_touches_drogue": False, "receiver_touches": ""}
+    return Truth(**(state | values))  # type: ignore[arg-type]
+
+
+@pytest.fixture
+def make_truth() -> Callable[..., Truth]:
+    return bare_truth
 
 
 @pytest.fixture

@@ -24,11 +24,11 @@ def test_shares_add_up_and_every_part_was_called():
 
 
 def test_the_stopwatches_are_gone_afterwards():
-    from dockair.nav import navigator
+    from dockair.nav import ring_finder
     from dockair.nav.image.detect import detect
 
     bench(load_scenario("still_air"), seconds=0.05)
-    assert navigator.detect is detect
+    assert ring_finder.detect is detect
 
 
 def test_the_image_bench_counts_the_leds_of_its_frames_and_times_every_detector(monkeypatch):

@@ -1,5 +1,7 @@
-"""`dockair/Dock-v0` keeps gymnasium's contract, is determined by its seed, and shows no truth in its observation."""
+"""The environments keep gymnasium's contract, are determined by their seeds, and observe no truth."""
 
+import hashlib
+import multiprocessing
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -11,24 +13,38 @@ from gymnasium.utils.env_checker import check_env
 
 import dockair
 from dockair.errors import DockairError
-from dockair.scenarios.envs import ACTION, OBSERVATION, OUTCOME_REWARD, DockEnv, observation_from
-from dockair.scenarios.loop import Tick
+from dockair.messages import LedObservation
+from dockair.scenarios.envs import DockEnv, DockFastEnv, DockPixelsEnv
+from dockair.scenarios.envs_tables import (
+    ACTION,
+    OBSERVATION,
+    OUTCOME_REWARD,
+    PIXEL_STATE,
+    action_cost,
+    clipped,
+    observation_from,
+)
+from dockair.scenarios.loop import Flight, Tick
 from dockair.scenarios.referee import Outcome
+from dockair.scenarios.schema import load_scenario
 
 #: The world without camera: what is tested here does not depend on who navigates.
 QUICK = "truth_navigation"
+IDS = tuple(dockair.ENVIRONMENTS)
 #: The checker recommends actions in [-1, 1]; ours are in units (gymnasium.wrappers.RescaleAction changes that).
 allow_units = pytest.mark.filterwarnings("ignore:.*symmetric and normalized space")
+PAGE = Path(__file__).parents[2] / "docs" / "environments.md"
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def env():
+    """One for all tests: each resets it as it needs."""
     made = DockEnv(QUICK, ticks_per_step=5)
     yield made
     made.close()
 
 
-def _fly(env: DockEnv, seed: int, steps: int) -> list[tuple]:
+def _fly(env: gymnasium.Env, seed: int, steps: int) -> list[tuple]:
     rng = np.random.default_rng(1)
     history: list[tuple] = [env.reset(seed=seed)]
     for _ in range(steps):
@@ -44,23 +60,64 @@ def _same(a, b) -> bool:
     return np.array_equal(a, b)
 
 
-@pytest.mark.slow
-@allow_units
-def test_the_contract_of_gymnasium_is_kept(env):
-    check_env(env, skip_render_check=True)
+def _digest(value) -> str:
+    digest = hashlib.blake2b()
+
+    def take(x) -> None:
+        if isinstance(x, dict):
+            for key in sorted(x):
+                digest.update(key.encode())
+                take(x[key])
+        elif isinstance(x, tuple | list):
+            for one in x:
+                take(one)
+        else:
+            digest.update(x.encode() if isinstance(x, str) else np.asarray(x).tobytes())
+
+    take(value)
+    return digest.hexdigest()
+
+
+def roll_out(name: str, steps: int) -> str:
+    """Digest of everything that an environment returns, for a process of its own."""
+    made = gymnasium.make(name, ticks_per_step=4)
+    try:
+        return _digest(_fly(made, 21, steps))
+    finally:
+        made.close()
 
 
 @pytest.mark.slow
 @pytest.mark.gl
 @pytest.mark.timeout(900)
 @allow_units
-def test_the_registered_environment_passes_the_checker_with_the_camera_in_the_loop():
-    assert "dockair/Dock-v0" in dockair.ENVIRONMENTS
-    made = gymnasium.make("dockair/Dock-v0", render_mode="rgb_array")
+@pytest.mark.parametrize("name", IDS)
+def test_each_registered_environment_passes_the_checker(name):
+    made = gymnasium.make(name, render_mode="rgb_array")
     try:
-        check_env(made.unwrapped)
+        check_env(made.unwrapped, skip_render_check=name != "dockair/Dock-v0")  # the same for all
     finally:
         made.close()
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(600)
+@pytest.mark.parametrize("name", ["dockair/DockFast-v0", "dockair/DockPixels-v0"])
+def test_a_roll_out_is_the_same_to_the_bit_in_another_process(name):
+    with multiprocessing.get_context("spawn").Pool(1) as pool:
+        elsewhere = pool.apply(roll_out, (name, 12))
+    assert roll_out(name, 12) == elsewhere
+
+
+@pytest.mark.slow
+def test_the_first_observation_after_a_reset_is_a_new_environments(env):
+    env.reset(seed=2)
+    for _ in range(4):
+        env.step(env.action_space.sample())
+    again = env.reset(seed=9)
+    fresh = DockEnv(QUICK, ticks_per_step=5)
+    assert _same(again, fresh.reset(seed=9))
+    fresh.close()
 
 
 @pytest.mark.slow
@@ -80,67 +137,66 @@ def test_without_a_seed_the_environment_draws_the_next_flight_from_its_own_gener
     assert not np.array_equal(second, third)
 
 
-def test_observations_are_new_objects(env):
-    history = _fly(env, 0, 3)
-    arrays = [entry[0] for entry in history]
-    assert all(not np.shares_memory(a, b) for a, b in zip(arrays, arrays[1:], strict=False))
+@pytest.mark.slow
+def test_a_seed_among_the_options_chooses_the_flight(env):
+    assert _same(env.reset(seed=1, options={"seed": 5}), env.reset(seed=5))
 
 
-def test_step_before_reset_and_after_the_end_is_refused(env):
+def test_shaping_sums_to_the_distance_made_good_and_observations_are_new_objects(env):
+    """With zero action nothing is subtracted: the sum of rewards is the distance at the start less that at the end."""
+    _, start = env.reset(seed=4)
+    steps = [env.step(np.zeros(6, np.float32)) for _ in range(10)]
+    made_good = start["truth"]["distance_m"] - steps[-1][4]["truth"]["distance_m"]
+    assert sum(step[1] for step in steps) == pytest.approx(made_good, abs=1e-12)
+    assert all(not np.shares_memory(a[0], b[0]) for a, b in zip(steps, steps[1:], strict=False))
+
+
+def test_a_step_before_any_reset_is_refused():
     with pytest.raises(gymnasium.error.ResetNeeded):
-        env.step(np.zeros(6, np.float32))
-    env.reset(seed=0, options={"set": {"flight.duration_s": 0.2}})
-    for _ in range(10):
-        *_, terminated, truncated, _ = env.step(np.zeros(6, np.float32))
-        if terminated or truncated:
-            break
-    with pytest.raises(gymnasium.error.ResetNeeded):
-        env.step(np.zeros(6, np.float32))
+        DockEnv(QUICK).step(np.zeros(6, np.float32))
 
 
-def test_the_end_of_time_truncates_and_does_not_terminate(env):
+def test_the_end_of_time_truncates_and_what_comes_after_is_refused(env):
     env.reset(seed=0, options={"set": {"flight.duration_s": 0.1}})
     ends = [env.step(np.zeros(6, np.float32))[2:] for _ in range(2)]
     (terminated, truncated, info) = ends[-1]
     assert (terminated, truncated) == (False, True)
     assert info["outcome"] == "timeout"
     assert not info["is_success"]
+    with pytest.raises(gymnasium.error.ResetNeeded):
+        env.step(np.zeros(6, np.float32))
 
 
-def test_shaping_sums_to_the_distance_made_good(env):
-    """With zero action nothing is subtracted: the sum of rewards is the distance at the start less that at the end."""
-    _, start = env.reset(seed=4)
-    steps = [env.step(np.zeros(6, np.float32)) for _ in range(10)]
-    made_good = start["truth"]["distance_m"] - steps[-1][4]["truth"]["distance_m"]
-    assert sum(step[1] for step in steps) == pytest.approx(made_good, abs=1e-12)
-
-
-def test_a_full_deflection_costs_what_is_written(make_hand_made):
-    """0.02 per second with every axis at its limit: 0.001 in a step of 50 ms, 0.0005 with half the axes."""
-    env = DockEnv(QUICK, ticks_per_step=5)
-    env.reset(seed=4)
-    high = env.action_space.high  # type: ignore[attr-defined]
-    assert env._action_cost(env._command(high)) == pytest.approx(0.02 * 0.05)
-    assert env._action_cost(env._command(np.where(np.arange(6) < 3, high, 0.0))) == pytest.approx(0.5 * 0.02 * 0.05)
+@pytest.mark.slow
+def test_the_sparse_reward_is_the_outcome_alone():
+    env = DockEnv(QUICK, ticks_per_step=5, reward="sparse")
+    env.reset(seed=4, options={"set": {"flight.duration_s": 0.12}})
+    rewards = [env.step(np.ones(6, np.float32))[1] for _ in range(3)]
     env.close()
+    assert rewards == [0.0, 0.0, OUTCOME_REWARD[Outcome.TIMEOUT]]
+
+
+def test_a_full_deflection_costs_what_is_written(env):
+    """0.02 per second with every axis at its limit: 0.001 in a step of 50 ms, 0.0005 with half the axes."""
+    high = env.action_space.high.astype(float)
+    assert action_cost(high[:3], high[3:], 0.05) == pytest.approx(0.02 * 0.05)
+    assert action_cost(high[:3], np.zeros(3), 0.05) == pytest.approx(0.5 * 0.02 * 0.05)
 
 
 def test_commands_beyond_the_limits_are_clipped_and_nonsense_is_refused(env):
-    env.reset(seed=0)
     command = env._command(np.full(6, 100.0, np.float32))
     np.testing.assert_array_equal(command.velocity_m_s, 2.5)
     np.testing.assert_array_equal(command.acceleration_m_s2, 2.0)
     for wrong in (np.full(6, np.nan, np.float32), np.zeros(5, np.float32)):
         with pytest.raises(DockairError, match="6 finite numbers"):
-            env.step(wrong)
+            env._command(wrong)
 
 
 def test_an_observation_is_finite_and_inside_its_space_when_the_navigation_knows_nothing(hand_made, env):
     truth, _, _, solution = hand_made.tick(1)
     blind = replace(solution, valid=False, covariance=np.full((9, 9), np.nan), led_pixels_px=np.full((8, 2), np.nan))
-    env.reset(seed=0)
     env._tick = Tick(truth=truth, imu=(), frame=None, solution=blind, outcome=None)
-    observation = env._observation()
+    observation = env.observation()
     assert np.isfinite(observation).all()
     assert env.observation_space.contains(observation)
     named = dict(zip([entry.name for entry in OBSERVATION], observation, strict=True))
@@ -149,23 +205,80 @@ def test_an_observation_is_finite_and_inside_its_space_when_the_navigation_knows
     assert named["p_PD_B_x"] == solution.p_PD_B[0]
 
 
-def test_the_observation_does_not_depend_on_the_truth(hand_made):
-    """The same solution and gyro with another truth give the same observation."""
-    truth, imu, _, solution = hand_made.tick(2)
-    elsewhere = hand_made.truth(9000)
-    a, b = (Tick(truth=t, imu=imu, frame=None, solution=solution, outcome=None) for t in (truth, elsewhere))
-    np.testing.assert_array_equal(observation_from(solution, a), observation_from(solution, b))
+def test_the_observation_is_made_of_the_solution_and_the_gyro(hand_made, env):
+    """It is not given the truth."""
+    _, imu, _, solution = hand_made.tick(2)
+    observation = clipped(observation_from(solution, imu), env.observation_space)
+    named = dict(zip([entry.name for entry in OBSERVATION], observation, strict=True))
+    assert [named[f"gyro_{axis}"] for axis in "xyz"] == list(imu[-1].angular_rate_rad_s)
+    assert named["v_PD_B_x"] == solution.v_PD_B[0]
+
+
+@pytest.mark.slow
+def test_the_fast_environment_flies_the_same_world_and_hardware_without_a_picture():
+    fast = DockFastEnv(ticks_per_step=4)
+    fast.reset(seed=3)
+    for _ in range(3):
+        *_, info = fast.step(np.zeros(6, np.float32))
+    flight = Flight(load_scenario("default", {"camera.sensing": "measurements"}), 3)
+    for _ in range(13):
+        tick = flight.step(type(flight.navigator.step((), None).command)())
+    assert info["truth"]["p_PD_B_x_m"] == tick.truth.p_PD_B[0]
+    assert fast.tick.frame is None or isinstance(fast.tick.frame, LedObservation)
+    fast.close()
+    flight.close()
+
+
+@pytest.mark.slow
+@pytest.mark.gl
+def test_the_picture_shows_the_navigations_window_and_says_where_it_lies():
+    env = DockPixelsEnv(ticks_per_step=4)
+    observation, _ = env.reset(seed=3)
+    assert not observation["picture"].any()
+    assert dict(zip([e.name for e in PIXEL_STATE], observation["state"], strict=True))["frame_age"] == 10.0
+    for _ in range(6):
+        before, (observation, *_) = observation, env.step(np.zeros(6, np.float32))
+    frame, state = env._frame, dict(zip([e.name for e in PIXEL_STATE], observation["state"], strict=True))
+    assert env.observation_space.contains(observation)
+    assert observation["picture"].max() == frame.pixels.max()
+    assert (state["row"], state["column"]) == (frame.window.row_start, frame.window.column_start)
+    assert 0.005 < state["frame_age"] < 0.04
+    assert not np.shares_memory(before["picture"], observation["picture"])
+    env.close()
+
+
+@pytest.mark.slow
+@pytest.mark.gl
+def test_the_whole_sensor_can_be_asked_for():
+    env = DockPixelsEnv(view="sensor", ticks_per_step=4)
+    env.reset(seed=3)
+    for _ in range(3):
+        observation, *_ = env.step(np.zeros(6, np.float32))
+    env.close()
+    assert observation["picture"].shape == (136, 256)
+    assert list(observation["state"][:3]) == [0.0, 0.0, 8.0]
 
 
 def test_wrong_arguments_say_what_exists():
-    with pytest.raises(DockairError, match="rgb_array"):
-        DockEnv(QUICK, render_mode="human")
+    for arguments, exists in (
+        ({"render_mode": "ansi"}, "exists: human, rgb_array"),
+        ({"reward": "shaped"}, "exists: dense, sparse"),
+        ({"attempts": 0}, "from 1 on"),
+        ({"ticks_per_step": 0}, "from 1 on"),
+    ):
+        with pytest.raises(DockairError, match=exists):
+            DockEnv(QUICK, **arguments)
+    with pytest.raises(DockairError, match="exists: ring, sensor"):
+        DockPixelsEnv(view="crop")
+    with pytest.raises(DockairError, match="one that looks through the camera"):
+        DockPixelsEnv(QUICK)
     with pytest.raises(DockairError, match="exists: .*default"):
         DockEnv("no_such_scenario")
-    with pytest.raises(DockairError, match="options: .*'scenari'.*exists: scenario, set"):
+    with pytest.raises(DockairError, match="options: .*'scenari'.*exists: scenario, seed, set"):
         DockEnv(QUICK).reset(options={"scenari": "default"})
 
 
+@pytest.mark.slow
 @pytest.mark.gl
 def test_the_third_persons_view_is_a_picture_of_the_world(env):
     seen = DockEnv(QUICK, render_mode="rgb_array")
@@ -180,17 +293,37 @@ def test_the_third_persons_view_is_a_picture_of_the_world(env):
     assert env.render() is None
 
 
+@pytest.mark.slow
+@pytest.mark.timeout(600)
+def test_vector_environments_in_one_process_and_in_two_fly_the_same():
+    several = [
+        gymnasium.make_vec("dockair/DockFast-v0", num_envs=2, vectorization_mode=mode, vector_kwargs=arguments)
+        for mode, arguments in (("sync", {}), ("async", {"context": "spawn"}))
+    ]
+    try:
+        firsts = [env.reset(seed=[7, 8])[0] for env in several]
+        thens = [env.step(np.zeros((2, 6), np.float32))[0] for env in several for _ in range(2)]
+        np.testing.assert_array_equal(*firsts)
+        np.testing.assert_array_equal(thens[1], thens[3])
+        assert not np.array_equal(thens[1][0], thens[1][1])
+    finally:
+        for env in several:
+            env.close()
+
+
 def test_the_page_tables_what_the_code_has():
-    """Every entry of the observation and the action, with its index, stands in docs/environments.md."""
-    page = (Path(__file__).parents[2] / "docs" / "environments.md").read_text(encoding="utf-8")
-    assert f"`Box({len(OBSERVATION)},)`, float64" in page
-    assert f"`Box({len(ACTION)},)`, float32" in page
-    first_index = {}
-    for index, entry in enumerate(OBSERVATION):
-        stem = re.sub(r"(_velocity|_acceleration)?_[xyz]$", "", entry.name)
-        first_index.setdefault(stem, index)
-    for stem, index in first_index.items():
-        assert re.search(rf"^\| {index}(-\d+)? \| `{stem}`", page, re.MULTILINE), stem
+    """Every entry of observation, picture's state and action, with its index, stands in docs/environments.md."""
+    page = PAGE.read_text(encoding="utf-8")
+    for entries, kind in ((OBSERVATION, "float64"), (ACTION, "float32"), (PIXEL_STATE, "float64")):
+        assert f"`Box({len(entries)},)`, {kind}" in page
+        first_index: dict[str, int] = {}
+        for index, entry in enumerate(entries):
+            stem = re.sub(r"(_velocity|_acceleration)?_[xyz]$", "", entry.name)
+            first_index.setdefault(stem, index)
+        for stem, index in first_index.items():
+            assert re.search(rf"^\| {index}(-\d+)? \| `{stem}`", page, re.MULTILINE), stem
     for outcome, reward in OUTCOME_REWARD.items():
         assert re.search(rf"^\|.*`{outcome.value}`.*\| {reward:g} \|", page, re.MULTILINE), outcome
     assert set(OUTCOME_REWARD) == set(Outcome)
+    for name in IDS:
+        assert f"`{name}`" in page

@@ -1,7 +1,9 @@
 """Figures of a flight against errors put in by hand."""
 
 import json
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -9,8 +11,10 @@ import pytest
 
 from dockair.rotations import exp
 from dockair.scenarios import metrics
+from dockair.scenarios.causes import Flown
 from dockair.scenarios.flight_log import FlightLog
-from dockair.scenarios.referee import Contact
+from dockair.scenarios.hold import hold_of
+from dockair.scenarios.referee import Referee
 
 
 def _log(flight, count: int) -> FlightLog:
@@ -22,9 +26,9 @@ def _log(flight, count: int) -> FlightLog:
 
 def _summary(flight, log: FlightLog, **changes):
     values = dict(
-        scenario="hand_made", seed=3, outcome="contact", contact=None,
-        collided_with="", truths=log.truths, solutions=log.solutions, frames=log.frames,
-        mounting=flight.sheets.mounting, truth_navigation=False, background="mujoco", wall_time_s=2.0, out_dir=None,
+        scenario="hand_made", seed=3, outcome="timeout", referee=Referee(),
+        flown=Flown(truths=log.truths, solutions=log.solutions, p_PN_B=np.array([-1.2, 0.9, -0.65])), frames=log.frames,
+        mounting=flight.sheets.mounting, sensing="camera", background="mujoco", wall_time_s=2.0, out_dir=None,
     )  # fmt: skip
     return metrics.summarise(**(values | changes))
 
@@ -86,16 +90,10 @@ def test_availability_is_counted_from_the_first_valid_tick():
     assert metrics.availability([False, False]) == 0.0
 
 
-def test_a_second_approach_is_a_second_attempt():
-    phases = ["pre_contact", "approach", "approach", "breakaway", "pre_contact", "approach"]
-    assert metrics.attempts(phases) == 2
-    assert metrics.attempts([]) == 0
-
-
 def test_hold_and_disconnect_are_read_from_the_latch(hand_made):
     """Latched from 6.55 to 8.49 s, so that the first free control tick is at 8.5 s."""
     truths = [hand_made.truth(10 * k) for k in range(1, 900)]
-    hold, disconnect = metrics.hold_of(truths)
+    hold, disconnect = hold_of(truths)
     assert hold is not None and disconnect is not None
     assert hold.duration_s == pytest.approx(8.49 - 6.55)
     assert hold.take_in_max_m == pytest.approx(1.2)
@@ -104,22 +102,54 @@ def test_hold_and_disconnect_are_read_from_the_latch(hand_made):
 
 
 def test_a_probe_still_held_at_the_end_was_not_disconnected(hand_made):
-    _, disconnect = metrics.hold_of([hand_made.truth(10 * k) for k in range(600, 700)])
+    _, disconnect = hold_of([hand_made.truth(10 * k) for k in range(600, 700)])
     assert disconnect is None
 
 
-def test_result_json_has_the_documented_keys(hand_made, tmp_path):
-    contact = Contact(time_s=6.55, radial_offset_m=0.03, closure_speed_m_s=1.2, angle_deg=2.0)
-    result = _summary(hand_made, _log(hand_made, 20), contact=contact, out_dir=tmp_path)
+def _refereed(flight, count: int) -> tuple[FlightLog, Referee]:
+    """The log of some control ticks without pictures, and a referee who watched them."""
+    flight.frame = lambda truth: None
+    log, referee = _log(flight, count), Referee()
+    for truth, solution in zip(log.truths, log.solutions, strict=True):
+        referee.watch(truth)
+        referee.judge(truth, solution.phase, 60.0, usable=solution.valid, reason=solution.phase_reason)
+    return log, referee
+
+
+def test_result_json_has_the_documented_keys_and_no_others(hand_made, tmp_path):
+    log, referee = _refereed(hand_made, 700)
+    result = _summary(hand_made, log, referee=referee, outcome="contact", out_dir=tmp_path, wall_time_s=70.0)
     written = json.loads(result.write(tmp_path).read_text())
     assert list(written) == [
-        "schema_version", "scenario", "seed", "outcome", "attempts", "contact", "hold", "disconnect", "collided_with",
-        "truth_navigation", "background", "nav", "frames", "duration_s", "real_time_factor", "wall_time_s", "versions",
-        "out_dir",
+        "schema_version", "scenario", "seed", "outcome", "success", "first_attempt", "cause", "unsafe", "attempts",
+        "attempt_log", "contact", "hold", "disconnect", "fuel_kg", "collided_with", "sensing", "truth_navigation",
+        "background", "nav", "frames", "duration_s", "real_time_factor", "wall_time_s", "versions", "out_dir",
     ]  # fmt: skip
+    page = (Path(__file__).parents[2] / "docs" / "results.md").read_text(encoding="utf-8")
+    documented = page[page.index("## result.json") : page.index("## as_built.json")]
+    for key in (*written, *(f"attempt_log[].{key}" for key in written["attempt_log"][0])):
+        assert f"`{key}`" in documented or f"`{key}." in documented, key
     assert list(written["contact"]) == ["time_s", "radial_offset_m", "closure_speed_m_s", "angle_deg"]
     assert written["real_time_factor"] == pytest.approx(0.1)
     assert written["versions"]["dockair"]
+
+
+def test_attempts_contact_and_fuel_of_a_flight_come_from_the_referee_and_the_truth(hand_made):
+    """The hand-made probe stops at the ring's plane and closes at 1.2 m/s from 3 s on; it is held at 6.55 s."""
+    log, referee = _refereed(hand_made, 700)
+    result = _summary(hand_made, log, referee=referee, outcome="contact")
+    (attempt,) = result.attempt_log
+    assert (result.attempts, attempt.number, attempt.outcome, attempt.cause) == (1, 1, "contact", "")
+    assert (attempt.begun_s, attempt.ended_s) == (3.0, 6.55)
+    assert result.first_attempt and result.success and result.unsafe == () and result.cause == ""
+    assert result.fuel_kg == log.truths[-1].fuel_kg
+    assert not result.truth_navigation and result.sensing == "camera"
+    assert _summary(hand_made, log, sensing="truth").truth_navigation
+
+
+def test_a_flight_that_never_approached_has_a_cause_without_an_attempt(hand_made):
+    result = _summary(hand_made, _refereed(hand_made, 200)[0])
+    assert (result.attempts, result.attempt_log, result.success, result.cause) == (0, (), False, "never_steady")
 
 
 def test_what_could_not_be_measured_is_null_and_not_nan(hand_made):
@@ -139,3 +169,11 @@ def test_flight_parquet_holds_truth_and_belief_side_by_side(hand_made, tmp_path)
     np.testing.assert_allclose(table["nav_sigma_p_PD_B_y_m"].to_numpy(), 0.01)
     assert table["nav_leds_named"].to_pylist()[-1] == 8
     assert len(table["truth_p_WH_m"][0].as_py()) == 3 * 17
+
+
+def test_every_column_of_the_log_stands_on_the_page_but_for_its_axis_and_unit(hand_made):
+    page = (Path(__file__).parents[2] / "docs" / "results.md").read_text(encoding="utf-8")
+    documented = page[page.index("## flight.parquet") : page.index("## messages.parquet")]
+    for column in _log(hand_made, 3).columns():
+        symbol = re.sub(r"_[wxyz](_m|_m_s|_m_s2|_rad|_rad_s|_rad_s2)?$", "", column)
+        assert symbol in documented or symbol.removeprefix("truth_") in documented, column

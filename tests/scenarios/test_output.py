@@ -4,11 +4,9 @@ import io
 from types import SimpleNamespace
 
 import numpy as np
-import pytest
 from rich.console import Console
 
-from dockair.scenarios.output import FlightProgress, gusts_in_words, show_result
-from dockair.scenarios.schema import load_scenario
+from dockair.scenarios.output import FlightProgress, show_result
 
 
 def tick(time_s: float):
@@ -37,11 +35,6 @@ def test_on_a_terminal_progress_is_a_bar_that_is_gone_afterwards():
     assert text.getvalue().endswith("\x1b[2K")  # the line is cleared
 
 
-@pytest.mark.parametrize(("name", "words"), [("default", "0.5 m/s"), ("still_air", "still"), ("light_gusts", "light")])
-def test_gusts_are_told_by_strength_or_by_name(name, words):
-    assert gusts_in_words(load_scenario(name)) == words
-
-
 def test_a_flight_without_contact_shows_no_contact_figures_and_no_recording(capsys, tmp_path):
     result = {
         "outcome": "miss",
@@ -58,3 +51,16 @@ def test_a_flight_without_contact_shows_no_contact_figures_and_no_recording(caps
     assert "closing speed" not in out
     assert "range error" not in out
     assert "rerun" not in out
+
+
+def test_every_failed_attempt_is_told_with_its_cause(capsys, tmp_path):
+    """Successful ones need no line: their figures stand below."""
+    strike = {"number": 1, "outcome": "rim_strike", "radial_offset_m": 0.21, "cause": "gust", "reason": ""}
+    broke = {"number": 2, "outcome": "breakaway", "radial_offset_m": None, "cause": "detection", "reason": "track lost"}
+    held = {"number": 3, "outcome": "contact", "radial_offset_m": 0.02, "cause": "", "reason": ""}
+    result = {"outcome": "contact", "scenario": "mine", "seed": 1, "attempt_log": [strike, broke, held]}
+    show_result(result, [], tmp_path)
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[1] == "attempt 1: rim strike, 0.21 m off; cause: gust"
+    assert lines[2] == "attempt 2: breakaway (track lost); cause: detection"
+    assert not any("attempt 3" in line for line in lines)

@@ -1,11 +1,13 @@
 """The referee on hand-made truths: a probe tip led through the ring's plane."""
 
 import dataclasses
+import functools
 
 import numpy as np
 import pytest
 
 from dockair.rotations import exp
+from dockair.scenarios.attempts import RefereeLimits
 from dockair.scenarios.referee import Outcome, Referee
 from dockair.sim.truth import Truth
 
@@ -67,24 +69,31 @@ def test_probe_that_was_held_and_let_go_has_made_contact_and_only_its_first_coun
     assert judged(referee, truth_at(9.0, (-3.0, 0.0, 0.0)), "clear") is Outcome.CONTACT
 
 
-def test_probe_that_passes_beside_the_basket_and_touches_nothing_has_missed():
+def test_probe_that_passes_beside_the_basket_and_touches_nothing_has_missed_and_the_flight_goes_on():
     referee = Referee()
-    assert judged(referee, through(referee, 0.4)) is Outcome.MISS
-
-
-def test_probe_that_has_passed_by_less_than_a_metre_may_still_be_held():
-    referee = Referee()
-    referee.watch(truth_at(1.0, (-0.1, 0.4, 0.0)))
-    referee.watch(truth_at(2.0, (0.9, 0.4, 0.0)))
-    assert judged(referee, truth_at(2.0, (0.9, 0.4, 0.0))) is None
-    assert judged(referee, truth_at(2.2, (1.1, 0.4, 0.0))) is Outcome.MISS
+    truth = through(referee, 0.4)
+    assert judged(referee, truth) is None
+    assert judged(referee, truth_at(9.0, (-3.0, 0.0, 0.0)), "clear") is Outcome.MISS
 
 
 def test_probe_that_touches_the_drogue_and_is_not_held_has_struck_it_from_ahead_or_behind_the_rings_plane():
     passed, backed_off = Referee(), Referee()
-    assert judged(passed, through(passed, 0.25, touches=True)) is Outcome.RIM_STRIKE
+    through(passed, 0.25, touches=True)
     backed_off.watch(truth_at(1.0, (-0.02, 0.27, 0.0), touches=True))
-    assert judged(backed_off, truth_at(9.0, (-3.0, 0.0, 0.0)), "clear") is Outcome.RIM_STRIKE
+    for referee in (passed, backed_off):
+        assert judged(referee, truth_at(9.0, (-3.0, 0.0, 0.0)), "clear") is Outcome.RIM_STRIKE
+
+
+def test_a_strike_in_one_attempt_outweighs_a_clean_breakaway_in_the_next_and_contact_outweighs_both():
+    referee = Referee()
+    judged(referee, truth_at(0.0, (-3.0, 0.0, 0.0)), "approach")
+    through(referee, 0.25, touches=True)
+    judged(referee, truth_at(3.0, (-3.0, 0.0, 0.0)), "approach")
+    judged(referee, truth_at(4.0, (-2.0, 0.0, 0.0)), "breakaway")
+    assert judged(referee, truth_at(5.0, (-4.0, 0.0, 0.0)), "clear") is Outcome.RIM_STRIKE
+    judged(referee, truth_at(6.0, (-3.0, 0.0, 0.0)), "approach")
+    through(referee, 0.05, latch=True)
+    assert judged(referee, truth_at(9.0, (-4.0, 0.0, 0.0)), "clear") is Outcome.CONTACT
 
 
 def test_anything_else_of_the_receiver_that_touches_ends_the_flight_whatever_went_before():
@@ -122,3 +131,45 @@ def test_offset_and_closure_are_seen_from_the_drogue_also_when_it_moves_and_turn
     assert referee.contact is not None
     assert referee.contact.radial_offset_m == pytest.approx(np.hypot(0.07, 0.04))
     assert referee.contact.closure_speed_m_s == pytest.approx(closure)
+
+
+def unsafe_of(referee, lateral, *, speed=1.2, latch=False, touches=True, usable=(True, True)):
+    """Fly through the ring's plane with the navigation's word before it and after it; return what was unsafe."""
+    judge = functools.partial(referee.judge, phase="approach", duration_s=60.0)
+    judge(truth_at(0.0, (-0.6, lateral, 0.0)), usable=usable[0])
+    for k, x in enumerate(np.arange(-0.5, 0.4, 0.01)):
+        held = latch and x > 0.3
+        tick = truth_at(0.01 * k, (x, lateral, 0.0), (speed, 0, 0), latched=held, touches=touches and x > 0.02)
+        referee.watch(tick)
+        judge(tick, usable=usable[int(x > 0.1)])
+    return referee.unsafe
+
+
+def test_a_contact_inside_every_limit_is_safe():
+    assert unsafe_of(Referee(), 0.05, latch=True) == ()
+
+
+@pytest.mark.parametrize(("speed", "expected"), [(2.59, ()), (2.61, ("touch at 2.61 m/s",))])
+def test_a_touch_at_more_than_five_knots_is_unsafe_whether_it_is_held_or_not(speed, expected):
+    for latch in (False, True):
+        assert unsafe_of(Referee(), 0.1, speed=speed, latch=latch) == expected
+
+
+def test_a_touch_with_the_tip_beyond_the_rim_is_unsafe_and_told_once_with_the_farthest_place():
+    assert unsafe_of(Referee(), 0.24) == ()
+    assert unsafe_of(Referee(), 0.26) == ("touch outside the rim, 0.26 m off the axis",)
+    assert unsafe_of(Referee(RefereeLimits(rim_radius_m=0.305)), 0.26) == ()
+    assert unsafe_of(Referee(), 0.40, touches=False) == ()  # a miss is none
+
+
+@pytest.mark.parametrize("usable", [(False, True), (True, False), (False, False)])
+def test_a_contact_is_unsafe_when_the_solution_was_marked_unusable_on_the_way_in_or_at_the_latch(usable):
+    assert unsafe_of(Referee(), 0.05, latch=True, usable=usable) == ("contact on a solution marked unusable",)
+    assert unsafe_of(Referee(), 0.05, usable=usable) == ()  # nothing was held
+
+
+def test_a_collision_is_unsafe_and_told_once():
+    referee = Referee()
+    for time_s in (1.0, 1.001):
+        referee.watch(truth_at(time_s, (-3.0, 0.0, 0.0), hit="hose_3"))
+    assert referee.unsafe == ("collision with hose_3",)

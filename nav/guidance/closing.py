@@ -1,0 +1,70 @@
+"""When to close: only while the predicted miss is inside the capture radius, as long as there is room to stop.
+
+The miss at contact, t_go from now, is predicted from the error that the commands given will leave and from how well
+the drogue has been followed over its last swing,
+
+    miss^2 = |e|^2 exp(-2 t_go / T_e) + mean of |e|^2 over the swing                                      (1)
+
+and the receiver, once it closes at c, comes to rest not before
+
+    d = c tau + c^2 / (2 a)                                                                               (2)
+
+Within d of the ring it is committed: stopping there would leave the probe among the rim's swings.
+"""
+
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ClosingSettings:
+    """Constants of Eqs. (1) and (2)."""
+
+    swing_s: float = 3.0  # the drogue's period at 0.33 Hz
+    error_time_s: float = 0.4  # T_e: an error of the following is another one half a response and a half swing later
+    deceleration_m_s2: float = 0.6  # a: with idle thrust a fighter slows by 0.8
+    response_s: float = 0.45  # tau along, engine and all
+    hysteresis: float = 1.3  # of the capture radius once closing: a good moment must not flicker
+    margin_m: float = 0.2  # short of the ring, at rest: drogue and receiver move by 0.06 m rms in moderate gusts
+
+
+class PredictedMiss:
+    """Eq. (1), one control tick at a time."""
+
+    def __init__(self, settings: ClosingSettings, step_s: float) -> None:
+        self._settings = settings
+        self._squares: deque[float] = deque(maxlen=round(settings.swing_s / step_s))
+        self._sum = 0.0
+
+    def forget(self) -> None:
+        """Begin anew: nothing is known of how well the drogue is followed."""
+        self._squares.clear()
+        self._sum = 0.0
+
+    def step(self, error_m: float) -> None:
+        """Take note of how far off the drogue the probe's line is now."""
+        if len(self._squares) == self._squares.maxlen:
+            self._sum -= self._squares[0]
+        self._squares.append(error_m**2)
+        self._sum += error_m**2
+
+    @property
+    def spread_m(self) -> float:
+        """Root of the mean square over the last swing; infinite before a whole one has been followed."""
+        if len(self._squares) < (self._squares.maxlen or 0):
+            return float("inf")
+        return float(np.sqrt(max(self._sum, 0.0) / len(self._squares)))
+
+    def at_contact_m(self, error_to_come_m: float, distance_m: float, closure_m_s: float) -> float:
+        """Miss predicted for a contact that lies `distance_m` ahead at that closure speed."""
+        to_go_s = max(distance_m, 0.0) / closure_m_s
+        share = float(np.exp(-to_go_s / self._settings.error_time_s))
+        return float(np.hypot(share * error_to_come_m, self.spread_m))
+
+
+def room_to_stop_m(settings: ClosingSettings, closure_m_s: float) -> float:
+    """Distance to the ring within which a receiver that closes at this speed is committed, Eq. (2) with its margin."""
+    c = max(closure_m_s, 0.0)
+    return c * settings.response_s + 0.5 * c * c / settings.deceleration_m_s2 + settings.margin_m

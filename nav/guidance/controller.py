@@ -1,0 +1,57 @@
+"""What the two controllers have in common: the drogue as they see it, what is wanted, and the command's rate."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from dockair.rotations import Array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Sight:
+    """The drogue in stabilised axes, forward, left, up."""
+
+    place_m: Array  #: (3,) where to bring the probe's tip, from there: ring centre, or the coupling once past it
+    rate_m_s: Array  #: (3,) its rate
+    push_m_s2: Array  #: (3,) what the bow wave does to it now
+    push_then_m_s2: Array  #: (3,) and after the response time
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Wanted:
+    """Where to be: at a distance, or closing."""
+
+    distance_m: float | None  #: behind `Sight.place_m`; None: close
+    speed_m_s: float  #: closing, or the most to go to the distance with
+    aim_m: Array  #: (2,) off the place, left and up
+
+
+class Controller(Protocol):
+    """Follows the drogue."""
+
+    def observe(self, sight: Sight | None) -> None:
+        """Take note of the drogue, once a control tick; None when it is not seen."""
+        ...
+
+    def given(self, velocity_m_s: Array) -> None:
+        """Take note of the velocity (3,) commanded for the next period, in stabilised axes."""
+        ...
+
+    @property
+    def drift_m_s(self) -> Array:
+        """(3,) velocity that keeps company with the drogue, its swing apart."""
+        ...
+
+    def error_to_come(self, aim_m: Array) -> Array:
+        """(2,) off the drogue across, when what has been commanded has been flown."""
+        ...
+
+    def rate(self, u: Array, wanted: Wanted) -> Array:
+        """(3,) du/dt of the commanded velocity u (3,) [m/s^2]."""
+        ...
+
+
+def clipped(value: float, limit: float) -> float:
+    """Return the value, or the limit with its sign."""
+    return float(np.clip(value, -limit, limit))

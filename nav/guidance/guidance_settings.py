@@ -1,0 +1,73 @@
+"""Gains, speeds and limits of guidance, and what it is told."""
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+from dockair.nav.guidance.bow_wave_push import BowWavePush
+from dockair.nav.guidance.closing import ClosingSettings
+from dockair.nav.guidance.drogue_motion import SwingSettings
+from dockair.nav.guidance.phases import PhaseLimits
+from dockair.rotations import Array
+
+ControllerName = Literal["predictive", "pid"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PredictiveSettings:
+    """Gains of `predictive`."""
+
+    across_gain_1_s: float = 1.6  # k: poles at a quarter of 1 / tau
+    along_gain_1_s: float = 0.5  # likewise along, where the engine answers later
+    integral_1_s2: float = 0.3  # k_i: a steady error goes within some 5 s, slow beside the swing
+    integral_error_max_m: float = 0.2  # beyond this the receiver is on its way, not off by a wrong idea
+    smoothing_1_s: float = 6.0  # how fast u goes to the u of Eq. (1) where it is not there: 1 / tau
+    swing: SwingSettings = field(default_factory=SwingSettings)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PidSettings:
+    """Gains of `pid`."""
+
+    proportional_1_s: float = 1.0  # k_p: a quarter of 1 / tau
+    integral_1_s2: float = 0.15  # k_i: a steady drift goes within some 7 s, twice the drogue's period
+    derivative: float = 0.3  # k_d: more would fly the noise of the rate
+    smoothing_1_s: float = 4.0  # how fast u goes to the u of Eq. (1)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GuidanceSettings:
+    """Everything that guidance can be told beforehand; axes forward, left, up."""
+
+    controller: ControllerName = "predictive"
+    stand_off_m: float = 4.0  # pre-contact distance, tip to ring centre (procedures: 3-5 m)
+    closure_speed_m_s: float = 1.2  # published practice 1.0-1.5 m/s
+    join_up_speed_m_s: float = 1.5  # assumed: walking pace, as in practice from some tens of metres
+    back_off_speed_m_s: float = 1.0  # breakaway practice 1-2 m/s
+    response_s: tuple[float, float, float] = (0.40, 0.17, 0.14)  # tau: the flight control's delay to a command with its
+    # rate at 0.3 Hz, computing included
+    acceleration_limit_m_s2: tuple[float, float, float] = (0.8, 1.9, 1.9)  # what the flight control flies
+    velocity_limit_m_s: float = 3.5
+    closure_acceleration_m_s2: float = 0.6  # how fast the closure speed is asked for
+    take_in_gain_1_s: float = 0.35  # speed into the refuelling range per metre to go; a third of course_gain: no overshoot
+    course_gain_1_s: float = 1.2  # how fast a course without a view of the drogue is taken up
+    levelling_s: float = 10.0  # of the stabilised axes: long beside the swing, short beside a turn
+    turn_gain_rad_m: float = 1e-3  # k_r: at 180 m/s a drift across goes within 6 s, slow beside the swing
+    turn_learning_s: float = 10.0  # T_r: the turn's error is known when the probe is in the basket and sees no drift
+    predictive: PredictiveSettings = field(default_factory=PredictiveSettings)
+    pid: PidSettings = field(default_factory=PidSettings)
+    closing: ClosingSettings = field(default_factory=ClosingSettings)
+    bow_wave: BowWavePush = field(default_factory=BowWavePush)
+    limits: PhaseLimits = field(default_factory=PhaseLimits)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class RelativeState:
+    """What guidance is told about the drogue, in body axes."""
+
+    usable: bool
+    contact_usable: bool  #: the integrity monitor claims that contact may be flown on it
+    p_PD_B: Array  #: (3,) ring centre from the probe's tip [m]
+    rate_PD_B: Array  #: (3,) d/dt of p_PD_B [m/s]
+    p_PK_B: Array  #: (3,) coupling from the probe's tip [m]
+    w_WB_B: Array  #: (3,) the body's angular velocity [rad/s]
+    sigma_lateral_m: float  #: standard deviation of p_PD_B across the probe's line

@@ -1,0 +1,62 @@
+"""Follows the drogue by a plain PID: the baseline that shows what prediction is worth.
+
+With e the place of the drogue less what is wanted, axis by axis,
+
+    u* = k_p e + k_i integral of e + k_d e',     du/dt = s (u* - u)                                       (1)
+
+and while closing at c, along, u* = k_i integral of e + c + k_d (e' + c). The integral is held while the drogue is not
+seen and, along, while closing.
+
+Not modelled: the response time, the swing, the bow wave. Nothing limits the integral but what feeds it.
+"""
+
+import numpy as np
+
+from dockair.nav.guidance.controller import Sight, Wanted, clipped
+from dockair.nav.guidance.guidance_settings import PidSettings
+from dockair.rotations import Array
+
+
+class Pid:
+    """Eq. (1); see `controller.Controller`."""
+
+    def __init__(self, settings: PidSettings, step_s: float) -> None:
+        self._settings, self._step_s = settings, step_s
+        self._integral: Array = np.zeros(3)  # k_i times it [m/s]
+        self._place: Array = np.zeros(3)
+        self._rate: Array = np.zeros(3)
+        self._seen = False
+
+    def observe(self, sight: Sight | None) -> None:
+        """Take note of the drogue, once a control tick; None when it is not seen."""
+        self._seen = sight is not None
+        if sight is not None:
+            self._place, self._rate = sight.place_m, sight.rate_m_s
+
+    def given(self, velocity_m_s: Array) -> None:
+        """Nothing: it does not look at what it has commanded."""
+
+    @property
+    def drift_m_s(self) -> Array:
+        """(3,) velocity that keeps company with the drogue, its swing apart: what the integrals hold."""
+        return self._integral.copy()
+
+    def error_to_come(self, aim_m: Array) -> Array:
+        """(2,) off the drogue across, now: it has no better idea."""
+        return np.asarray(self._place[1:] + aim_m)
+
+    def rate(self, u: Array, wanted: Wanted) -> Array:
+        """(3,) du/dt of Eq. (1)."""
+        s = self._settings
+        error, error_rate = self._place.copy(), self._rate.copy()
+        error[1:] += wanted.aim_m
+        if wanted.distance_m is None:
+            error[0], speed = 0.0, wanted.speed_m_s
+            error_rate[0] += speed
+        else:
+            error[0], speed = clipped(error[0] - wanted.distance_m, wanted.speed_m_s / s.proportional_1_s), 0.0
+        if self._seen:
+            self._integral = self._integral + s.integral_1_s2 * error * self._step_s
+        target = s.proportional_1_s * error + self._integral + s.derivative * error_rate
+        target[0] += speed
+        return np.asarray(s.smoothing_1_s * (target - u))

@@ -1,0 +1,174 @@
+"""A camera in a process of its own: it works on a frame while the world goes on until the frame could arrive.
+
+The world's state at the exposure and the frame's pixels go through shared memory, a slot for each frame under way;
+orders and answers through a pipe. The process is a fork of the flight, so it has the camera as it was built, and it
+ends with the flight: an order of None, or the pipe's end, ends it. What the camera refuses is raised in the flight,
+when the frame is asked for.
+
+Not for a camera that draws with OpenGL (a context does not survive a fork), nor for systems without fork, nor inside a
+process that may have no children: see `can_overlap`.
+"""
+
+import mmap
+import multiprocessing
+import os
+import signal
+import sys
+from collections import deque
+from contextlib import suppress
+from multiprocessing.connection import Connection
+from typing import Any, NamedTuple, TypeGuard
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from dockair.errors import MachineError
+from dockair.messages import CameraFrame, Window
+from dockair.sim.camera.camera import NearInfraredCamera
+from dockair.sim.camera.scene_state import SceneState, size_of
+
+_SLOTS = 4  # frames under way: two at 50 Hz and 10 ms; more when the transfer takes long
+_GOODBYE_S = 5.0  # for a process to end by itself; it has at most _SLOTS frames to finish
+
+
+class _Begun(NamedTuple):
+    """A frame that is being made."""
+
+    slot: int
+    time_s: float
+    jitter_s: float
+    least_s: float  #: it cannot arrive before
+
+
+class _Slot:
+    """Memory that both processes see."""
+
+    def __init__(self, model: mujoco.MjModel, most_pixels: int) -> None:
+        numbers = size_of(model)
+        memory = mmap.mmap(-1, 8 * numbers + most_pixels)
+        self.scene = SceneState(model, np.frombuffer(memory, dtype=np.float64, count=numbers))
+        self.pixels: NDArray[np.uint8] = np.frombuffer(memory, dtype=np.uint8, offset=8 * numbers, count=most_pixels)
+
+
+class OverlappedExposures:
+    """Stands where `ExposuresInTurn` stands, and gives the same frames.
+
+    Args:
+        camera: that this process no longer exposes itself.
+        model: the world's.
+    """
+
+    def __init__(self, camera: NearInfraredCamera, model: mujoco.MjModel) -> None:
+        self._camera = camera
+        rows, columns = camera.full_window.shape
+        self._slots = [_Slot(model, rows * columns) for _ in range(_SLOTS)]
+        self._begun: deque[_Begun] = deque()
+        self._in_transfer: deque[tuple[float, CameraFrame]] = deque()
+        self._next_slot = 0
+        fork = multiprocessing.get_context("fork")
+        self._pipe, theirs = fork.Pipe()
+        self._process: Any = fork.Process(
+            target=_serve, args=(camera, self._slots, theirs, self._pipe), name="camera", daemon=True
+        )
+        self._process.start()
+        theirs.close()
+
+    def begin(self, data: mujoco.MjData, time_s: float, number: int, window: Window | None) -> None:
+        """See `exposures.Exposures`."""
+        if len(self._begun) == _SLOTS:
+            self._collect()
+        slot, self._next_slot = self._next_slot, (self._next_slot + 1) % _SLOTS
+        self._slots[slot].scene.take(data)
+        jitter_s = self._camera.transfer_jitter_s()
+        least_s = time_s + (self._camera.least_latency_s(window) + jitter_s)
+        self._begun.append(_Begun(slot, time_s, jitter_s, least_s))
+        self._send((slot, time_s, number, window))
+
+    def delivered(self, time_s: float) -> CameraFrame | None:
+        """See `exposures.Exposures`."""
+        while any(begun.least_s <= time_s for begun in self._begun):
+            self._collect()
+        if self._in_transfer and self._in_transfer[0][0] <= time_s:
+            return self._in_transfer.popleft()[1]
+        return None
+
+    def close(self) -> None:
+        """See `exposures.Exposures`."""
+        if self._process is None:
+            return
+        with suppress(OSError):
+            self._pipe.send(None)
+        self._pipe.close()
+        self._process.join(_GOODBYE_S)
+        if self._process.is_alive():
+            self._process.kill()
+            self._process.join()
+        self._process = None
+
+    def _collect(self) -> None:
+        """Wait for the oldest frame that is being made."""
+        begun = self._begun.popleft()
+        try:
+            answer = self._pipe.recv()
+        except (EOFError, OSError) as error:
+            raise self._lost() from error
+        if isinstance(answer, BaseException):
+            raise answer
+        if answer is not None:
+            frame = _frame_of(answer, self._slots[begun.slot].pixels)
+            self._in_transfer.append((begun.time_s + self._camera.latency_s(frame, begun.jitter_s), frame))
+
+    def _send(self, order: Any) -> None:
+        try:
+            self._pipe.send(order)
+        except OSError as error:
+            raise self._lost() from error
+
+    def _lost(self) -> MachineError:
+        self._process.join(_GOODBYE_S)
+        status = self._process.exitcode
+        expected = f"the camera's process to live as long as the flight, not to end with status {status}"
+        return MachineError("camera", expected=expected, remedy="is there memory enough? see `dockair doctor`")
+
+
+def can_overlap(camera: object) -> TypeGuard[NearInfraredCamera]:
+    """Say whether a camera can be exposed in a process beside this one, and a core is there for it."""
+    return (
+        isinstance(camera, NearInfraredCamera)
+        and camera.background == "analytic"
+        and sys.platform.startswith("linux")
+        and len(os.sched_getaffinity(0)) > 1
+        and not multiprocessing.current_process().daemon
+    )
+
+
+def _serve(camera: NearInfraredCamera, slots: list[_Slot], pipe: Connection, flights_end: Connection) -> None:
+    """Expose as ordered until there are no more orders."""
+    flights_end.close()  # or the pipe would never end with the flight
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # a keyboard's interrupt goes to both; the flight says when to end
+    with suppress(EOFError, OSError):
+        while (order := pipe.recv()) is not None:
+            slot, time_s, number, window = order
+            try:
+                answer: Any = _exposed(camera, slots[slot], time_s, number, window)
+            except Exception as error:  # the flight's to handle, whatever it is
+                answer = error
+            pipe.send(answer)
+
+
+def _exposed(camera: NearInfraredCamera, slot: _Slot, time_s: float, number: int, window: Window | None) -> Any:
+    """Make a frame; leave its pixels in the slot and return the rest, or None for a frame that dropped out."""
+    frame = camera.expose(slot.scene, time_s, number, window)
+    if frame is None:
+        return None
+    slot.pixels[: frame.pixels.size] = frame.pixels.ravel()
+    return frame.time_stamp_s, frame.window, frame.exposure_s, frame.gain
+
+
+def _frame_of(answer: tuple[float, Window, float, float], memory: NDArray[np.uint8]) -> CameraFrame:
+    time_stamp_s, window, exposure_s, gain = answer
+    rows, columns = window.shape
+    pixels = memory[: rows * columns].reshape(rows, columns).copy()
+    pixels.setflags(write=False)
+    return CameraFrame(time_stamp_s=time_stamp_s, pixels=pixels, window=window, exposure_s=exposure_s, gain=gain)

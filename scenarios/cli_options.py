@@ -1,0 +1,37 @@
+"""What the commands of the command line have in common: options, and how one JSON object is printed."""
+
+import json
+from typing import Annotated, Any
+
+import typer
+
+from dockair.errors import DockairError
+
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout and nothing else.")]
+ScenarioName = Annotated[str, typer.Argument(metavar="SCENARIO", help="A name in the library or a TOML path.")]
+Settings = Annotated[
+    list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Dotted key and TOML value; may be repeated.")
+]
+Seed = Annotated[
+    int | None, typer.Option(min=0, max=2**63 - 1, help="Seed of every random stream; the scenario's by default.")
+]
+
+
+def overrides(settings: list[str] | None) -> dict[str, str]:
+    """Return dotted key -> TOML value of `--set`.
+
+    Raises:
+        DockairError: a setting without key or equals sign.
+    """
+    found = {}
+    for setting in settings or ():
+        key, equals, value = setting.partition("=")
+        if not equals or not key.strip():
+            raise DockairError("--set", expected="key=value, as in turbulence.sigma_m_s=1.1", got=setting)
+        found[key.strip()] = value.strip()
+    return found
+
+
+def print_json(table: Any) -> None:
+    """Print one object, and no NaN: JSON has none."""
+    typer.echo(json.dumps(table, allow_nan=False))

@@ -1,0 +1,38 @@
+"""The time between contact and release: how long, how far in, how hard."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from dockair.sim.truth import Truth
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Hold:
+    """The time between contact and release."""
+
+    duration_s: float
+    take_in_max_m: float  #: most hose that was wound in
+    coupling_force_max_n: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Disconnect:
+    """How the probe left the coupling."""
+
+    time_s: float
+
+
+def hold_of(truths: Sequence[Truth]) -> tuple[Hold | None, Disconnect | None]:
+    """Return what happened while the probe was held, and how it came free (None: it did not)."""
+    held = [k for k, truth in enumerate(truths) if truth.latched]
+    if not held:
+        return None, None
+    first, last = held[0], held[-1]
+    during = truths[first : last + 1]
+    hold = Hold(
+        duration_s=truths[last].time_s - truths[first].time_s,
+        take_in_max_m=max(truth.reel_position_m for truth in during),
+        coupling_force_max_n=max(truth.coupling_force_n for truth in during),
+    )
+    released = truths[last + 1] if last + 1 < len(truths) else None
+    return hold, Disconnect(time_s=released.time_s) if released is not None else None

@@ -1,0 +1,33 @@
+"""What `dockair scenarios` shows to people: the library with its claims and what each is held to, or one scenario."""
+
+from collections.abc import Sequence
+
+from rich.console import Console
+from rich.table import Table
+
+from dockair.scenarios.scenario_file import scenario_text
+from dockair.scenarios.schema import Scenario
+
+
+def show_scenarios(scenarios: Sequence[Scenario]) -> None:
+    """Print the library."""
+    table = Table(box=None, padding=(0, 1))
+    table.add_column("scenario", no_wrap=True)
+    for heading in ("claim", "held to"):
+        table.add_column(heading)
+    for scenario in scenarios:
+        table.add_row(scenario.name, scenario.claim, scenario.accept.in_words)
+    Console(highlight=False).print(table)
+
+
+def show_scenario(name: str, scenario: Scenario) -> None:
+    """Print one scenario as its file has it, and what it is held to.
+
+    Args:
+        name: in the library, or the path of its file.
+        scenario: the same, read.
+    """
+    console = Console(highlight=False)
+    console.print(scenario_text(name).rstrip(), markup=False, soft_wrap=True)
+    if scenario.accept.claims_figures:
+        console.print(f"\nheld to: {scenario.accept.in_words}", markup=False, soft_wrap=True)

@@ -1,0 +1,117 @@
+"""What a campaign is held to: counts against rates, and what is told of those that fall short."""
+
+import pytest
+
+from dockair.errors import DockairError
+from dockair.scenarios.accept import Accept, is_clean
+
+
+def row(seed=0, **changes):
+    values = {
+        "seed": seed, "error": "", "unsafe": "", "success": True, "first_attempt": True, "outcome": "contact",
+        "radial_offset_m": 0.04, "closure_speed_m_s": 1.2, "sensing": "camera",
+    }  # fmt: skip
+    return values | changes
+
+
+MISSED = {"outcome": "miss", "success": False, "first_attempt": False, "radial_offset_m": 0.4}
+CRASHED = {"error": "ValueError: 3", "outcome": "", "success": None, "first_attempt": None, "unsafe": "", "sensing": ""}
+
+
+def rows(good, bad, what):
+    return [row(seed) for seed in range(good)] + [row(good + k, **what) for k in range(bad)]
+
+
+def test_a_rate_is_reached_at_exactly_its_part_and_missed_by_one_flight_less():
+    accept = Accept(first_attempt_rate_min=0.95)
+    assert accept.judge(rows(19, 1, MISSED)) == []
+    assert accept.judge(rows(18, 2, MISSED)) == ["contacts at the first attempt 18 of 20, wanted at least 95 %"]
+
+
+def test_a_contact_in_a_later_attempt_counts_for_the_one_rate_and_not_for_the_other():
+    later = rows(1, 1, {"first_attempt": False})
+    accept = Accept(first_attempt_rate_min=1.0, success_rate_min=1.0)
+    assert accept.judge(later) == ["contacts at the first attempt 1 of 2, wanted at least 100 %"]
+
+
+def test_a_flight_that_crashed_counts_as_flown_without_success():
+    accept = Accept(success_rate_min=0.9, clean_rate_min=0.9)
+    assert accept.judge(rows(9, 1, CRASHED)) == []
+    assert accept.judge(rows(8, 2, CRASHED)) == [
+        "contacts in any attempt 8 of 10, wanted at least 90 %",
+        "contacts or clean departures 8 of 10, wanted at least 90 %",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("change", "clean"),
+    [
+        ({}, True),
+        (MISSED, True),
+        (MISSED | {"outcome": "abort"}, True),
+        (MISSED | {"outcome": "rim_strike"}, False),
+        (MISSED | {"outcome": "timeout"}, False),
+        (MISSED | {"outcome": "collision", "unsafe": "collision with hose_3"}, False),
+        ({"success": False, "radial_offset_m": 0.2}, False),  # held, but from outside the limits
+        ({"unsafe": "touch at 2.70 m/s"}, False),
+        (CRASHED, False),
+    ],
+)
+def test_a_flight_is_clean_that_made_a_good_contact_or_went_away_without_touching_anything(change, clean):
+    assert is_clean(row(**change)) is clean
+
+
+def test_the_median_is_over_the_contacts_alone():
+    flights = [row(k, radial_offset_m=offset) for k, offset in enumerate([0.03, 0.05, 0.09])] + rows(0, 3, MISSED)
+    assert Accept(radial_offset_median_max_m=0.05).judge(flights) == []
+    assert Accept(radial_offset_median_max_m=0.049).judge(flights) == [
+        "median radial offset 0.050 m, wanted at most 0.049"
+    ]
+
+
+def test_the_part_of_contacts_at_the_right_speed_counts_contacts_alone():
+    flights = rows(19, 1, {"closure_speed_m_s": 1.6}) + rows(0, 5, MISSED)
+    speeds = {"closure_speed_min_m_s": 1.0, "closure_speed_max_m_s": 1.5}
+    assert Accept(closure_rate_min=0.95, **speeds).judge(flights) == []
+    assert Accept(closure_rate_min=0.96, **speeds).judge(flights) == [
+        "contacts at 1 to 1.5 m/s 19 of 20, wanted at least 96 %"
+    ]
+
+
+def test_where_no_rate_is_asked_for_every_flight_must_show_what_one_must():
+    accept = Accept(outcome="contact", radial_offset_max_m=0.15)
+    assert accept.judge(rows(5, 0, {})) == []
+    assert accept.judge(rows(5, 2, MISSED)) == ["2 of 7 flights fall short: seeds 5, 6"]
+    assert accept.judge(rows(0, 7, {"radial_offset_m": 0.16})) == [
+        "7 of 7 flights fall short: seeds 0, 1, 2, 3, 4, ..."
+    ]
+
+
+def test_one_unsafe_flight_is_too_many_unless_the_scenario_grants_it_whatever_else_is_asked_for():
+    flights = rows(99, 1, {"unsafe": "touch outside the rim, 0.27 m off the axis"})
+    assert Accept().judge(flights) == ["unsafe in 1 of 100 flights, wanted at most 0: seeds 99"]
+    assert Accept(unsafe_max=1).judge(flights) == []
+
+
+def test_flights_of_different_sensing_are_not_pooled_and_none_are_no_campaign():
+    with pytest.raises(DockairError, match=r"one kind of sensing, got \['camera', 'truth'\]"):
+        Accept().judge([row(), row(1, sensing="truth")])
+    with pytest.raises(DockairError, match="at least one flight"):
+        Accept().judge([])
+
+
+def test_the_acceptance_in_words_names_every_figure_asked_for():
+    accept = Accept(
+        outcome="contact", first_attempt_rate_min=0.7, success_rate_min=0.95, closure_rate_min=0.9, clean_rate_min=1.0,
+        radial_offset_max_m=0.15, radial_offset_median_max_m=0.08, closure_speed_min_m_s=1.0,
+        closure_speed_max_m_s=1.5, unsafe_max=2,
+    )  # fmt: skip
+    assert accept.in_words == (
+        "contact, 70 % at the first attempt, 95 % within all, 100 % contact or clean departure, within 0.15 m, "
+        "median offset 0.08 m, 90 % at 1 to 1.5 m/s, unsafe in at most 2"
+    )
+    assert Accept().in_words == ""
+
+
+def test_what_was_unsafe_in_one_flight_is_a_shortfall_of_any_scenario():
+    assert Accept().shortfalls("contact", 0.1, 1.2, ("touch at 2.70 m/s",)) == ["unsafe: touch at 2.70 m/s"]

@@ -1,0 +1,182 @@
+"""A camera in a process of its own gives the frames of one that the world waits for, bit by bit and when they are due."""
+
+import os
+import signal
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from dockair.errors import DockairError, MachineError
+from dockair.messages import Window
+from dockair.scenarios import camera_process
+from dockair.scenarios.build import build
+from dockair.scenarios.camera_process import OverlappedExposures, can_overlap
+from dockair.scenarios.exposures import ExposuresInTurn
+from dockair.scenarios.loop import Flight, fly
+from dockair.scenarios.schema import load_scenario
+from dockair.sim.camera.scene_state import SceneState
+
+PERIOD_S, TICK_S = 0.02, 0.005
+SMALL, OTHER = Window(400, 440, 900, 980), Window(300, 420, 700, 760)
+SETTINGS = {"turbulence.model": "none", "flight.duration_s": 10.0}
+FAULTS = [
+    {"kind": "camera_drop_out", "start_s": 0.05, "stop_s": 0.09},
+    {"kind": "stuck_frame", "start_s": 0.15, "stop_s": 0.2},
+]
+
+
+def scenario(**settings):
+    return load_scenario("still_air", SETTINGS | settings)
+
+
+@pytest.fixture(scope="module")
+def parts():
+    return build(scenario(), 5)
+
+
+def fork_is_wanted(camera):
+    if not can_overlap(camera):
+        pytest.skip("one core, or no fork")
+
+
+def frames_of(exposures, data, seconds=0.3):
+    """Every frame, with the time at which it was delivered."""
+    delivered = []
+    try:
+        for tick in range(round(seconds / TICK_S)):
+            time_s = tick * TICK_S
+            if tick % round(PERIOD_S / TICK_S) == 0:
+                number = round(time_s / PERIOD_S)
+                exposures.begin(data, time_s, number, (SMALL, OTHER)[number % 2])
+            frame = exposures.delivered(time_s)
+            if frame is not None:
+                delivered.append((time_s, frame))
+    finally:
+        exposures.close()
+    return delivered
+
+
+def test_frames_and_their_arrivals_are_those_of_a_camera_that_is_waited_for():
+    for faults in ([], FAULTS):
+        first, second = (build(scenario(faults=faults), 5) for _ in range(2))
+        fork_is_wanted(second.camera)
+        waited = frames_of(ExposuresInTurn(first.camera), first.world.data)
+        beside = frames_of(OverlappedExposures(second.camera, second.world.model), second.world.data)
+        assert len(waited) == (13 if faults else 15)
+        assert [time_s for time_s, _ in beside] == [time_s for time_s, _ in waited]
+        for (_, ours), (_, theirs) in zip(beside, waited, strict=True):
+            assert ours.pixels.tobytes() == theirs.pixels.tobytes()
+            for field in ("time_stamp_s", "window", "exposure_s", "gain"):
+                assert getattr(ours, field) == getattr(theirs, field)
+
+
+def test_what_the_world_does_after_an_exposure_changes_no_pixel(parts):
+    fork_is_wanted(parts.camera)
+    still = frames_of(OverlappedExposures(parts.camera, parts.world.model), parts.world.data, 0.02)
+    again = build(scenario(), 5)
+    exposures = OverlappedExposures(again.camera, again.world.model)
+    exposures.begin(again.world.data, 0.0, 0, SMALL)
+    again.world.data.geom_xpos[:] = again.world.data.xpos[:] = 0.0
+    frame = exposures.delivered(1.0)
+    exposures.close()
+    assert frame.pixels.tobytes() == still[0][1].pixels.tobytes()
+
+
+def test_more_frames_under_way_than_there_are_slots_are_none_the_worse(parts):
+    fork_is_wanted(parts.camera)
+    exposures = OverlappedExposures(parts.camera, parts.world.model)
+    count = 2 * camera_process._SLOTS + 1
+    for number in range(count):
+        exposures.begin(parts.world.data, PERIOD_S * number, number, SMALL)
+    stamps = [exposures.delivered(10.0).time_stamp_s for _ in range(count)]
+    assert stamps == pytest.approx([PERIOD_S * number for number in range(count)])
+    assert exposures.delivered(10.0) is None
+    exposures.close()
+
+
+def test_pixels_are_the_frames_own_and_cannot_be_written(parts):
+    fork_is_wanted(parts.camera)
+    exposures = OverlappedExposures(parts.camera, parts.world.model)
+    exposures.begin(parts.world.data, 0.0, 0, SMALL)
+    first = exposures.delivered(1.0).pixels
+    kept = first.copy()
+    for number in range(1, 2 * camera_process._SLOTS):
+        exposures.begin(parts.world.data, PERIOD_S * number, number, SMALL)
+        exposures.delivered(10.0)
+    exposures.close()
+    assert np.array_equal(first, kept) and not first.flags.writeable
+
+
+def test_a_window_outside_the_sensor_is_refused_where_the_frame_is_asked_for(parts):
+    fork_is_wanted(parts.camera)
+    exposures = OverlappedExposures(parts.camera, parts.world.model)
+    exposures.begin(parts.world.data, 0.0, 0, Window(0, 2000, 0, 10))
+    with pytest.raises(DockairError, match=r"camera\.window: expected a window inside"):
+        exposures.delivered(1.0)
+    exposures.begin(parts.world.data, 0.02, 1, SMALL)  # and the process lives on
+    assert exposures.delivered(1.0).window == SMALL
+    exposures.close()
+
+
+def test_a_process_that_was_killed_ends_the_flight_with_an_error_that_says_so(parts):
+    fork_is_wanted(parts.camera)
+    exposures = OverlappedExposures(parts.camera, parts.world.model)
+    os.kill(exposures._process.pid, signal.SIGKILL)
+    exposures._process.join()
+    with pytest.raises(
+        MachineError, match="camera: expected the camera's process to live .* not to end with status -9"
+    ):
+        exposures.begin(parts.world.data, 0.0, 0, SMALL)
+        exposures.delivered(1.0)
+    exposures.close()
+
+
+def test_no_process_is_left_behind():
+    flight = Flight(scenario(), 5, overlap=True)
+    fork_is_wanted(flight.camera)
+    process = flight._exposures._process
+    flight.step()
+    assert process.is_alive()
+    flight.close()
+    flight.close()
+    assert process.exitcode == 0
+    with pytest.raises(ChildProcessError):
+        os.waitpid(process.pid, 0)
+
+
+def test_only_a_camera_without_opengl_is_let_beside_the_flight(parts, monkeypatch):
+    assert not can_overlap(None)
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0, 1})
+    assert can_overlap(parts.camera) == os.sys.platform.startswith("linux")
+    monkeypatch.setattr(type(parts.camera), "background", "mujoco")
+    assert not can_overlap(parts.camera)
+    monkeypatch.setattr(type(parts.camera), "background", "analytic")
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0})
+    assert not can_overlap(parts.camera)
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0, 1})
+    monkeypatch.setattr(camera_process.multiprocessing, "current_process", lambda: SimpleNamespace(daemon=True))
+    assert not can_overlap(parts.camera)
+
+
+def test_a_state_of_the_scene_is_a_copy_of_what_the_camera_reads(parts):
+    data, state = parts.world.data, SceneState(parts.world.model)
+    state.take(data)
+    for name in ("xpos", "xmat", "geom_xpos", "geom_xmat", "cvel", "subtree_com"):
+        mine, its = getattr(state, name), getattr(data, name)
+        assert np.array_equal(mine, its) and not np.shares_memory(mine, its)
+        assert mine.dtype == its.dtype and mine.flags.c_contiguous
+    assert state.time == data.time
+
+
+@pytest.mark.slow
+def test_a_flight_is_the_same_flight_with_the_camera_beside_it(tmp_path):
+    results = []
+    for overlap in (False, True):
+        short = load_scenario("default", {"flight.duration_s": 1.0})
+        result = fly(short, 3, tmp_path / str(overlap), record="none", overlap=overlap)
+        results.append({k: v for k, v in result.to_dict().items() if k not in ("wall_time_s", "real_time_factor")})
+        results[-1].pop("files", None)
+    first, second = (repr(result).replace(str(tmp_path / str(overlap)), "") for overlap, result in
+                     zip((False, True), results, strict=True))  # fmt: skip
+    assert first == second

@@ -1,0 +1,218 @@
+"""Why an attempt failed, on histories of which each is wrong in one thing alone."""
+
+import numpy as np
+import pytest
+
+from dockair.messages import NavSolution, ReceiverCommand
+from dockair.rotations import exp
+from dockair.scenarios.attempts import Attempt
+from dockair.scenarios.causes import CAUSES, CauseRules, Flown, cause_of_flight, flown_of, unforeseen_motion, with_cause
+from dockair.scenarios.schema import load_scenario
+from dockair.sim.faults import CameraDropOut, DeadReel, LedOff
+
+TIMES = np.round(np.arange(0.0, 5.0, 0.01), 2)
+END_S = 4.0  # when the attempt is decided
+NOSE = np.array([-1.2, 0.9, -0.65])  # to the left of the probe and below
+
+
+def attempt(**changes):
+    values = dict(
+        number=1, begun_s=1.0, ended_s=END_S, outcome="miss", radial_offset_m=0.3, closure_speed_m_s=1.2,
+        angle_deg=2.0, left_m=0.0, up_m=0.3, decided_s=END_S,
+    )  # fmt: skip
+    return Attempt(**(values | changes))
+
+
+@pytest.fixture
+def flight(make_truth):
+    """Make a flight of 5 s: a level receiver closes on a drogue; all are functions of time.
+
+    Args of the function: the drogue across (y, z) [m], its rate; the tip's place across; error of the belief across;
+    wind at the drogue across; valid, usable; turn of the believed attitude, of the true one.
+    """
+
+    def make(
+        drogue=lambda t: (0.0, 0.0), rate=lambda t: (0.0, 0.0), tip=lambda t: (0.0, 0.0), error=lambda t: (0.0, 0.0),
+        wind=lambda t: (0.0, 0.0), valid=lambda t: True, usable=lambda t: True, turn=(0.0, 0.0, 0.0),
+        attitude=(0.0, 0.0, 0.0), faults=(),
+    ):  # fmt: skip
+        truths, solutions = [], []
+        R_BD = exp(np.array(attitude))
+        for t in TIMES:
+            truth = make_truth(
+                t, R_WD=R_BD, p_WD=np.array([0.0, *drogue(t)]), v_WD=np.array([0.0, *rate(t)]),
+                p_WP=np.array([1.2 * (t - END_S), *tip(t)]), gust_D_m_s=np.array([0.0, *wind(t)]),
+            )  # fmt: skip
+            believed = truth.p_PD_B + np.array([0.0, *error(t)])
+            truths.append(truth)
+            solutions.append(solution(t, believed, exp(np.array(turn)) @ R_BD, valid(t), usable(t)))
+        return Flown(truths=truths, solutions=solutions, p_PN_B=NOSE, faults=faults)
+
+    return make
+
+
+def solution(t, p_PD_B, R_BD, valid=True, usable=True):
+    return NavSolution(
+        time_stamp_s=t, valid=valid, phase="approach", status="", p_PD_B=p_PD_B, v_PD_B=np.zeros(3), R_BD=R_BD,
+        covariance=np.eye(9), command=ReceiverCommand(), window=None, frame_time_stamp_s=t,
+        candidates_px=np.zeros((0, 2)), led_pixels_px=np.zeros((8, 2)), contact_usable=usable,
+    )  # fmt: skip
+
+
+def cause(flown, **changes):
+    return with_cause(attempt(**changes), flown).cause
+
+
+def kick(t):
+    """0.3 m upward within the last 0.2 s, from rest: nobody could have known."""
+    return (0.0, 0.3 * max(t - END_S + 0.2, 0.0) / 0.2)
+
+
+BEHIND = dict(tip=lambda t: (0.0, -0.3))  # a tip that stays where the drogue, at rest, is not
+MISLED = dict(tip=lambda t: (0.0, -0.3), error=lambda t: (0.0, -0.3))  # believed to be on the line
+
+
+def test_a_good_contact_has_no_cause_and_one_outside_the_limits_has_that_of_a_miss(flight):
+    assert cause(flight(**BEHIND), outcome="contact", radial_offset_m=0.1) == ""
+    assert cause(flight(**BEHIND), outcome="contact", radial_offset_m=0.2) == "control_limit"
+    assert cause(flight(**MISLED), outcome="contact", radial_offset_m=0.2) == "navigation_error"
+    assert cause(flight(), outcome="contact", radial_offset_m=0.0, closure_speed_m_s=2.7) == "outside_limits"
+    assert cause(flight(), outcome="contact", radial_offset_m=0.0, angle_deg=11.0) == "outside_limits"
+
+
+def test_a_drogue_that_jumps_aside_within_the_response_time_is_a_gusts_doing(flight):
+    assert cause(flight(drogue=kick, rate=lambda t: (0.0, 0.0))) == "gust"
+
+
+def test_a_drogue_that_goes_on_as_it_moved_is_no_gust_but_the_receivers_own_lag(flight):
+    """Constant velocity and acceleration are foreseen: 0.3 m in the last 0.3 s, at 0.7 m/s and 2 m/s^2."""
+    fall = dict(
+        drogue=lambda t: (0.0, 0.7 * (t - END_S) + (t - END_S) ** 2 + 0.3),
+        rate=lambda t: (0.0, 0.7 + 2.0 * (t - END_S)),
+    )
+    np.testing.assert_allclose(unforeseen_motion(400, flight(**fall), CauseRules()), 0.0, atol=0.01)
+    assert cause(flight(**fall)) == "control_limit"
+
+
+def test_unforeseen_motion_is_what_velocity_and_acceleration_of_before_do_not_explain(flight):
+    """A jerk j gives j tau^3/6, and half of difference_s of it in the acceleration j difference_s tau^2/4."""
+    rules, j = CauseRules(response_s=0.4, difference_s=0.02), 6.0
+    s = lambda t: t - (END_S - 0.4)  # noqa: E731
+    jerk = flight(drogue=lambda t: (0.0, j * s(t) ** 3 / 6), rate=lambda t: (0.0, j * s(t) ** 2 / 2))
+    expected = j * 0.4**3 / 6 + j * 0.02 * 0.4**2 / 4
+    np.testing.assert_allclose(unforeseen_motion(400, jerk, rules), [0.0, expected], rtol=1e-9, atol=1e-12)
+
+
+def test_a_receiver_that_is_not_where_the_known_drogue_is_was_at_the_limit_of_its_control(flight):
+    assert cause(flight(**BEHIND)) == "control_limit"
+
+
+def test_a_drogue_that_was_believed_on_the_line_is_an_error_of_the_navigation(flight):
+    assert cause(flight(**MISLED)) == "navigation_error"
+
+
+def test_an_error_away_from_the_miss_does_not_explain_it(flight):
+    """Believed farther off than it was: the navigation's share is negative."""
+    assert cause(flight(tip=lambda t: (0.0, -0.3), error=lambda t: (0.0, 0.3))) == "control_limit"
+
+
+@pytest.mark.parametrize("angle_deg", [45.0, -90.0, 170.0])
+def test_an_error_of_a_numbering_that_is_another_is_an_ambiguity(flight, angle_deg):
+    assert cause(flight(**MISLED, turn=(np.radians(angle_deg), 0.0, 0.0))) == "ambiguity"
+
+
+def test_a_roll_of_less_than_half_an_led_is_no_ambiguity(flight):
+    assert cause(flight(**MISLED, turn=(np.radians(22.0), 0.0, 0.0))) == "navigation_error"
+
+
+def test_an_error_with_the_mirrored_attitude_is_an_ambiguity(flight):
+    """A drogue 6 degrees nose up, seen at the end along the line of the miss, and believed on the other side of it."""
+    tilt = np.radians(6.0)
+    sight = np.array([0.0, 0.0, 1.0])  # from a tip that is below the drogue, at the crossing
+    axis = exp(np.array([0.0, tilt, 0.0]))[:, 0]
+    mirrored = 2.0 * (axis @ sight) * sight - axis
+    assert mirrored @ axis < 0.0  # so seen, the two differ by more than a right angle: the last second decides
+    far = dict(
+        tip=lambda t: (0.0, -0.3 if t > END_S - 0.3 else 0.0), error=lambda t: (0.0, -0.3), attitude=(0, tilt, 0)
+    )
+    assert cause(flight(**far, turn=(0.0, -2.0 * tilt, 0.0))) == "ambiguity"
+    assert cause(flight(**far, turn=(0.0, -0.4 * tilt, 0.0))) == "navigation_error"
+
+
+@pytest.mark.parametrize(("lost_s", "expected"), [(0.49, "control_limit"), (0.51, "detection")])
+def test_half_of_the_last_second_without_a_solution_is_a_failure_to_detect(flight, lost_s, expected):
+    flown = flight(**BEHIND, valid=lambda t: not END_S - 0.6 < t <= END_S - 0.6 + lost_s)
+    assert cause(flown) == expected
+
+
+def test_a_solution_that_is_not_to_be_flown_into_contact_is_a_matter_of_integrity(flight):
+    assert cause(flight(**BEHIND, usable=lambda t: t < 3.2)) == "integrity"
+    assert cause(flight(**BEHIND, usable=lambda t: t < 3.2, valid=lambda t: t < 3.2)) == "detection"
+
+
+def test_a_miss_away_from_the_nose_with_the_air_blowing_that_way_is_the_bow_waves(flight):
+    """The nose stands left of the probe and below: away is to the right and up."""
+    away = -np.array([0.9, -0.65]) / np.hypot(0.9, 0.65)
+    blown = lambda t: 0.2 * np.sin(9.0 * t) + (3.0 if t > END_S - 1.0 else 0.0)  # noqa: E731
+    right = dict(tip=lambda t: tuple(-0.25 * away), wind=lambda t: tuple(blown(t) * away))
+    assert cause(flight(**right)) == "bow_wave"
+    assert cause(flight(tip=lambda t: tuple(0.25 * away), wind=lambda t: tuple(-blown(t) * away))) == "control_limit"
+    gusty = lambda t: 3.0 * np.sign(np.sin(9.0 * t)) + blown(t)  # noqa: E731  # as much as it varied by before
+    assert cause(flight(tip=lambda t: tuple(-0.25 * away), wind=lambda t: tuple(gusty(t) * away))) == "control_limit"
+
+
+def test_a_tip_inside_the_basket_that_was_not_held_and_one_that_was_called_off_on_the_line(flight):
+    inside = flight(tip=lambda t: (0.0, -0.14))
+    assert cause(inside, outcome="rim_strike") == "not_held"
+    assert cause(inside, outcome="given_up") == "called_off"
+    assert cause(flight(tip=lambda t: (0.0, -0.16)), outcome="given_up") == "control_limit"
+
+
+def test_one_called_off_is_judged_where_it_was_called_off_and_not_where_it_had_come_nearest(flight):
+    """The tip was on the line at its nearest, and 0.3 m off half a second later, when the navigation gave up."""
+    late = flight(tip=lambda t: (0.0, -0.3 if t > 4.3 else 0.0))
+    assert cause(late, outcome="given_up", ended_s=4.5) == "control_limit"
+    assert cause(late, outcome="miss", ended_s=4.5) == "not_held"
+
+
+@pytest.mark.parametrize(("outcome", "expected"), [("timeout", "out_of_time"), ("diverged", "diverged")])
+def test_an_attempt_that_was_cut_short_failed_for_that(flight, outcome, expected):
+    assert cause(flight(**BEHIND), outcome=outcome) == expected
+
+
+def test_a_fault_is_named_where_it_can_have_brought_the_cause_about_and_acted_during_the_attempt(flight):
+    blind = dict(**BEHIND, valid=lambda t: t < 3.0)
+    assert cause(flight(**blind, faults=[CameraDropOut(start_s=3.0, stop_s=3.5)])) == "fault"
+    assert cause(flight(**blind, faults=[CameraDropOut(start_s=0.1, stop_s=0.9)])) == "detection"  # over before
+    assert cause(flight(**blind, faults=[CameraDropOut(start_s=4.5)])) == "detection"  # later
+    assert cause(flight(**BEHIND, faults=[LedOff(leds=(0,))])) == "control_limit"  # a dark LED moves no receiver
+    assert cause(flight(drogue=kick, faults=[DeadReel()])) == "fault"
+    assert cause(flight(**MISLED, faults=[DeadReel()])) == "navigation_error"
+
+
+def test_a_flight_has_the_cause_of_its_last_failed_attempt(flight):
+    flown = flight()
+    failed = [attempt(outcome="miss", cause="gust"), attempt(number=2, cause="bow_wave")]
+    held = attempt(number=3, outcome="contact", radial_offset_m=0.05)
+    assert cause_of_flight([*failed, held], flown) == "bow_wave"
+    assert cause_of_flight([held], flown) == ""
+
+
+def test_a_flight_without_an_attempt_was_never_steady_or_saw_nothing(flight):
+    assert cause_of_flight([], flight()) == "never_steady"
+    assert cause_of_flight([], flight(valid=lambda t: t < 3.0)) == "detection"
+    assert cause_of_flight([], flight(valid=lambda t: t > 3.0)) == "never_steady"  # it came to see in time
+    assert cause_of_flight([], flight(faults=[LedOff()])) == "fault"
+
+
+def test_every_cause_is_in_the_modules_table_and_every_one_there_is_known():
+    import dockair.scenarios.causes as causes
+
+    rows = [line.split("|")[1].strip() for line in causes.__doc__.splitlines() if line.startswith("| ")]
+    assert {row for row in rows if row and row != "cause"} | {"never_steady"} == set(CAUSES)
+
+
+def test_the_nose_stands_in_the_plane_of_symmetry_ahead_of_the_centre_of_gravity(hand_made):
+    """Probe's tip at (6.8, 0.4, 1.0) from the centre of gravity; the nose 1.2 m behind it, 0.05 m below that centre."""
+    flown = flown_of(load_scenario("default"), hand_made.sheets.mounting, [], [])
+    np.testing.assert_allclose(hand_made.sheets.mounting.p_BP + flown.p_PN_B, [5.6, 0.0, -0.05], atol=1e-12)

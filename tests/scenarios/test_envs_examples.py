@@ -1,0 +1,62 @@
+"""The examples run, and do what they say."""
+
+import importlib
+import re
+from pathlib import Path
+
+import pytest
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
+
+
+@pytest.fixture
+def example(monkeypatch):
+    monkeypatch.syspath_prepend(str(EXAMPLES))
+    return importlib.import_module
+
+
+@pytest.fixture
+def short(tmp_path):
+    """A scenario of two seconds."""
+    path = tmp_path / "short.toml"
+    path.write_text('name = "short"\n[flight]\nduration_s = 2.0\n', encoding="utf-8")
+    return str(path)
+
+
+def test_the_scripted_policy_flies_its_episodes_one_after_the_other(example, short, capsys):
+    example("scripted_policy").main("2", short)
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.partition(",")[0] for line in lines[:2]] == [f"seed {k}: timeout after 2.0 s" for k in range(2)]
+    assert lines[2] == "contact in 0 of 2"
+
+
+def test_the_scripted_policy_is_the_flight_of_the_same_seed(example):
+    """The command that stands in the observation, held for one tick, is what the loop would have flown."""
+    import gymnasium
+
+    from dockair.scenarios.loop import Flight
+    from dockair.scenarios.schema import load_scenario
+
+    env = gymnasium.make("dockair/DockFast-v0", until_clear=True)
+    observation, info = env.reset(seed=5)
+    flight = Flight(load_scenario("default", {"camera.sensing": "measurements"}), 5)
+    flight.step()
+    for _ in range(50):
+        observation, *_, info = env.step(example("scripted_policy").policy(observation))
+        tick = flight.step()
+    env.close()
+    flight.close()
+    assert info["truth"]["p_PD_B_x_m"] == pytest.approx(tick.truth.p_PD_B[0], abs=1e-6)  # actions are 32-bit
+
+
+def test_the_controller_of_ones_own_docks(example, capsys):
+    example("own_controller").main("still_air", "1", "dockair/DockFast-v0")
+    assert capsys.readouterr().out.startswith("contact after")
+
+
+def test_the_navigator_of_ones_own_docks_and_is_judged_by_the_truth(example, capsys):
+    example("own_navigator").main("still_air", "1")
+    outcome, figures = capsys.readouterr().out.splitlines()
+    assert outcome.startswith("contact after")
+    assert float(re.search(r"([\d.]+) m off", figures)[1]) < 0.15

@@ -1,0 +1,67 @@
+"""Attempts judged from the truth: each way an attempt can end is told from the others."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from dockair.scenarios.envs_judge import AttemptJudge
+from dockair.scenarios.referee import Outcome
+
+
+def _watch(judge: AttemptJudge, *xs: float, touches: bool = False, latched: bool = False):
+    for x in xs:
+        truth = SimpleNamespace(p_DP=(x, 0.0, 0.0), probe_touches_drogue=touches, latched=latched)
+        failed, outcome = judge.watch(truth)
+    return failed, outcome
+
+
+def test_a_tip_that_stays_behind_the_ring_tries_nothing():
+    assert _watch(AttemptJudge(1), -4.0, -0.1, -3.0, -0.01, -2.0) == (False, None)
+
+
+def test_a_tip_that_crosses_and_goes_back_has_missed_half_a_metre_behind():
+    judge = AttemptJudge(1)
+    assert _watch(judge, -0.1, 0.2, -0.49) == (False, None)
+    assert _watch(judge, -0.51) == (True, Outcome.MISS)
+
+
+def test_a_tip_that_flies_past_has_missed_a_metre_ahead():
+    judge = AttemptJudge(1)
+    assert _watch(judge, -0.1, 0.99) == (False, None)
+    assert _watch(judge, 1.01) == (True, Outcome.MISS)
+
+
+def test_a_probe_that_touched_and_went_back_struck_the_rim():
+    judge = AttemptJudge(1)
+    _watch(judge, -0.05, touches=True)
+    assert _watch(judge, -0.6) == (True, Outcome.RIM_STRIKE)
+
+
+def test_a_touch_is_not_over_while_it_lasts():
+    judge = AttemptJudge(1)
+    assert _watch(judge, -0.1, 0.1, -0.7, touches=True) == (False, None)
+
+
+def test_the_coupling_ends_it():
+    judge = AttemptJudge(1)
+    _watch(judge, -0.1, 0.2)
+    assert _watch(judge, 0.3, latched=True) == (False, Outcome.CONTACT)
+
+
+@pytest.mark.parametrize("attempts", [1, 2, 3])
+def test_the_last_attempt_has_the_outcome_and_those_before_only_fail(attempts):
+    judge = AttemptJudge(attempts)
+    ends = [_watch(judge, -0.1, 0.2, -0.6) for _ in range(attempts)]
+    assert ends == [(True, None)] * (attempts - 1) + [(True, Outcome.MISS)]
+    assert judge.number == attempts
+
+
+def test_a_strike_in_one_attempt_is_not_held_against_the_next():
+    judge = AttemptJudge(2)
+    _watch(judge, -0.05, touches=True)
+    _watch(judge, -0.6)
+    assert _watch(judge, -0.1, 0.2, -0.6) == (True, Outcome.MISS)
+
+
+def test_a_flight_that_begins_ahead_of_the_ring_has_not_crossed_it():
+    assert _watch(AttemptJudge(1), 0.5, 2.0) == (False, None)

@@ -1,0 +1,70 @@
+"""The library: every scenario loads, claims something, is held to figures, and stands on its page."""
+
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from dockair.scenarios.scenario_file import scenario_names, scenario_text
+from dockair.scenarios.schema import load_scenario
+
+NAMES = scenario_names()
+PAGE = (Path(__file__).parents[2] / "docs" / "scenarios.md").read_text(encoding="utf-8")
+FREE = {"name", "claim", "accept"}  # keys that do not change a flight
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_scenario_claims_something_in_a_sentence_and_is_held_to_figures(name):
+    scenario = load_scenario(name)
+    assert scenario.name == name
+    assert scenario.claim and scenario.claim[0].islower() and not scenario.claim.endswith(".")
+    assert scenario.accept.claims_rates and scenario.accept.unsafe_max == 0
+
+
+@pytest.mark.parametrize("name", [name for name in NAMES if name != "severe_gusts"])
+def test_whoever_is_to_dock_is_held_to_the_limits_of_service_practice(name):
+    """Contact within 0.15 m of the centre at 1.0 to 1.5 m/s; severe turbulence is held to doing no harm instead."""
+    accept = load_scenario(name).accept
+    assert (accept.outcome, accept.radial_offset_max_m) == ("contact", 0.15)
+    assert (accept.closure_speed_min_m_s, accept.closure_speed_max_m_s, accept.closure_rate_min) == (1.0, 1.5, 0.95)
+    assert accept.first_attempt_rate_min >= 0.7 and accept.success_rate_min >= max(accept.first_attempt_rate_min, 0.95)
+
+
+def test_the_levels_of_turbulence_are_held_to_the_figures_of_the_project():
+    light, moderate, severe = (load_scenario(f"{level}_gusts") for level in ("light", "moderate", "severe"))
+    assert [s.turbulence.intensity for s in (light, moderate, severe)] == ["light", "moderate", "severe"]
+    figures = [
+        (s.accept.first_attempt_rate_min, s.accept.success_rate_min, s.accept.radial_offset_median_max_m)
+        for s in (light, moderate)
+    ]
+    assert figures == [(0.95, 0.99, 0.05), (0.70, 0.95, 0.08)]
+    assert severe.accept.clean_rate_min == 1.0 and severe.accept.outcome is None
+
+
+def test_no_two_scenarios_fly_the_same():
+    flown = {}
+    for name in NAMES:
+        table = {key: value for key, value in load_scenario(name).model_dump(mode="json").items() if key not in FREE}
+        assert table not in flown.values(), name
+        flown[name] = table
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_scenario_is_data_with_a_comment_that_says_what_differs_in_lines_of_at_most_120(name):
+    text = scenario_text(name)
+    assert text.startswith("# ")
+    assert max(map(len, text.splitlines())) <= 120
+    assert tomllib.loads(text)["name"] == name
+
+
+def test_leds_out_are_as_many_as_the_name_says():
+    for count in (1, 2, 3, 4):
+        (fault,) = load_scenario(f"leds_out_{count}").faults
+        assert fault.kind == "led_off" and len(set(fault.leds)) == count
+
+
+def test_the_page_has_a_row_for_each_scenario_with_its_claim_and_no_other():
+    library = PAGE[PAGE.index("## The library") : PAGE.index("## Acceptance")]
+    rows = [line.split("|") for line in library.splitlines() if line.startswith("| `")]
+    told = {row[1].strip(" `"): row[2].strip() for row in rows}
+    assert told == {name: load_scenario(name).claim for name in NAMES}

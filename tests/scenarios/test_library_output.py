@@ -1,0 +1,34 @@
+"""The library as it is listed: what each scenario claims and what it is held to."""
+
+import pytest
+
+from dockair.scenarios.accept import Accept
+from dockair.scenarios.library_output import show_scenario, show_scenarios
+from dockair.scenarios.schema import Scenario, load_scenario
+
+
+@pytest.fixture(autouse=True)
+def wide(monkeypatch):
+    monkeypatch.setenv("COLUMNS", "300")
+
+
+def test_each_scenario_is_one_line_with_claim_and_acceptance(capsys):
+    accept = Accept(outcome="contact", radial_offset_max_m=0.15)
+    show_scenarios([Scenario(name="one", claim="it docks", accept=accept), Scenario(name="two", claim="it may")])
+    lines = [line.split("  ") for line in capsys.readouterr().out.splitlines()[1:]]
+    assert [[part.strip() for part in line if part.strip()] for line in lines] == [
+        ["one", "it docks", "contact, within 0.15 m"],
+        ["two", "it may"],
+    ]
+
+
+def test_one_scenario_is_shown_as_it_was_written_brackets_included(capsys, tmp_path):
+    """Tables of TOML look like the mark-up of the terminal's printer, which would swallow them."""
+    path = tmp_path / "mine.toml"
+    path.write_text(
+        '# mine\nname = "mine"\n[flight]\nduration_s = 5.0\n[accept]\noutcome = "timeout"\n', encoding="utf-8"
+    )
+    show_scenario(str(path), load_scenario(path))
+    out = capsys.readouterr().out
+    assert out.startswith(path.read_text(encoding="utf-8").rstrip())
+    assert out.splitlines()[-1] == "held to: timeout"

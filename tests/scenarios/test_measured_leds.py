@@ -1,0 +1,228 @@
+"""LEDs measured without a picture: places, errors, faults, and that nothing is drawn out of turn."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import mujoco
+import numpy as np
+import pytest
+from scipy.stats import chi2, norm
+
+from dockair.calibration import Camera, LedRing, Mounting
+from dockair.errors import DockairError
+from dockair.parameters import load_parameters
+from dockair.rotations import exp
+from dockair.scenarios.build_measured import SHEET, refuse_unmodelled
+from dockair.scenarios.measured_leds import MeasuredLeds, MeasurementParameters
+from dockair.scenarios.schema import load_scenario
+from dockair.sim.as_built import AsBuilt, AsBuiltParameters, draw_as_built
+from dockair.sim.camera.electronics import output_black, output_gain
+from dockair.sim.camera.radiometry import responses
+from dockair.sim.camera.sheets import CameraSheets
+from dockair.sim.faults import CameraDropOut, ExposureStuck, Faults, LedDim, LedOff, StuckFrame
+
+SHEETS = CameraSheets.load()
+PARAMETERS = load_parameters(SHEET, MeasurementParameters)
+#: Everything that is drawn at random, switched off.
+EXACT = replace(
+    PARAMETERS, error_over_sigma=0.0, clipped_error_over_sigma=0.0, unnamed_share=0.0, stray_share=0.0,
+    no_ring_share=0.0, faintest_spread=0.0,
+)  # fmt: skip
+ALL = tuple(range(8))
+_XML = """<mujoco><worldbody>
+<body name="receiver" mocap="true"><geom type="sphere" size="0.01" pos="-9 0 0"/></body>
+<body name="drogue" mocap="true"><geom type="sphere" size="0.01" pos="9 0 0"/></body>
+<body name="board" mocap="true" pos="0 0 99"><geom type="box" size="0.01 0.04 0.04"/></body>
+</worldbody></mujoco>"""
+
+
+class Stand:
+    """A receiver at the origin, a drogue that can be put, a small board that can be put in the way."""
+
+    def __init__(self, parameters: MeasurementParameters = EXACT, faults=(), seed: int = 0, **changes) -> None:
+        self.model = mujoco.MjModel.from_xml_string(_XML)
+        self.data = mujoco.MjData(self.model)
+        mounting = Mounting(R_BC=exp(np.array([0.0, 0.0, 0.02])), p_BC=np.array([3.0, -0.4, 0.7]), p_BP=np.zeros(3))
+        self.built = draw_as_built(
+            Camera(), LedRing(), mounting, load_parameters("as_built", AsBuiltParameters), SHEETS.leds,
+            np.random.default_rng(4),
+        )  # fmt: skip
+        response = responses(SHEETS.lens, SHEETS.filter, SHEETS.sensor, SHEETS.leds, SHEETS.light, self.built.camera)
+        self.leds = MeasuredLeds(
+            parameters, SHEETS, self.built, response, self.model,
+            rng=np.random.default_rng(seed), transfer=np.random.default_rng(1),
+            defects=SimpleNamespace(dirt=lambda cover: None), faults=Faults(faults, 8), **changes,
+        )  # fmt: skip
+        self.put(7.0)
+
+    def put(self, depth_m: float, board_before: int | None = None) -> None:
+        """Put the drogue ahead of the lens, the board half-way to an LED."""
+        R_WC, p_WC = self.built.mounting.R_BC, self.built.mounting.p_BC
+        self.data.mocap_pos[1] = p_WC + R_WC @ np.array([depth_m, 0.1, -0.05])
+        self.data.mocap_pos[2] = [0.0, 0.0, 99.0]
+        if board_before is not None:
+            led = self.data.mocap_pos[1] + self.built.ring_positions_D[board_before]
+            self.data.mocap_pos[2] = 0.5 * (p_WC + led)
+        mujoco.mj_kinematics(self.model, self.data)
+
+    def look(self, time_s: float = 1.0):
+        """One exposure."""
+        return self.leds.expose(self.data, time_s, 0, None)
+
+    def true_px(self) -> np.ndarray:
+        """(8, 2) the as-built pinhole projection."""
+        built = self.built
+        leds_W = self.data.mocap_pos[1] + built.ring_positions_D
+        return built.camera.pixels_from_points((leds_W - built.mounting.p_BC) @ built.mounting.R_BC)
+
+
+def test_without_errors_each_led_is_where_the_as_built_camera_images_it():
+    for depth_m in (3.0, 7.0, 20.0):
+        stand = Stand()
+        stand.put(depth_m)
+        seen = stand.look()
+        assert tuple(seen.led_numbers) == ALL
+        np.testing.assert_allclose(seen.centroids_px, stand.true_px(), atol=1e-9)
+        assert seen.time_stamp_s == 1.0
+
+
+def test_a_board_before_an_led_hides_that_one_alone():
+    stand = Stand()
+    stand.put(7.0, board_before=3)
+    assert tuple(stand.look().led_numbers) == (0, 1, 2, 4, 5, 6, 7)
+
+
+def test_the_stated_sigma_is_that_of_photons_on_a_gaussian():
+    """Without floor, background and texture, a = 1: w/sqrt(N), the classical bound."""
+    plain = replace(EXACT, sigma_floor_px=0.0, background_e=0.0, texture_e=0.0, photon_factor=1.0)
+    stand = Stand(plain)
+    seen, view = stand.look(), stand.leds.view(stand.data, 1.0, SHEETS.exposure.exposure_s)
+    _, width_px = stand.leds.spots(view)
+    np.testing.assert_allclose(seen.sigma_px, width_px / np.sqrt(view.electrons), rtol=1e-12)
+
+
+def test_a_clipped_spot_states_the_root_of_its_full_pixels_up_to_the_most():
+    leds = Stand().leds
+    variance, texture = leds.variances(np.full(4, 2e5), np.full(4, 0.8), np.array([1, 2, 4, 9]), 14e-6)
+    p = EXACT
+    np.testing.assert_allclose(variance, p.clipped_sigma_px**2 * np.array([1.0, 2.0, p.clipped_most, p.clipped_most]))
+    assert not texture.any()
+
+
+def test_errors_have_the_stated_spread_times_the_ratio():
+    """Chi-square of 16 x 400 normals: a false alarm in 1e4 seeds; the seed is fixed."""
+    stand = Stand(replace(EXACT, error_over_sigma=0.9, texture_lasting_share=0.0))
+    frames = [stand.look(0.02 * k) for k in range(400)]
+    z = np.concatenate([(one.centroids_px - stand.true_px()) / (0.9 * one.sigma_px[:, None]) for one in frames])
+    low, high = chi2.ppf([5e-5, 1.0 - 5e-5], z.size)
+    assert low < (z**2).sum() < high
+    assert abs(z.mean()) < norm.ppf(1.0 - 5e-5) / np.sqrt(z.size)
+
+
+def test_the_lasting_part_of_the_textures_error_is_correlated_over_its_time():
+    """All error is texture's and half of it lasts: correlation 0.5 exp(-lag/T); 3000 frames give it to 0.05."""
+    p = replace(
+        EXACT, error_over_sigma=1.0, sigma_floor_px=0.0, photon_factor=0.0, texture_e=500.0, texture_lasting_share=0.5,
+        texture_time_s=0.2,
+    )  # fmt: skip
+    stand = Stand(p, automatic_exposure=False)
+    z = np.array([(stand.look(0.02 * k).centroids_px - stand.true_px()).ravel() for k in range(3000)])[100:]
+    z /= z.std()
+    for lag in (1, 10):
+        assert np.mean(z[lag:] * z[:-lag]) == pytest.approx(0.5 * np.exp(-0.02 * lag / 0.2), abs=0.05)
+
+
+def test_the_exposure_brings_the_metered_pixel_to_its_target_within_the_dead_band():
+    for depth_m in (6.0, 12.0, 25.0):
+        stand = Stand()
+        stand.put(depth_m)
+        for k in range(12):
+            stand.look(0.02 * k)
+        levels, _ = stand.leds.spots(stand.leds.view(stand.data, 1.0, stand.leds.exposure_s))
+        black = output_black(SHEETS.sensor)
+        span = min(black + output_gain(SHEETS.sensor) * SHEETS.sensor.full_well_e, 255.0) - black
+        metered = (np.sort(levels, axis=None)[-SHEETS.exposure.metered_pixel] - black) / span
+        assert metered == pytest.approx(SHEETS.exposure.target_level, rel=SHEETS.exposure.dead_band + 0.02)
+
+
+@pytest.mark.parametrize(("dark", "left"), [((0, 2, 5), (1, 3, 4, 6, 7)), ((0, 2, 5, 7), (1, 3, 4, 6)), (range(5), ())])
+def test_dark_leds_are_not_named_and_too_few_are_no_ring(dark, left):
+    assert tuple(Stand(faults=[LedOff(leds=tuple(dark))]).look().led_numbers) == left
+
+
+def test_an_led_dimmed_below_the_faintest_level_is_not_seen_and_above_it_is():
+    stand = Stand(automatic_exposure=False)
+    view = stand.leds.view(stand.data, 1.0, SHEETS.exposure.exposure_s)
+    levels, _ = stand.leds.spots(view)
+    t = SHEETS.exposure.exposure_s
+    faintest_dn = EXACT.faintest_dn + EXACT.faintest_dn_per_e * stand.leds.texture_e(t)
+    factor = faintest_dn / (levels[2].max() - output_black(SHEETS.sensor))
+    for times, seen in ((0.5, False), (2.5, True)):  # output levels are whole numbers
+        dimmed = Stand(faults=[LedDim(leds=(2,), factor=min(times * factor, 1.0))], automatic_exposure=False)
+        assert (2 in dimmed.look().led_numbers) is seen
+
+
+def test_a_camera_that_has_dropped_out_sends_nothing_and_a_stuck_one_the_same_again():
+    faults = [StuckFrame(start_s=1.0, stop_s=2.0), CameraDropOut(start_s=2.0, stop_s=3.0)]
+    stand = Stand(PARAMETERS, faults)
+    before, stuck = stand.look(0.9), stand.look(1.1)
+    np.testing.assert_array_equal(stuck.centroids_px, before.centroids_px)
+    assert stuck.time_stamp_s == 1.1
+    assert stand.look(2.5) is None
+    assert stand.look(3.1) is not None
+
+
+def test_a_drop_out_leaves_the_numbers_of_later_frames_as_they_are():
+    p = replace(PARAMETERS, texture_lasting_share=0.0)
+    whole, broken = Stand(p, seed=3), Stand(p, [CameraDropOut(start_s=0.05, stop_s=0.07)], seed=3)
+    series = [[stand.look(0.02 * k) for k in range(8)] for stand in (whole, broken)]
+    assert series[1][3] is None
+    np.testing.assert_array_equal(series[0][7].centroids_px, series[1][7].centroids_px)
+
+
+def test_a_stuck_exposure_is_the_one_in_use():
+    stand = Stand(faults=[ExposureStuck(exposure_s=200e-6)])
+    stand.look()
+    assert stand.leds.exposure_s == 200e-6
+
+
+def test_shares_of_unnamed_leds_and_of_frames_without_a_ring_are_those_of_the_sheet():
+    """Within five standard deviations of a binomial: a false alarm in 1.7e6; the seed is fixed."""
+    p = replace(EXACT, unnamed_share=0.1, no_ring_share=0.2, texture_exposure_s=SHEETS.exposure.exposure_s)
+    stand, frames = Stand(p, automatic_exposure=False), 600
+    counts = np.array([len(stand.look(0.02 * k).led_numbers) for k in range(frames)])
+    without = (counts == 0).mean()
+    assert without == pytest.approx(0.2, abs=5.0 * np.sqrt(0.2 * 0.8 / frames))
+    assert counts[counts > 0].mean() / 8.0 == pytest.approx(0.9, abs=5.0 * np.sqrt(0.09 / (8 * 0.8 * frames)))
+
+
+def test_latency_follows_the_window_of_a_ring_that_is_tracked_and_the_full_frame_before():
+    """Rows are read one after another: the difference of the two is theirs."""
+    no_jitter = replace(SHEETS, sensor=replace(SHEETS.sensor, transfer_jitter_s=0.0))
+    stand = Stand()
+    stand.leds._sheets = no_jitter
+    first = stand.leds.latency_s(stand.look(0.0)) - 0.5 * stand.leds.exposure_s
+    later = stand.leds.latency_s(stand.look(0.02)) - 0.5 * stand.leds.exposure_s
+    height_px = np.ptp(stand.true_px()[:, 1])
+    rows = EXACT.window_heights * height_px + EXACT.window_margin_px
+    row_s = SHEETS.sensor.row_clocks / SHEETS.sensor.clock_hz * 16 / SHEETS.sensor.outputs
+    assert first - later == pytest.approx((1088 - rows) * row_s, abs=2.0 * row_s)
+
+
+@pytest.mark.parametrize(
+    ("settings", "reason"),
+    [
+        ({"faults": [{"kind": "hot_pixels", "count": 9}]}, "hot pixels"),
+        ({"weather.cloud_cover": 0.3}, "clouds"),
+        ({"sun.azimuth_deg": 5.0, "sun.elevation_deg": 10.0}, "the Sun in the camera's field"),
+    ],
+)
+def test_what_acts_through_the_picture_alone_is_refused(settings, reason):
+    with pytest.raises(DockairError, match=reason):
+        refuse_unmodelled(load_scenario("default", settings), Stand().built)
+
+
+def test_the_default_scenario_and_a_night_with_the_sun_below_are_not_refused():
+    built: AsBuilt = Stand().built
+    refuse_unmodelled(load_scenario("default"), built)
+    refuse_unmodelled(load_scenario("default", {"sun.azimuth_deg": 5.0, "weather.night": True}), built)
