@@ -178,7 +178,7 @@ class Guidance:
         """(3,) du/dt of the controller."""
         s = self._settings
         if self.phase is Phase.APPROACH:
-            wanted = Wanted(distance_m=None, speed_m_s=self._closure, aim_m=self._aim_now())
+            wanted = Wanted(distance_m=None, speed_m_s=self._closure, aim_m=self._aim_now(), must_follow=True)
         elif self.phase in _RETREATING:
             wanted = Wanted(distance_m=None, speed_m_s=-s.back_off_speed_m_s, aim_m=self._aim_now())
         else:
@@ -216,7 +216,8 @@ class Guidance:
 def _controller(settings: GuidanceSettings, step_s: float) -> Controller:
     if settings.controller == "pid":
         return Pid(settings.pid, step_s)
-    return Predictive(settings.predictive, np.array(settings.response_s), step_s)
+    limit = np.array(settings.acceleration_limit_m_s2)
+    return Predictive(settings.predictive, np.array(settings.response_s), limit, step_s)
 
 
 def _limited(v: Array, limit: float) -> Array:

@@ -4,9 +4,9 @@ A source behind the nose makes a half-body of radius R and sends out, at r from 
 
     u / V = R^2/4  r/|r|^3,         b = c u/V  across                                                     (1)
 
-A drogue in a stream that has been turned by u/V is accelerated across by c u/V: c is its drag per mass that moves along,
-as long as it hangs where it hung. An attempt that missed tells what (1) did not know: a share of the miss is added to
-where the next one aims.
+A drogue in a stream that has been turned by u/V is accelerated across by c u/V as long as it hangs where it hung: c is
+its drag per mass that moves along. An attempt that missed tells what (1) did not know: a share of the miss is added
+to where the next one aims.
 
 Not modelled: the push along the way, the turning of the source with the body, the hose in the same flow.
 Source: potential flow about a Rankine half-body; c from the swing, omega^2 times the hose's length.

@@ -25,6 +25,7 @@ class Wanted:
     distance_m: float | None  #: behind `Sight.place_m`; None: close
     speed_m_s: float  #: closing, or the most to go to the distance with
     aim_m: Array  #: (2,) off the place, left and up
+    must_follow: bool = False  #: a swing, too, that is more than the receiver can bear
 
 
 class Controller(Protocol):

@@ -18,8 +18,10 @@ flight; the peers' hoses and research on hose-drogue dynamics give 0.2-0.5 Hz.
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
+from numba import njit
 from scipy.linalg import expm, solve_continuous_lyapunov, solve_discrete_are
 
 from dockair.rotations import Array
@@ -39,7 +41,9 @@ class SwingSettings:
     drift_sigma_m_s: float = 0.4  # of d at the start: the inertial velocity's bias, twice its 0.2 m/s
     learning_s: float = 12.0  # after which the gains stay the same: drift and swing are told apart within a few periods
     drift_density: float = 0.03  # of d' [m/s^2/sqrt(Hz)]: the inertial velocity's drift, gusts far below the swing
-    position_sigma_m: float = 0.02  # of the place: what the tip does besides its commands is in it, and must not be chased
+    position_sigma_m: float = (
+        0.02  # of the place: what the tip does besides its commands is in it, and must not be chased
+    )
     rate_sigma_m_s: float = 0.10  # of its rate, likewise; the camera itself knows it to 0.025 m/s
 
 
@@ -57,7 +61,7 @@ class DrogueMotion:
         self._A = np.stack([_dynamics(settings, axis) for axis in range(3)])
         self._F = np.stack([expm(A * step_s) for A in self._A])
         self._lead = np.stack([expm(A * lead) for A, lead in zip(self._A, self._lead_s, strict=True)])
-        self._K = np.stack([_gains(settings, axis, self._A[axis], step_s) for axis in range(3)], axis=1)
+        self._K = np.stack([_gains(settings, axis, step_s) for axis in range(3)], axis=1)
         self._ticks = 0
         self._pushed = np.stack([_held(A, step_s) for A in self._A])
         self._x: Array = np.zeros((3, _STATES))
@@ -75,12 +79,12 @@ class DrogueMotion:
             velocity_m_s: (3,) likewise.
             push_m_s2: (3,) b.
         """
-        x = np.einsum("aij,aj->ai", self._F, self._x) + self._pushed * push_m_s2[:, np.newaxis]
-        if place_m is not None and velocity_m_s is not None:
-            innovation = np.column_stack([place_m, velocity_m_s]) - x @ _H.T
-            x = x + np.einsum("aij,aj->ai", self._K[min(self._ticks, len(self._K) - 1)], innovation)
-            self._ticks += 1
-        self._x = x
+        seen = place_m is not None and velocity_m_s is not None
+        gains = self._K[min(self._ticks, len(self._K) - 1)]
+        if place_m is None or velocity_m_s is None:
+            place_m = velocity_m_s = push_m_s2  # of the right shape, and not looked at
+        _advance(self._x, self._F, self._pushed, push_m_s2, gains, seen, place_m, velocity_m_s)
+        self._ticks += seen
 
     @property
     def drift_m_s(self) -> Array:
@@ -94,12 +98,49 @@ class DrogueMotion:
             push_m_s2: (3,) b now; until then it changes steadily, and the swing does not answer to it yet.
             push_then_m_s2: (3,) b after the lead time.
         """
-        x = np.einsum("aij,aj->ai", self._lead, self._x)
-        change = np.einsum("aij,aj->ai", self._A, x)
-        lead, place, velocity = self._lead_s, x @ _H[0], x @ _H[1]
-        place = place + lead**2 * (push_m_s2 / 3.0 + push_then_m_s2 / 6.0)
-        velocity = velocity + 0.5 * lead * (push_m_s2 + push_then_m_s2)
-        return place, velocity, change @ _H[1] + push_then_m_s2
+        out = np.empty((3, 3))
+        _predict(self._x, self._lead, self._A, self._lead_s, push_m_s2, push_then_m_s2, out)
+        return out[0], out[1], out[2]
+
+    def mean_ahead(self) -> tuple[Array, Array, Array]:
+        """(3,) the same three without the swing: drift alone."""
+        m, d = self._x[:, 0], self._x[:, 1]
+        return m + self._lead_s * d, d.copy(), np.zeros(3)
+
+
+@njit(cache=True)
+def _advance(x, F, pushed, push, K, seen, place, velocity):  # type: ignore[no-untyped-def]
+    """A step of the filter in place: x (3, 5), F (3, 5, 5), pushed (3, 5), K (3, 5, 2)."""
+    n = x.shape[1]
+    later = np.empty(n)
+    for axis in range(3):
+        for i in range(n):
+            later[i] = pushed[axis, i] * push[axis]
+            for j in range(n):
+                later[i] += F[axis, i, j] * x[axis, j]
+        off, off_rate = 0.0, 0.0
+        if seen:
+            off, off_rate = place[axis] - later[0] - later[2], velocity[axis] - later[1] - later[3]
+        for i in range(n):
+            x[axis, i] = later[i] + K[axis, i, 0] * off + K[axis, i, 1] * off_rate
+
+
+@njit(cache=True)
+def _predict(x, lead, A, lead_s, push, push_then, out):  # type: ignore[no-untyped-def]
+    """Write place, velocity and acceleration (rows of out) of each axis after its lead time."""
+    n = x.shape[1]
+    later = np.empty(n)
+    for axis in range(3):
+        for i in range(n):
+            later[i] = 0.0
+            for j in range(n):
+                later[i] += lead[axis, i, j] * x[axis, j]
+        tau, now, then = lead_s[axis], push[axis], push_then[axis]
+        out[0, axis] = later[0] + later[2] + tau * tau * (now / 3.0 + then / 6.0)
+        out[1, axis] = later[1] + later[3] + 0.5 * tau * (now + then)
+        out[2, axis] = then
+        for j in range(n):
+            out[2, axis] += (A[axis, 1, j] + A[axis, 3, j]) * later[j]
 
 
 def _dynamics(settings: SwingSettings, axis: int) -> Array:
@@ -119,8 +160,10 @@ def _held(A: Array, step_s: float) -> Array:
     return np.asarray(expm(augmented * step_s)[:_STATES, _STATES])
 
 
-def _gains(settings: SwingSettings, axis: int, A: Array, step_s: float) -> Array:
-    """(n, 5, 2) gains of the Kalman filter tick by tick, the last one for good; the step's noise by Van Loan's matrix."""
+@lru_cache(maxsize=12)
+def _gains(settings: SwingSettings, axis: int, step_s: float) -> Array:
+    """(n, 5, 2) gains of the Kalman filter tick by tick, the last for good; the step's noise by Van Loan's matrix."""
+    A = _dynamics(settings, axis)
     drive = np.diag([0.0, settings.drift_density**2, 0.0, 0.0, settings.gust_density[axis] ** 2])
     loan = expm(np.block([[-A, drive], [np.zeros_like(A), A.T]]) * step_s)
     F = loan[_STATES:, _STATES:].T

@@ -21,6 +21,8 @@ class PredictiveSettings:
     integral_1_s2: float = 0.3  # k_i: a steady error goes within some 5 s, slow beside the swing
     integral_error_max_m: float = 0.2  # beyond this the receiver is on its way, not off by a wrong idea
     smoothing_1_s: float = 6.0  # how fast u goes to the u of Eq. (1) where it is not there: 1 / tau
+    bearable_share: float = 0.7  # of the limit of acceleration, rms: above it a swing's peaks are cut off every time
+    bearing_s: float = 4.0  # over which that mean is taken: a swing and a half
     swing: SwingSettings = field(default_factory=SwingSettings)
 
 
@@ -43,12 +45,11 @@ class GuidanceSettings:
     closure_speed_m_s: float = 1.2  # published practice 1.0-1.5 m/s
     join_up_speed_m_s: float = 1.5  # assumed: walking pace, as in practice from some tens of metres
     back_off_speed_m_s: float = 1.0  # breakaway practice 1-2 m/s
-    response_s: tuple[float, float, float] = (0.40, 0.17, 0.14)  # tau: the flight control's delay to a command with its
-    # rate at 0.3 Hz, computing included
-    acceleration_limit_m_s2: tuple[float, float, float] = (0.8, 1.9, 1.9)  # what the flight control flies
+    response_s: tuple[float, float, float] = (0.40, 0.17, 0.14)  # tau: delay of the tip at 0.3 Hz, computing included
+    acceleration_limit_m_s2: tuple[float, float, float] = (0.75, 1.9, 1.9)  # a little less than the flight control's
     velocity_limit_m_s: float = 3.5
     closure_acceleration_m_s2: float = 0.6  # how fast the closure speed is asked for
-    take_in_gain_1_s: float = 0.35  # speed into the refuelling range per metre to go; a third of course_gain: no overshoot
+    take_in_gain_1_s: float = 0.35  # speed into the refuelling range per metre to go; a third of the next: no overshoot
     course_gain_1_s: float = 1.2  # how fast a course without a view of the drogue is taken up
     levelling_s: float = 10.0  # of the stabilised axes: long beside the swing, short beside a turn
     turn_gain_rad_m: float = 1e-3  # k_r: at 180 m/s a drift across goes within 6 s, slow beside the swing

@@ -10,8 +10,6 @@ Not modelled: a gain other than one and whatever else the response is besides a 
 shows as motion of the drogue on this scale, and is followed as such.
 """
 
-from collections import deque
-
 import numpy as np
 
 from dockair.rotations import Array
@@ -23,26 +21,27 @@ class OwnPath:
     def __init__(self, response_s: Array, step_s: float) -> None:
         self._step_s = step_s
         self._ticks = np.maximum(np.round(np.asarray(response_s) / step_s).astype(int), 1)
-        length = int(self._ticks.max()) + 1
-        self._places: deque[Array] = deque([np.zeros(3)] * length, maxlen=length)  # newest last
-        self._velocities: deque[Array] = deque([np.zeros(3)] * length, maxlen=length)
+        self._length = int(self._ticks.max()) + 1
+        self._axes, self._newest = np.arange(3), 0
+        self._places, self._velocities = np.zeros((self._length, 3)), np.zeros((self._length, 3))  # rings
 
     def step(self, velocity_m_s: Array) -> None:
         """Take note of the velocity (3,) commanded for the next period."""
-        self._places.append(self._places[-1] + velocity_m_s * self._step_s)
-        self._velocities.append(velocity_m_s)
+        before, self._newest = self._newest, (self._newest + 1) % self._length
+        self._places[self._newest] = self._places[before] + velocity_m_s * self._step_s
+        self._velocities[self._newest] = velocity_m_s
 
     @property
     def place_m(self) -> Array:
         """(3,) y_r now."""
-        return np.array([self._places[-1 - n][i] for i, n in enumerate(self._ticks)])
+        return np.asarray(self._places[self._newest - self._ticks, self._axes])
 
     @property
     def velocity_m_s(self) -> Array:
         """(3,) v now."""
-        return np.array([self._velocities[-1 - n][i] for i, n in enumerate(self._ticks)])
+        return np.asarray(self._velocities[self._newest - self._ticks, self._axes])
 
     @property
     def place_ahead_m(self) -> Array:
         """(3,) y_r after the response time of each axis, by the commands given so far."""
-        return self._places[-1]
+        return np.array(self._places[self._newest])

@@ -106,9 +106,7 @@ class Transition:
     holds: _Condition
 
 
-_TOO_FAST = Transition(
-    Phase.BREAKAWAY, "closing too fast", lambda limits, s: s.closing_m_s > limits.closure_limit_m_s
-)
+_TOO_FAST = Transition(Phase.BREAKAWAY, "closing too fast", lambda limits, s: s.closing_m_s > limits.closure_limit_m_s)
 _AWAY = (
     Transition(
         Phase.CLEAR,

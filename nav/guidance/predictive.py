@@ -6,9 +6,13 @@ With y_D place of the drogue and y_r that of the receiver on its own scale, both
     e = y_D - y_r - wanted,     u* = y_D' + k e + k_i integral of e across,
     du/dt = y_D'' + k (y_D' - u) + s (u* - u)                                                             (1)
 
-axis by axis; while closing at c, u* = y_D' + c along. The integral takes out what a wrong idea of y_D'' leaves. Both u and du/dt go out, so that the flight control has nothing to
-guess. A bias of the receiver's inertial velocity is part of y_D'. What the tip does otherwise than commanded is part of
-y_D too: it is predicted and flown against like the drogue's own motion, with the same filter.
+axis by axis; while closing at c, u* = y_D' + c along. The integral takes out what a wrong idea of y_D'' leaves. Both u
+and du/dt go out, so that the flight control has nothing to guess. A bias of the receiver's inertial velocity is part of
+y_D'. What the tip does otherwise than commanded is part of y_D too: it is predicted and flown against like the drogue's
+own motion, with the same filter.
+
+A swing that asks for more than a share of the acceleration that the receiver may fly (rms over some swings) is not
+followed but waited for astern: then y_D is the middle of the swing.
 
 Not modelled: limits of the airframe in advance; what they cut off is missing from y_r's scale until it is seen.
 """
@@ -25,13 +29,15 @@ from dockair.rotations import Array
 class Predictive:
     """Eq. (1); see `controller.Controller`."""
 
-    def __init__(self, settings: PredictiveSettings, response_s: Array, step_s: float) -> None:
+    def __init__(self, settings: PredictiveSettings, response_s: Array, limit_m_s2: Array, step_s: float) -> None:
         self._settings = settings
         self._own = OwnPath(response_s, step_s)
         self._motion = DrogueMotion(settings.swing, step_s, response_s)
         self._gains = np.array([settings.along_gain_1_s, settings.across_gain_1_s, settings.across_gain_1_s])
-        self._ahead = np.zeros(3), np.zeros(3), np.zeros(3)
+        self._ahead: tuple[Array, Array, Array] = (np.zeros(3), np.zeros(3), np.zeros(3))
         self._integral: Array = np.zeros(2)  # k_i times it, left and up [m/s]
+        self._asked: Array = np.zeros(2)  # mean square of the drogue's acceleration, left and up
+        self._bearable = (settings.bearable_share * limit_m_s2[1:]) ** 2
         self._step_s, self._seen = step_s, False
 
     def observe(self, sight: Sight | None) -> None:
@@ -47,6 +53,8 @@ class Predictive:
             self._seen = True
         self._motion.step(place, velocity, sight.push_m_s2)
         self._ahead = self._motion.ahead(sight.push_m_s2, sight.push_then_m_s2)
+        share = self._step_s / self._settings.bearing_s
+        self._asked = self._asked + share * (self._ahead[2][1:] ** 2 - self._asked)
 
     def given(self, velocity_m_s: Array) -> None:
         """Take note of the velocity (3,) commanded for the next period."""
@@ -63,7 +71,8 @@ class Predictive:
 
     def rate(self, u: Array, wanted: Wanted) -> Array:
         """(3,) du/dt of Eq. (1)."""
-        place, velocity, acceleration = self._ahead
+        bearable = wanted.must_follow or bool((self._asked <= self._bearable).all())
+        place, velocity, acceleration = self._ahead if bearable else self._motion.mean_ahead()
         to_go = place - self._own.place_ahead_m
         to_go[1:] += wanted.aim_m
         speed = self._gains * to_go

@@ -1,40 +1,35 @@
-"""The push that guidance anticipates: its shape, its rate against differences, and where it ends."""
+"""The push that guidance anticipates, and what it learns of it."""
 
 import numpy as np
 import pytest
 
 from dockair.nav.guidance.bow_wave_push import BowWavePush
 
-PUSH = BowWavePush()
+PUSH = BowWavePush(radius_m=0.75)
 
 
-def _at(x):
-    return np.array(PUSH.at_contact_m) / (1.0 + x / PUSH.reach_m) ** 2
+def test_it_is_a_source_s_flow_away_from_the_nose_turned_into_an_acceleration():
+    """u/V = R^2/4 / r^2 along r: at r = (2, -1, 2), |r| = 3, the flow across is 0.140625/9 (-1, 2)/3."""
+    p = np.array(PUSH.source_from_tip_m) + [2.0, -1.0, 2.0]
+    expected = PUSH.side_acceleration_m_s2 * 0.140625 / 9.0 * np.array([0.0, -1.0, 2.0]) / 3.0
+    np.testing.assert_allclose(PUSH.at(p), expected, rtol=1e-12)
 
 
-def test_what_is_still_to_come_is_the_difference_of_the_pushes():
-    way, _ = PUSH.ahead(2.0, 1.2)
-    np.testing.assert_allclose(way, _at(2.0 - 0.6) - _at(2.0), rtol=1e-12)
+def test_the_drogue_of_a_probe_right_of_the_nose_goes_to_the_right_and_up_and_more_so_close_to_it():
+    near, far = PUSH.at(np.zeros(3)), PUSH.at(np.array([4.0, 0.0, 0.0]))
+    assert near[1] < far[1] < 0.0 < far[2] < near[2]
+    assert far[1] > 0.1 * near[1]
 
 
-def test_its_rate_is_the_push_s_own_along_the_way():
-    step, later = 1e-6, 2.0 - 1.2 * PUSH.lead_s
-    here, there = ((_at(x - 1.2 * step) - _at(x)) / step for x in (2.0, later))
-    np.testing.assert_allclose(PUSH.ahead(2.0, 1.2)[1], there - here, rtol=1e-5)
+def test_without_a_bow_wave_nothing_is_pushed_and_within_the_body_it_stays_finite():
+    assert not BowWavePush().at(np.array([0.5, 0.0, 0.0])).any()
+    assert np.isfinite(PUSH.at(np.array(PUSH.source_from_tip_m))).all()
 
 
-def test_nothing_is_added_at_contact_nor_while_backing_off():
-    for distance, closing in ((0.0, 1.2), (-0.1, 1.2), (2.0, 0.0), (2.0, -1.0)):
-        way, rate = PUSH.ahead(distance, closing)
-        assert (way == 0.0).all() and (rate == 0.0).all()
-    assert np.abs(PUSH.ahead(1e-9, 1.2)[0]).max() < 1e-9
-
-
-def test_the_whole_push_is_anticipated_once_contact_lies_within_the_lead():
-    way, _ = PUSH.ahead(1.2 * PUSH.lead_s, 1.2)
-    np.testing.assert_allclose(_at(1.2 * PUSH.lead_s) + way, PUSH.at_contact_m, rtol=1e-12)
-
-
-@pytest.mark.parametrize(("distance_m", "measured_m"), [(1.0, -0.042), (2.0, -0.019), (3.0, -0.011)])
-def test_it_is_the_measured_push_to_a_centimetre(distance_m, measured_m):
-    assert _at(distance_m)[0] == pytest.approx(measured_m, abs=0.01)
+def test_a_share_of_a_miss_is_learnt_and_never_more_than_the_bow_wave_could_do():
+    aim = PUSH.learnt(np.zeros(2), np.array([0.05, -0.1]))
+    np.testing.assert_allclose(aim, [0.02, -0.04], rtol=1e-12)
+    for _ in range(50):
+        aim = PUSH.learnt(aim, np.array([3.0, 4.0]))
+    assert np.hypot(*aim) == pytest.approx(PUSH.learnt_max_m)
+    np.testing.assert_allclose(aim / np.hypot(*aim), [0.6, 0.8], atol=1e-3)

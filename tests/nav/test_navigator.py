@@ -1,13 +1,15 @@
 """The navigator on frames drawn without any simulator: pixels and gyro in, belief, window and command out."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.stats import binom
 
 from dockair.calibration import Camera, GyroSheet, LedRing, Mounting, NavigationSheets, StartGeometry
 from dockair.errors import DockairError
-from dockair.messages import CameraFrame, ImuSample, Window
+from dockair.messages import CameraFrame, ImuSample, LedObservation, Window
 from dockair.nav.integrity.contact import Doubt
 from dockair.nav.navigator import Navigator, NavigatorSettings
 from dockair.rotations import exp, log, matrix_from_yaw_pitch_roll
@@ -322,6 +324,95 @@ def test_the_window_is_made_for_the_next_exposure_however_old_the_frame(render):
     widths = [sky.step(camera=False).window.shape[1] for _ in range(12)]
     growth = np.diff(widths)
     assert (growth[0::2] > 0).all() and (growth[1::2] == 0).all()  # two control ticks to an exposure
+
+
+def named(sky, numbers, time_s):
+    """What a model of the camera would draw: the true places of some LEDs, 0.1 px of noise."""
+    pixels = sky.led_pixels(time_s)[list(numbers)] + 0.1 * sky.rng.normal(size=(len(numbers), 2))
+    return LedObservation(
+        time_stamp_s=time_s,
+        led_numbers=np.array(numbers, dtype=np.int64),
+        centroids_px=pixels,
+        sigma_px=np.full(len(numbers), 0.1),
+    )
+
+
+def step_on_leds(sky, numbers):
+    """One control tick; every second with named LEDs in place of a frame."""
+    times = (sky.tick * 5 + np.arange(1, 6)) / 500.0
+    sky.tick += 1
+    imu = tuple(ImuSample(time_stamp_s=float(t), angular_rate_rad_s=np.zeros(3)) for t in times)
+    seen = named(sky, numbers, float(times[-1])) if sky.tick % 2 == 0 else None
+    return sky.navigator.step(imu, seen)
+
+
+def test_named_leds_may_come_in_place_of_frames(render):
+    sky = Sky(render, still)
+    for _ in range(40):
+        solution = step_on_leds(sky, range(8))
+    assert solution.valid and solution.status == "pose used" and solution.window is None
+    error = solution.p_PD_B - still(0.0)
+    assert abs(error[0]) < 0.02 and np.abs(error[1:]).max() < 0.003
+    assert np.abs(solution.led_pixels_px - sky.led_pixels(0.0)).max() < 0.6
+    assert sky.navigator.contact_claim().usable
+    assert step_on_leds(sky, ()).status in ("pose used", "ring not found")
+    assert step_on_leds(sky, ()).status == "ring not found"
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_one_to_three_leds_keep_a_belief_and_begin_none(render, count):
+    """Belief with all LEDs for 0.3 s, then for 0.5 s with some: across as good as a pixel or two at 5 m."""
+    sky = Sky(render, still)
+    for _ in range(20):
+        assert not step_on_leds(sky, range(count)).valid
+    assert np.isnan(sky.navigator.step((), None).frame_time_stamp_s)
+    for _ in range(30):
+        step_on_leds(sky, range(8))
+    statuses = set()
+    for _ in range(50):
+        solution = step_on_leds(sky, range(count))
+        statuses.add(solution.status)
+    assert "LEDs used" in statuses and solution.valid
+    assert np.abs(solution.p_PD_B - still(0.0))[1:].max() < (0.05 if count == 1 else 0.02)
+    assert Doubt.AGE in sky.navigator.contact_claim().doubts  # a claim needs a pose that can be tested
+
+
+def test_single_leds_of_a_frame_get_their_names_from_the_belief(render):
+    """Six of eight go dark: the two that are left are named right and used, in the window they need."""
+    sky = Sky(render, still)
+    sky.run(0.4)
+    sky.hidden = {0, 1, 2, 4, 5, 6}
+    statuses = [sky.step().status for _ in range(60)]
+    solution = sky.step()
+    assert statuses.count("LEDs used") > 50 and solution.valid
+    seen = np.isfinite(solution.led_pixels_px).all(axis=1)
+    assert np.flatnonzero(seen).tolist() == [3, 7]
+    assert np.hypot(*(solution.led_pixels_px - sky.led_pixels(0.0))[seen].T).max() < 1.0
+    rows, columns = solution.window.shape
+    assert rows * columns < 0.2 * 1088 * 2048
+    sky.hidden = set()
+    assert sky.run(0.1).status == "pose used"
+
+
+def test_clutter_gets_an_led_s_name_no_oftener_than_is_said(render):
+    """1 to 20 blobs about a ring of which no LED shines, 2000 frames: at most 5e-3; false alarm below 1e-4."""
+    sky = Sky(render, still)
+    sky.run(0.3)
+    finder, time_s, rng = sky.navigator._finder, sky.tick / 100.0, np.random.default_rng(3)
+    led_px = sky.led_pixels(0.0)
+    centre_px, reach_px = led_px.mean(axis=0), 1.6 * 0.5 * np.ptp(led_px, axis=0).max()
+    wrong, offered = 0, 0
+    for _ in range(2000):
+        count = int(rng.integers(1, 21))
+        places = centre_px + reach_px * rng.uniform(-1.0, 1.0, (count, 2))
+        blobs = SimpleNamespace(centroids_px=places, sigma_px=np.full(count, 0.1))
+        wrong += len(finder._named_singly(blobs, time_s)[0]) > 0
+        true = SimpleNamespace(
+            centroids_px=np.vstack([places[:1], led_px[:2]]), sigma_px=np.full(3, 0.1)
+        )  # fmt: skip
+        offered += len(finder._named_singly(true, time_s)[0]) >= 2
+    assert wrong <= binom.ppf(1.0 - 1e-4, 2000, 5e-3)
+    assert offered > 1950  # with one blob of clutter about, the two LEDs are named
 
 
 def test_a_ring_that_cannot_be_identified_is_refused_before_the_first_frame():

@@ -1,52 +1,96 @@
 """The table of phases."""
 
 import dataclasses
+import math
+import re
+from pathlib import Path
 
 import pytest
 
 from dockair.nav.guidance.phases import TRANSITIONS, Phase, PhaseLimits, Situation, next_phase
 
+DOCS = Path(__file__).parents[2] / "docs" / "guidance.md"
+LIMITS = PhaseLimits()
 CALM = Situation(
+    time_s=20.0,
     in_phase_s=0.0,
     steady_s=0.0,
+    spread_m=0.05,
+    waiting_s=0.0,
     unusable_s=0.0,
+    doubtful_s=0.0,
+    station_m=3.0,
     ahead_m=1.5,
     ring_ahead_m=1.2,
     lateral_m=0.0,
     closing_m_s=1.2,
     pushed_in_m=0.0,
+    attempts=1,
 )
-HELD = dataclasses.replace(CALM, ahead_m=0.0, ring_ahead_m=-0.3, closing_m_s=0.0)
+HELD = {"ahead_m": 0.0, "ring_ahead_m": -0.3, "closing_m_s": 0.0}
 
 
 @pytest.mark.parametrize(
-    ("phase", "situation", "following"),
+    ("phase", "changes", "following"),
     [
-        (Phase.PRE_CONTACT, CALM, Phase.PRE_CONTACT),
-        (Phase.PRE_CONTACT, dataclasses.replace(CALM, steady_s=3.0), Phase.APPROACH),
-        (Phase.APPROACH, CALM, Phase.APPROACH),
-        (Phase.APPROACH, dataclasses.replace(CALM, unusable_s=0.6), Phase.BREAKAWAY),
-        (Phase.APPROACH, dataclasses.replace(CALM, unusable_s=0.6, ahead_m=2.5), Phase.APPROACH),
-        (Phase.APPROACH, dataclasses.replace(CALM, lateral_m=1.1), Phase.APPROACH),
-        (Phase.APPROACH, dataclasses.replace(CALM, lateral_m=1.1, ahead_m=0.9), Phase.BREAKAWAY),
-        (Phase.APPROACH, dataclasses.replace(CALM, closing_m_s=2.7), Phase.BREAKAWAY),
-        (Phase.APPROACH, dataclasses.replace(CALM, ahead_m=0.04), Phase.CONTACT),
-        (Phase.CONTACT, HELD, Phase.CONTACT),
-        (Phase.CONTACT, dataclasses.replace(HELD, ahead_m=-0.3), Phase.BREAKAWAY),
-        (Phase.CONTACT, dataclasses.replace(HELD, pushed_in_m=1.6), Phase.HOLD),
-        (Phase.HOLD, dataclasses.replace(HELD, in_phase_s=4.9), Phase.HOLD),
-        (Phase.HOLD, dataclasses.replace(HELD, in_phase_s=5.0), Phase.DISCONNECT),
-        (Phase.HOLD, dataclasses.replace(HELD, ahead_m=0.5), Phase.BREAKAWAY),
-        (Phase.DISCONNECT, HELD, Phase.DISCONNECT),
-        (Phase.DISCONNECT, dataclasses.replace(HELD, ring_ahead_m=3.1), Phase.CLEAR),
-        (Phase.BREAKAWAY, dataclasses.replace(HELD, in_phase_s=10.0), Phase.CLEAR),
+        ("join_up", {}, None),
+        ("join_up", {"station_m": 0.4}, "pre_contact"),
+        ("pre_contact", {}, None),
+        ("pre_contact", {"steady_s": 3.0}, "approach"),
+        ("pre_contact", {"steady_s": 3.0, "spread_m": 0.11}, None),
+        ("pre_contact", {"steady_s": 3.0, "spread_m": math.inf}, None),
+        ("approach", {}, None),
+        ("approach", {"unusable_s": 0.6}, "breakaway"),
+        ("approach", {"unusable_s": 0.6, "ahead_m": 2.5}, None),
+        ("approach", {"doubtful_s": 0.6}, "breakaway"),
+        ("approach", {"doubtful_s": 0.6, "ahead_m": 2.5}, None),
+        ("approach", {"lateral_m": 1.1}, None),
+        ("approach", {"lateral_m": 1.1, "ring_ahead_m": 0.9}, "breakaway"),
+        ("approach", {"lateral_m": 0.3, "ring_ahead_m": -0.01}, "breakaway"),
+        ("approach", {"lateral_m": 0.2, "ring_ahead_m": -0.01}, None),
+        ("approach", {"closing_m_s": 2.7}, "breakaway"),
+        ("approach", {"waiting_s": 8.1}, "back_off"),
+        ("approach", {"ahead_m": 0.04}, "contact"),
+        ("contact", HELD, None),
+        ("contact", HELD | {"ahead_m": -0.3}, "back_off"),
+        ("contact", HELD | {"ahead_m": -0.3, "lateral_m": 0.3}, "breakaway"),
+        ("contact", HELD | {"pushed_in_m": 1.36}, "hold"),
+        ("hold", HELD | {"in_phase_s": 4.9}, None),
+        ("hold", HELD | {"in_phase_s": 5.0}, "disconnect"),
+        ("hold", HELD | {"ahead_m": 0.5}, "breakaway"),
+        ("disconnect", HELD, None),
+        ("disconnect", HELD | {"ring_ahead_m": 3.1}, "clear"),
+        ("back_off", {"ring_ahead_m": 2.9}, None),
+        ("back_off", {"ring_ahead_m": 3.1}, "pre_contact"),
+        ("back_off", {"ring_ahead_m": 3.1, "attempts": 3}, "clear"),
+        ("breakaway", {"in_phase_s": 10.0}, "pre_contact"),
+        ("breakaway", {"in_phase_s": 10.0, "attempts": 3}, "clear"),
     ],
 )
-def test_each_row_of_the_table(phase, situation, following):
-    assert next_phase(phase, PhaseLimits(), situation) is following
+def test_each_row_of_the_table(phase, changes, following):
+    transition = next_phase(Phase(phase), LIMITS, dataclasses.replace(CALM, **changes))
+    assert (transition.to.value if transition else None) == following
+
+
+def test_no_approach_is_begun_once_the_time_slot_is_over():
+    late = dataclasses.replace(CALM, steady_s=10.0, station_m=0.0, time_s=45.0)
+    for phase in (Phase.JOIN_UP, Phase.PRE_CONTACT):
+        assert next_phase(phase, PhaseLimits(slot_s=45.0), late).to is Phase.CLEAR
+        assert next_phase(phase, PhaseLimits(slot_s=45.1), late).to is not Phase.CLEAR
+
+
+def test_docs_and_code_have_the_same_table():
+    rows = re.findall(r"^\| `(\w+)` \| `(\w+)` \| ([^|]+) \| [^|]+ \|$", DOCS.read_text(encoding="utf-8"), re.M)
+    code = [(phase.value, row.to.value, row.reason) for phase, table in TRANSITIONS.items() for row in table]
+    assert rows == code
+
+
+def test_docs_name_every_limit():
+    text = DOCS.read_text(encoding="utf-8")
+    assert [f.name for f in dataclasses.fields(PhaseLimits) if f"`{f.name}`" not in text] == []
 
 
 def test_every_phase_has_its_row_and_all_but_the_first_can_be_reached():
     assert set(TRANSITIONS) == set(Phase)
-    reached = {successor for row in TRANSITIONS.values() for _, successor in row}
-    assert reached == set(Phase) - {Phase.PRE_CONTACT}
+    reached = {row.to for table in TRANSITIONS.values() for row in table}
+    assert reached == set(Phase) - {Phase.JOIN_UP}

@@ -1,0 +1,48 @@
+"""When to close."""
+
+import numpy as np
+import pytest
+
+from dockair.nav.guidance.closing import ClosingSettings, PredictedMiss, room_to_stop_m
+
+SETTINGS = ClosingSettings()
+
+
+def _fed(errors):
+    miss = PredictedMiss(SETTINGS, 0.01)
+    for error in errors:
+        miss.step(float(error))
+    return miss
+
+
+def test_the_spread_is_the_rms_of_the_last_swing_and_forgets_what_was_before():
+    errors = np.random.default_rng(3).normal(size=1000)
+    assert _fed(errors).spread_m == pytest.approx(np.sqrt(np.mean(errors[-300:] ** 2)), rel=1e-9)
+
+
+def test_nothing_is_known_before_a_whole_swing_nor_after_forgetting():
+    miss = _fed(np.zeros(299))
+    assert miss.spread_m == np.inf
+    miss.step(0.0)
+    assert miss.spread_m == 0.0
+    miss.forget()
+    assert miss.spread_m == np.inf
+
+
+def test_the_error_to_come_counts_whole_at_the_ring_and_hardly_from_afar():
+    miss = _fed(np.full(300, 0.03))
+    assert miss.at_contact_m(0.04, 0.0, 1.2) == pytest.approx(0.05)
+    assert miss.at_contact_m(0.04, 3.0, 1.2) == pytest.approx(0.03, abs=1e-4)
+    t = 0.5 / 1.2
+    expected = np.hypot(0.04 * np.exp(-t / SETTINGS.error_time_s), 0.03)
+    assert miss.at_contact_m(0.04, 0.5, 1.2) == pytest.approx(expected, rel=1e-12)
+
+
+def test_a_receiver_that_brakes_after_its_response_time_stops_the_margin_short():
+    """Against the motion integrated in small steps."""
+    c, x, t, dt = 1.2, room_to_stop_m(SETTINGS, 1.2), 0.0, 1e-4
+    while c > 0.0:
+        c = c - SETTINGS.deceleration_m_s2 * dt if t > SETTINGS.response_s else c
+        x, t = x - max(c, 0.0) * dt, t + dt
+    assert x == pytest.approx(SETTINGS.margin_m, abs=1e-3)
+    assert room_to_stop_m(SETTINGS, 0.0) == room_to_stop_m(SETTINGS, -0.5) == SETTINGS.margin_m
