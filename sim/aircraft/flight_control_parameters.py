@@ -6,7 +6,7 @@ from dockair.rotations import Array
 from dockair.sim.aircraft.flight_path import FlightPathParameters
 from dockair.sim.aircraft.own_sensors import OwnSensorsParameters
 from dockair.sim.aircraft.reference import ReferenceLimits
-from dockair.sim.aircraft.regulator import Tolerances
+from dockair.sim.aircraft.regulator import Swing, Tolerances
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -25,7 +25,8 @@ class FlightControlParameters:
     following_rate_tolerance_rad_s: Array  #: (3,)
     following_surface_tolerance_rad: Array  #: (3,)
     following_thrust_tolerance_m_s2: float
-    command_rate_1_s: Array  #: (3,)
+    swing_frequency_rad_s: Array  #: (3,)
+    swing_damping: Array  #: (3,)
     gust_length_m: float
     gust_bandwidth_rad_s: float
     reference_gain_1_s: Array  #: (3,) forward, left, up
@@ -34,6 +35,7 @@ class FlightControlParameters:
     acceleration_limit_m_s2: Array  #: (3,)
     jerk_limit_m_s3: Array  #: (3,)
     velocity_limit_m_s: float
+    increment_bank_rad: Array  #: (2,)
     path_bandwidth_rad_s: float
     path_damping: float
     path_catching_up: float
@@ -76,6 +78,11 @@ class FlightControlParameters:
         )
 
     @property
+    def swing(self) -> Swing:
+        """How commands are expected to go on."""
+        return Swing(frequency_rad_s=self.swing_frequency_rad_s, damping=self.swing_damping)
+
+    @property
     def reference_limits(self) -> ReferenceLimits:
         """Constants of the reference."""
         return ReferenceLimits(
@@ -85,6 +92,7 @@ class FlightControlParameters:
             acceleration_m_s2=self.acceleration_limit_m_s2,
             jerk_m_s3=self.jerk_limit_m_s3,
             velocity_m_s=self.velocity_limit_m_s,
+            bank_rad=self.increment_bank_rad,
         )
 
     @property

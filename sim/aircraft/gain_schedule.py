@@ -13,12 +13,12 @@ from dockair.rotations import Array
 from dockair.sim.air.atmosphere import STANDARD_GRAVITY_M_S2, Air
 from dockair.sim.aircraft.airframe import AirframeData
 from dockair.sim.aircraft.linear_model import INPUTS, STATES, LinearModel, linear_model
-from dockair.sim.aircraft.regulator import FOLLOWED, Gains, Tolerances, design, tip_velocity
+from dockair.sim.aircraft.regulator import FOLLOWED, Gains, Swing, Tolerances, design, tip_velocity
 from dockair.sim.aircraft.trim import Trim, steady_trim
 
 NODE_RAD = float(np.radians(5.0))
 
-_SHAPES = ((10,), (STATES, STATES), (3, STATES), (INPUTS, STATES + 6), (INPUTS, FOLLOWED), (INPUTS, 6), (3, 3))
+_SHAPES = ((10,), (STATES, STATES), (3, STATES), (INPUTS, STATES + 6), (INPUTS, FOLLOWED), (INPUTS, 9), (3, 3))
 _ENDS = np.cumsum([int(np.prod(shape)) for shape in _SHAPES])
 #: In `Row.trim`.
 ATTITUDE_0, RATE_0, SURFACES_0, THRUST_0 = slice(0, 3), slice(3, 6), slice(6, 9), 9
@@ -33,7 +33,7 @@ class Row:
     C: Array  #: (3, 13)
     K: Array  #: (4, 19)
     K_followed: Array  #: (4, 16)
-    K_command: Array  #: (4, 6)
+    K_command: Array  #: (4, 9)
     gust_from_residual: Array  #: (3, 3)
 
     @classmethod
@@ -51,7 +51,7 @@ class Design:
     feedback: Tolerances
     following: Tolerances
     gust_1_s: float
-    command_1_s: Array  #: (3,)
+    swing: Swing
 
 
 class GainSchedule:
@@ -100,7 +100,7 @@ class GainSchedule:
             wanted.feedback,
             wanted.following,
             wanted.gust_1_s,
-            wanted.command_1_s,
+            wanted.swing,
         )
         # airspeed beyond the inertial one gives the gust along the path, the accelerometers the two across
         gust = np.linalg.inv(np.vstack([[1.0, 0.0, 0.0], model.F_gust[1:]]))

@@ -10,13 +10,13 @@ Feedback knows the gust as the flight control thinks of it, dg/dt = -(V/L) g + n
 
     u = -K x - K_z z - K_g g,     K = R^-1 B' P,     P of the algebraic Riccati equation                   (2)
 
-Following has its own tolerances. The command is a velocity c and its rate, dc/dt = a, da/dt = -lambda a + noise, and
-what is minimised is y - c:
+Following has its own tolerances. The command is a velocity c with its rate a and its jerk j, as of something that
+swings about a velocity of its own: dc/dt = a, da/dt = j, dj/dt = -w^2 a - 2 zeta w j + noise. Minimised is y - c:
 
-    u = -K_m (x, z) - K_c (c, a),     A_m' P_c + P_c S + P E = C' Q (1, 0),     A_m = A - B K_m             (3)
+    u = -K_m (x, z) - K_c (c, a, j),     A_m' P_c + P_c S + P E = C' Q (1, 0, 0),     A_m = A - B K_m       (3)
 
-with S the equation of (c, a), E the way of c into z. What nose, wing and tail each do for the tip is left to Eq. (3):
-slowly the aircraft translates by bank and angle of attack, fast it points its nose.
+with S the equation of (c, a, j), E the way of c into z. What nose, wing and tail each do for the tip is left to
+Eq. (3): slowly the aircraft translates by bank and angle of attack, fast it points its nose.
 Source: Anderson & Moore, Optimal Control: Linear Quadratic Methods, chapter 4 (tracking a reference with a model).
 """
 
@@ -45,13 +45,21 @@ class Tolerances:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Swing:
+    """How a command is expected to go on, Eq. (3)."""
+
+    frequency_rad_s: Array  #: (3,) w: forward, left, up
+    damping: Array  #: (3,) zeta
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Gains:
     """Eqs. (1) to (3)."""
 
     C: Array  #: (3, 13)
     K: Array  #: (4, 19) on x, z, g
     K_followed: Array  #: (4, 16) on x, z of the model that is followed
-    K_command: Array  #: (4, 6) on c, a
+    K_command: Array  #: (4, 9) on c, a, j
 
 
 def tip_velocity(R_trim: Array, point_B: Array) -> Array:
@@ -62,7 +70,7 @@ def tip_velocity(R_trim: Array, point_B: Array) -> Array:
 
 
 def design(
-    model: LinearModel, C: Array, feedback: Tolerances, following: Tolerances, gust_1_s: float, command_1_s: Array
+    model: LinearModel, C: Array, feedback: Tolerances, following: Tolerances, gust_1_s: float, swing: Swing
 ) -> Gains:
     """Gains for a linear model.
 
@@ -72,7 +80,7 @@ def design(
         feedback: weights against gusts and errors of the model.
         following: weights of the flight to be flown.
         gust_1_s: V/L of the gusts expected [1/s].
-        command_1_s: (3,) lambda, how fast accelerations asked for change [1/s].
+        swing: how commands are expected to go on.
     """
     A, B = _with_integral(model, C)
     A_gust = np.zeros((STATES + 6, STATES + 6))
@@ -80,7 +88,7 @@ def design(
     B_gust = np.vstack([B, np.zeros((3, INPUTS))])
     K, _ = _riccati(A_gust, B_gust, C, feedback)
     K_followed, P = _riccati(A, B, C, following)
-    K_command = _feed_forward(A - B @ K_followed, B, C, P, following, command_1_s)
+    K_command = _feed_forward(A - B @ K_followed, B, C, P, following, swing)
     return Gains(C=C, K=K, K_followed=K_followed, K_command=K_command)
 
 
@@ -106,10 +114,11 @@ def _input_weights(t: Tolerances) -> Array:
     return np.diag(np.append(t.surfaces_rad, t.thrust_m_s2) ** -2.0)
 
 
-def _feed_forward(A_m: Array, B: Array, C: Array, P: Array, t: Tolerances, command_1_s: Array) -> Array:
-    """(4, 6) K_c of Eq. (3)."""
-    S, E, right = np.zeros((6, 6)), np.zeros((FOLLOWED, 6)), np.zeros((FOLLOWED, 6))
-    S[:3, 3:], S[3:, 3:] = np.eye(3), -np.diag(command_1_s)
+def _feed_forward(A_m: Array, B: Array, C: Array, P: Array, t: Tolerances, swing: Swing) -> Array:
+    """(4, 9) K_c of Eq. (3)."""
+    S, E, right = np.zeros((9, 9)), np.zeros((FOLLOWED, 9)), np.zeros((FOLLOWED, 9))
+    w = swing.frequency_rad_s
+    S[:6, 3:], S[6:, 3:6], S[6:, 6:] = np.eye(6), -np.diag(w * w), -np.diag(2.0 * swing.damping * w)
     E[_Z, :3] = -np.eye(3)
     right[:STATES, :3] = C.T @ np.diag(t.velocity_m_s**-2.0)
     P_c = solve_sylvester(A_m.T, S, right - P @ E)

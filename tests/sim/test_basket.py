@@ -19,7 +19,7 @@ def test_tip_anywhere_in_the_bore_at_the_coupling_point_is_near_enough_to_latch(
 
 
 def test_tip_anywhere_at_the_bottom_of_the_bore_is_near_enough_to_latch():
-    """A nozzle that rests there in line is held: one that came in at an angle gets there before the drogue is in line."""
+    """A nozzle that came in at an angle gets there before the drogue is in line, and has to be held once it is."""
     aside = COUPLING.socket_radius_m - COUPLING.probe_tip_radius_m
     assert np.hypot(aside, COUPLING.stop_gap_m) < COUPLING.capture_distance_m
 

@@ -73,7 +73,7 @@ def test_basket_leads_a_probe_that_comes_in_beside_the_centre_to_the_coupling(ma
 
 @pytest.mark.parametrize("direction_deg", np.arange(0.0, 360.0, 45.0))
 def test_basket_leads_a_fast_probe_to_the_coupling_from_any_side(make_world, receiver_on_rails, direction_deg):
-    """Just under the limit of the closing speed: the blow turns the drogue, and it is taken once it is in line again."""
+    """Just under the limit of the closing speed: the blow turns the drogue, which takes it once it is in line again."""
     angle = np.radians(direction_deg)
     aside = {"y": 0.15 * float(np.cos(angle)), "z": 0.15 * float(np.sin(angle))}
     _, truth, touched = _fly_in(make_world, receiver_on_rails, speed=2.5, **aside)

@@ -24,7 +24,7 @@ def schedule() -> GainSchedule:
         feedback=PARAMETERS.tolerances,
         following=PARAMETERS.following_tolerances,
         gust_1_s=0.34,
-        command_1_s=PARAMETERS.command_rate_1_s,
+        swing=PARAMETERS.swing,
     )
     return GainSchedule(AIRFRAME, AIR, level_trim(AIRFRAME, 180.0, AIR), wanted)
 

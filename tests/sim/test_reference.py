@@ -54,3 +54,16 @@ def test_reference_shortens_a_command_beyond_the_velocity_limit() -> None:
     chain = fly_reference(lambda t: command, 10.0)
     assert chain[-1, 0, 1] == pytest.approx(PARAMETERS.velocity_limit_m_s, rel=1e-3)
     assert chain[:, 0, 1].max() < 1.02 * PARAMETERS.velocity_limit_m_s
+
+
+@pytest.mark.parametrize(("share", "left"), [(0.5, 1.0), (1.5, 0.5), (2.5, 0.0)])
+def test_reference_takes_back_the_acceleration_to_the_side_as_the_bank_grows(share: float, left: float) -> None:
+    """All of it up to the first bank of the sheet, half of it midway to the second, none beyond; up it stays."""
+    limits = PARAMETERS.reference_limits
+    first, last = limits.bank_rad
+    bank = first * share if share < 1.0 else first + (share - 1.0) * (last - first)
+    reference, command = Reference(limits, 1e-3), ReceiverCommand(velocity_m_s=np.array([0.0, 9.0, 9.0]))
+    reference.start(np.zeros(3), np.eye(3), command)
+    for _ in range(700):
+        chain = reference.step(np.eye(3), command, -bank)
+    np.testing.assert_allclose(chain[1, 1:], limits.acceleration_m_s2[1:] * [left, 1.0], rtol=0.02, atol=1e-12)

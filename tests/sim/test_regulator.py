@@ -31,7 +31,7 @@ def designed(sheet: str, airspeed_m_s: float, altitude_m: float) -> tuple[Linear
     trim = level_trim(airframe, airspeed_m_s, standard_atmosphere(altitude_m))
     model, C = linear_model(airframe, trim), tip_velocity(trim.R_WB, PROBES[sheet])
     gust_1_s = airspeed_m_s / p.gust_length_m
-    return model, design(model, C, p.tolerances, p.following_tolerances, gust_1_s, p.command_rate_1_s)
+    return model, design(model, C, p.tolerances, p.following_tolerances, gust_1_s, p.swing)
 
 
 def loop(model: LinearModel, C: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -109,8 +109,10 @@ def test_feed_forward_is_the_integral_of_what_the_command_will_be() -> None:
     A, B = loop(model, gains.C)
     Q, R = weights(gains.C, p.following_tolerances)
     A_m = A - B @ gains.K_followed
-    S, E, right = np.zeros((6, 6)), np.zeros((FOLLOWED, 6)), np.zeros((FOLLOWED, 6))
-    S[:3, 3:], S[3:, 3:] = np.eye(3), -np.diag(p.command_rate_1_s)
+    S, E, right = np.zeros((9, 9)), np.zeros((FOLLOWED, 9)), np.zeros((FOLLOWED, 9))
+    w, zeta = p.swing.frequency_rad_s, p.swing.damping
+    S[:3, 3:6], S[3:6, 6:] = np.eye(3), np.eye(3)
+    S[6:, 3:6], S[6:, 6:] = -np.diag(w**2), -np.diag(2.0 * zeta * w)
     P = solve_continuous_lyapunov(A_m.T, -Q - gains.K_followed.T @ R @ gains.K_followed)
     E[STATES:, :3] = -np.eye(3)
     right[:STATES, :3] = gains.C.T @ np.diag(p.following_tolerances.velocity_m_s**-2.0)
@@ -136,12 +138,12 @@ def test_model_that_is_followed_swings_its_tip_with_a_drogue(
     """
     model, gains = designed(sheet, airspeed_m_s, altitude_m)
     A, B = loop(model, gains.C)
-    E = np.zeros((FOLLOWED, 6))
+    E = np.zeros((FOLLOWED, 9))
     E[STATES:, :3] = -np.eye(3)
     late_deg = 26.0 if sheet == "airframe_unmanned" else 19.0
     for hertz, gain, phase_deg in ((0.1, 0.04, 9.0), (0.33, 0.18, late_deg)):
         s = 2j * np.pi * hertz
-        way = np.vstack([np.eye(3), s * np.eye(3)])[:, axis]
+        way = np.vstack([np.eye(3), s * np.eye(3), s * s * np.eye(3)])[:, axis]
         x = np.linalg.solve(s * np.eye(FOLLOWED) - A + B @ gains.K_followed, (E - B @ gains.K_command) @ way)
         response = (gains.C @ x[:STATES])[axis]
         assert abs(response) == pytest.approx(1.0, abs=gain)
@@ -152,12 +154,12 @@ def test_slowly_the_aircraft_translates_and_fast_it_points_its_nose() -> None:
     """Centre of gravity's part of a sideways swing of the tip: all at 0.03 Hz, under two thirds at 1 Hz."""
     model, gains = designed("airframe", 180.0, 6000.0)
     A, B = loop(model, gains.C)
-    E = np.zeros((FOLLOWED, 6))
+    E = np.zeros((FOLLOWED, 9))
     E[STATES:, :3] = -np.eye(3)
     part = []
     for hertz in (0.03, 1.0):
         s = 2j * np.pi * hertz
-        way = np.vstack([np.eye(3), s * np.eye(3)])[:, 1]
+        way = np.vstack([np.eye(3), s * np.eye(3), s * s * np.eye(3)])[:, 1]
         x = np.linalg.solve(s * np.eye(FOLLOWED) - A + B @ gains.K_followed, (E - B @ gains.K_command) @ way)
         part.append(abs(x[1] / (gains.C @ x[:STATES])[1]))
     assert part[0] == pytest.approx(1.0, abs=0.02)
@@ -189,7 +191,7 @@ def test_gains_of_a_left_turn_mirror_those_of_a_right_one() -> None:
         trim = steady_trim(airframe, 180.0, air, turn_rate_rad_s=0.025 * sign)
         model, point = linear_model(airframe, trim), np.array([6.0, -0.9 * sign, 0.6])
         C = tip_velocity(trim.R_WB, point)
-        found.append(design(model, C, p.tolerances, p.following_tolerances, 0.34, p.command_rate_1_s).K)
+        found.append(design(model, C, p.tolerances, p.following_tolerances, 0.34, p.swing).K)
     state = np.array([1, -1, 1, -1, 1, -1, -1, 1, -1, 1, -1, -1, 1, 1, -1, 1, 1, -1, 1], dtype=float)
     surfaces = np.array([1.0, -1.0, -1.0, 1.0])
     np.testing.assert_allclose(found[0], surfaces[:, None] * found[1] * state, atol=3e-3 * np.abs(found[0]).max())
