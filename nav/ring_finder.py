@@ -49,7 +49,9 @@ class FewSettings:
     """When single LEDs are named by the belief."""
 
     gate_sigmas: float = 4.0  # along the worst axis: a true LED is missed once in 3000
-    false_names_max: float = 1e-3  # Eq. (1), a frame: one in 20 s at 50 Hz, and then the filter's gate is still to pass
+    false_names_max: float = (
+        5e-3  # Eq. (1), a frame: one in 4 s at 50 Hz, which moves a belief by its own 4 sigma at most
+    )
 
 
 class RingFinder:

@@ -119,10 +119,10 @@ class Accept(Table):
         lines = []
         if self.closure_rate_min is not None:
             low, high = self.closure_speed_min_m_s or 0.0, self.closure_speed_max_m_s or np.inf
-            inside = sum(low <= row["closure_speed_m_s"] <= high for row in contacts)
+            inside = sum(low <= _number(row["closure_speed_m_s"]) <= high for row in contacts)
             lines += _rate(f"contacts at {low:g} to {high:g} m/s", inside, len(contacts), self.closure_rate_min)
         if self.radial_offset_median_max_m is not None and contacts:
-            median_m = float(np.median([row["radial_offset_m"] for row in contacts]))
+            median_m = float(np.median([_number(row["radial_offset_m"]) for row in contacts]))
             if not median_m <= self.radial_offset_median_max_m:
                 wanted = self.radial_offset_median_max_m
                 lines.append(f"median radial offset {median_m:.3f} m, wanted at most {wanted:g}")
@@ -132,9 +132,10 @@ class Accept(Table):
         """Hold every flight against what one flight must show."""
         short = []
         for row in rows:
-            contact = row["outcome"] == "contact"
-            offset, speed = (row["radial_offset_m"], row["closure_speed_m_s"]) if contact else (None, None)
-            if row["error"] or self.shortfalls(row["outcome"], offset, speed):
+            offset_m = speed_m_s = None
+            if row["outcome"] == "contact":
+                offset_m, speed_m_s = _number(row["radial_offset_m"]), _number(row["closure_speed_m_s"])
+            if row["error"] or self.shortfalls(row["outcome"], offset_m, speed_m_s):
                 short.append(row["seed"])
         return [f"{len(short)} of {len(rows)} flights fall short: {_some(short)}"] if short else []
 
@@ -169,6 +170,11 @@ def _rate(label: str, count: int, of: int, wanted: float | None) -> list[str]:
     if wanted is None or (of > 0 and count >= wanted * of):
         return []
     return [f"{label} {count} of {of}, wanted at least {100.0 * wanted:g} %"]
+
+
+def _number(value: float | None) -> float:
+    """A figure of a contact; what could not be measured is inside no limit."""
+    return float("nan") if value is None else value
 
 
 def _some(seeds: Sequence[int]) -> str:

@@ -49,6 +49,7 @@ from dockair.streams import random_stream
 
 SETTLE_S = 12.0  # hose and gusts run this long before the flight: several periods of the drogue's swing
 ATTEMPT_S = 15.0  # before a flight's time is over: an approach begun then still ends, with the probe clear again
+COMMANDED = 0.95  # of the accelerations that the flight control flies: what it cut off would be missing in guidance
 STAND_OFF_M = 4.0  # pre-contact: procedures say 3-5 m behind the drogue
 SUN_OVERHEAD = np.array([0.0, 0.0, 1.0])  # lights the scene of a scenario without Sun
 
@@ -145,6 +146,7 @@ def build(scenario: Scenario, seed: int) -> Parts:
         recipe = None
         navigator: Navigates = TruthNavigator(sheets, guidance_settings(scenario))
     else:
+        _check_camera_rate(scenario.rates.camera_hz, as_built.camera, camera_sheets(scenario))
         measured = scenario.camera.sensing == "measurements"
         camera = (measured_leds if measured else _camera)(scenario, seed, as_built, faults, world)
         recipe = _recipe(scenario, sheets)
@@ -178,6 +180,8 @@ def guidance_settings(scenario: Scenario) -> GuidanceSettings:
     bow_wave = load_parameters("bow_wave", BowWaveParameters)
     source_B = bow_wave_coefficients(bow_wave, mounting.probe_tip_m, scenario.flight.airspeed_m_s)[:3]
     x, y, z = (float(value) for value in source_B - mounting.probe_tip_m)
+    control = load_parameters(scenario.hardware.receiver_sheet("flight_control"), FlightControlParameters)
+    forward, left, up = (COMMANDED * float(limit) for limit in control.acceleration_limit_m_s2)
     limits = PhaseLimits(
         attempts_max=g.attempts_max,
         slot_s=max(scenario.flight.duration_s - ATTEMPT_S, 0.5 * scenario.flight.duration_s),
@@ -190,6 +194,7 @@ def guidance_settings(scenario: Scenario) -> GuidanceSettings:
         controller=g.controller,
         stand_off_m=STAND_OFF_M,
         closure_speed_m_s=g.closure_speed_m_s,
+        acceleration_limit_m_s2=(forward, left, up),
         bow_wave=BowWavePush(source_from_tip_m=(x, y, z), radius_m=bow_wave.radius_m),
         limits=limits,
     )
@@ -264,7 +269,6 @@ def _as_built(scenario: Scenario, seed: int, sheets: NavigationSheets) -> AsBuil
 
 def _camera(scenario: Scenario, seed: int, as_built: AsBuilt, faults: Faults, world: World) -> NearInfraredCamera:
     table, weather, sheets = scenario.camera, scenario.weather, camera_sheets(scenario)
-    _check_camera_rate(scenario.rates.camera_hz, as_built.camera, sheets)
     return NearInfraredCamera(
         sheets,
         as_built,

@@ -41,6 +41,20 @@ class _Begun(NamedTuple):
     least_s: float  #: it cannot arrive before
 
 
+class _Failed(NamedTuple):
+    """An error's parts: errors with arguments of their own cannot go through a pipe whole."""
+
+    kind: type[Exception]
+    arguments: tuple[Any, ...]
+    fields: dict[str, Any]
+
+    def error(self) -> Exception:
+        """Put it together again."""
+        made = self.kind.__new__(self.kind, *self.arguments)
+        made.__dict__.update(self.fields)
+        return made
+
+
 class _Slot:
     """Memory that both processes see."""
 
@@ -113,8 +127,8 @@ class OverlappedExposures:
             answer = self._pipe.recv()
         except (EOFError, OSError) as error:
             raise self._lost() from error
-        if isinstance(answer, BaseException):
-            raise answer
+        if isinstance(answer, _Failed):
+            raise answer.error()
         if answer is not None:
             frame = _frame_of(answer, self._slots[begun.slot].pixels)
             self._in_transfer.append((begun.time_s + self._camera.latency_s(frame, begun.jitter_s), frame))
@@ -153,7 +167,7 @@ def _serve(camera: NearInfraredCamera, slots: list[_Slot], pipe: Connection, fli
             try:
                 answer: Any = _exposed(camera, slots[slot], time_s, number, window)
             except Exception as error:  # the flight's to handle, whatever it is
-                answer = error
+                answer = _Failed(type(error), error.args, error.__dict__)
             pipe.send(answer)
 
 

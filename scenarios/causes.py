@@ -1,8 +1,9 @@
 """Why an attempt did not end in a good contact: one cause by stated rules, from the truth beside what was believed.
 
-Where the attempt was decided (the tip in the ring's plane, or its closest approach) the ring is off the probe's line by
-m, body axes across. With d as the navigation believed it and s the place at which the ring would have been, had it gone
-on for the response time tau as it moved before, at that velocity and acceleration,
+Where the attempt was decided (the tip in the ring's plane, or its closest approach; of one called off, where in its
+last second the ring was farthest off) the ring is off the probe's line by m, body axes across. With d as the navigation
+believed it and s the place at which the ring would have been, had it gone on for the response time tau as it moved
+before, at that velocity and acceleration,
 
     m = (m - d) + (m - s) + rest,        share = part . m / |m|                                            (1)
 
@@ -18,7 +19,7 @@ not flown. The largest share names the cause. Rules, the first that holds:
 | outside_limits   | the tip entered the basket inside the capture radius and was held, too fast or at too wide an    |
 |                  | angle                                                                                            |
 | not_held         | the same, and was not held                                                                       |
-| called_off       | the navigation went back although the ring was inside the capture radius                         |
+| called_off       | the navigation went back although the ring was inside the capture radius for all of that second  |
 | ambiguity        | share of navigation the largest, and the believed attitude was the mirrored one or rolled by     |
 |                  | more than half an LED's spacing for half of the last second                                      |
 | navigation_error | share of navigation the largest, otherwise                                                       |
@@ -154,11 +155,13 @@ def _cause(attempt: Attempt, flown: Flown, rules: CauseRules) -> str:
         return "out_of_time"
     called_off = attempt.outcome in (AttemptOutcome.GIVEN_UP.value, AttemptOutcome.BREAKAWAY.value)
     k = flown.tick_at(attempt.ended_s if called_off else attempt.decided_s)
-    last = flown.solutions[max(k + 1 - _ticks(rules.look_back_s, flown), 0) : k + 1]
-    if np.mean([solution.valid for solution in last]) <= rules.for_half:
+    last = range(max(k + 1 - _ticks(rules.look_back_s, flown), 0), k + 1)
+    if np.mean([flown.solutions[i].valid for i in last]) <= rules.for_half:
         return "detection"
-    if np.mean([solution.contact_usable for solution in last]) <= rules.for_half:
+    if np.mean([flown.solutions[i].contact_usable for i in last]) <= rules.for_half:
         return "integrity"
+    if called_off:
+        k = max(last, key=lambda i: float(np.linalg.norm(flown.truths[i].p_PD_B[1:])))
     miss = flown.truths[k].p_PD_B[1:]
     if np.linalg.norm(miss) <= rules.limits.radial_offset_m:
         if attempt.outcome == AttemptOutcome.CONTACT.value:

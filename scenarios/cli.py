@@ -21,6 +21,7 @@ from dockair.scenarios.allan_command import allan
 from dockair.scenarios.campaign_command import campaign
 from dockair.scenarios.cli_options import Json, ScenarioName, Seed, Settings, overrides, print_json
 from dockair.scenarios.design_ring_command import design_ring
+from dockair.scenarios.report_command import report
 
 if TYPE_CHECKING:
     from dockair.scenarios.schema import Scenario
@@ -208,6 +209,7 @@ def bench(
 app.command("design-ring")(design_ring)
 app.command()(allan)
 app.command()(campaign)
+app.command()(report)
 
 
 @app.command()

@@ -1,10 +1,14 @@
 """An episode in the rerun viewer while it is flown: scene, belief, plots, as in a recorded one."""
 
+import shutil
+import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from dockair.errors import MachineError
 from dockair.messages import CameraFrame
 from dockair.scenarios.flight_log import FlightLog
 from dockair.scenarios.loop import Flight, Tick
@@ -53,11 +57,11 @@ class LiveViewer:
         self._episode += 1
         name = f"{flight.scenario.name}, episode {self._episode}"
         self._recording = rr.RecordingStream("dockair", recording_id=name, send_properties=False)
+        self._recording.set_log_time_enabled(False)  # the timelines are the flight's
         self._sink(self._recording)
         self._recording.send_blueprint(blueprint(flight.sheets.camera))
         log = FlightLog()
-        tick_truth = flight.truth
-        log.truths.append(tick_truth)
+        log.truths.append(flight.truth)
         log_scene(self._recording, log, [], flight.sheets, shapes_of(flight.world.model))
 
     def _log_frame(self, frame: Any) -> None:
@@ -70,4 +74,10 @@ class LiveViewer:
 
 
 def _spawned(recording: Any) -> None:
-    recording.spawn()
+    """Send a recording to the viewer that is open, or open one: the program stands beside this Python."""
+    import rerun as rr
+
+    beside = shutil.which("rerun", path=str(Path(sys.executable).parent)) or shutil.which("rerun")
+    if beside is None:
+        raise MachineError("render_mode", expected="the rerun viewer", remedy="install rerun-sdk")
+    rr.spawn(executable_path=beside, recording=recording)

@@ -132,6 +132,9 @@ class CameraFault:
     exposure_s: float | None = None  #: the exposure it is stuck at
 
 
+_SOUND = CameraFault()
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ImuFault:
     """What is wrong with the IMU at one time; as it is by default, nothing."""
@@ -188,6 +191,8 @@ class Faults:
 
     def camera(self, time_s: float) -> CameraFault:
         """What is wrong with the camera at a time."""
+        if not self._faults:
+            return _SOUND
         clear = math.prod(1.0 - fault.cover for fault in self._acting(DirtyWindow, time_s))
         exposures = sorted(self._acting(ExposureStuck, time_s), key=lambda fault: fault.start_s)
         return CameraFault(

@@ -139,7 +139,8 @@ class Imu:
             limit = np.inf if fault.range_rad_s is None else fault.range_rad_s
             rates = self._gyros.sense(w, f, fault.bias_rad_s, limit)
         forces = self._accelerometers.sense(f, w)
-        stamp_s = time_s + float(self._jitter(1)[0])
+        limit_s = _JITTER_LIMIT / self._rate_hz
+        stamp_s = time_s + min(max(self._jitter_s * self._clock_rng.standard_normal(), -limit_s), limit_s)
         if fault is not None and fault.dropped:
             return None
         return ImuSample(time_stamp_s=stamp_s, angular_rate_rad_s=rates[0], specific_force_m_s2=forces[0])
@@ -239,7 +240,7 @@ def _accelerometer_sheet(p: ImuParameters) -> TriadParameters:
 
 
 def _row(vector: Array) -> Array:
-    return _contiguous(vector).reshape(1, 3)
+    return np.array(vector, dtype=float, order="C", ndmin=2)
 
 
 def _rows(motion: Array | None, part: slice, still: Array) -> Array:

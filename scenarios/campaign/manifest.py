@@ -18,7 +18,6 @@ import dockair
 from dockair.errors import DockairError
 from dockair.scenarios.campaign.jobs import Job
 from dockair.scenarios.campaign.plan import Plan
-from dockair.scenarios.campaign.row import sensing_of
 from dockair.scenarios.campaign.whole_file import write_whole
 from dockair.scenarios.metrics import versions
 
@@ -151,7 +150,7 @@ def _background(jobs: Sequence[Job]) -> str:
     from dockair.scenarios.doctor import require_rendering
     from dockair.sim.opengl import available_backend
 
-    wanted = {job.scenario.camera.background for job in jobs if sensing_of(job.scenario) == "camera"}
+    wanted = {job.scenario.camera.background for job in jobs if job.scenario.sensing == "camera"}
     if "mujoco" in wanted:
         require_rendering()
     return available_backend() if "auto" in wanted else ""

@@ -23,6 +23,7 @@ from dockair.scenarios.campaign.jobs import Job
 from dockair.scenarios.campaign.worker import FLIGHT, READY, Answer, Order, work
 
 DEATHS_OF_A_JOB = 2
+FLIGHTS_OF_A_PROCESS = 25  # then another begins: what libraries do not give back of the memory, the system takes
 _START_S = 300.0  # for a process to import what it needs, however slow the disk
 _TICK_S = 0.5  # between two looks at the clock
 _LEAVE_S = 5.0  # for an idle process to end by itself
@@ -50,7 +51,7 @@ class _Worker:
         self.process.start()
         theirs.close()  # so that its death is the end of the file here
         self.job: Job | None = None
-        self.begun_s, self._ready = 0.0, False
+        self.begun_s, self.flown, self._ready = 0.0, 0, False
 
     def take(self, job: Job) -> None:
         self.job, self.begun_s = job, time.monotonic()
@@ -151,17 +152,19 @@ class Pool:
         except EOFError:
             return self._dead(worker, job, waiting)
         if answer is not None:
-            worker.job = None
+            worker.job, worker.flown = None, worker.flown + 1
+            if worker.flown >= FLIGHTS_OF_A_PROCESS:
+                self._dismiss(worker, at_once=False)
             return Done(job, answer)
         if not worker.is_late(self._timeout_s):
             return None
-        self._dismiss(worker)
+        self._dismiss(worker, at_once=True)
         error = f"no result within {self._timeout_s:g} s"
         return Done(job, Answer(columns=None, error=error, wall_time_s=self._timeout_s))
 
     def _dead(self, worker: _Worker, job: Job, waiting: deque[Job]) -> Done | None:
         wall_time_s = time.monotonic() - worker.begun_s
-        self._dismiss(worker)
+        self._dismiss(worker, at_once=True)
         self._deaths[job.number] += 1
         if self._deaths[job.number] < DEATHS_OF_A_JOB:
             waiting.appendleft(job)
@@ -169,8 +172,8 @@ class Pool:
         error = _how_it_died(worker.process.exitcode)
         return Done(job, Answer(columns=None, error=error, wall_time_s=wall_time_s))
 
-    def _dismiss(self, worker: _Worker) -> None:
-        worker.end(at_once=True)
+    def _dismiss(self, worker: _Worker, *, at_once: bool) -> None:
+        worker.end(at_once=at_once)
         self._workers.remove(worker)
 
 

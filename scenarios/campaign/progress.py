@@ -10,7 +10,6 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 from rich.table import Table
 
 from dockair.scenarios.campaign.jobs import Job
-from dockair.scenarios.campaign.row import sensing_of
 from dockair.scenarios.statistics import wilson_interval
 
 _LINE_INTERVAL_S = 30.0  # between two lines where stderr is no terminal
@@ -54,7 +53,7 @@ class CampaignProgress:
         """Take the jobs, and the journal's entries of those that are done."""
         self._total = len(jobs)
         for job in jobs:
-            key = (job.scenario.name, sensing_of(job.scenario))
+            key = (job.scenario.name, job.scenario.sensing)
             if key not in self._tasks:
                 self._counts[key] = [0, 0]
                 self._tasks[key] = self._bars.add_task(f"{key[0]} ({key[1]})", total=0, said="")

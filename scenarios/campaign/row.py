@@ -11,7 +11,6 @@ from typing import Any
 from dockair.scenarios.campaign.jobs import Job
 from dockair.scenarios.campaign.worker import Answer
 from dockair.scenarios.metrics import NavigationFigures, Result
-from dockair.scenarios.schema import Scenario
 
 Row = dict[str, Any]
 
@@ -20,6 +19,7 @@ SET = "set."  #: begins the column of a key that the plan draws
 
 _ASKED = ("scenario", "seed", "sensing", "navigator", "controller")
 _CONTACT = {"contact_time_s": "time_s"} | {k: k for k in ("radial_offset_m", "closure_speed_m_s", "angle_deg")}
+_SAME = tuple("outcome attempts first_attempt success cause fuel_kg collided_with frames duration_s background".split())
 #: Fields of the result that are lists of objects: JSON in the table.
 _LISTS = tuple(f.name for f in fields(Result) if f.name in ("attempt_log", "nav_by_range", "timeline"))
 
@@ -40,13 +40,8 @@ COLUMNS: dict[str, str] = (
 def columns_of(result: Result) -> Row:
     """Return the columns that a flight's result fills."""
     table = result.to_dict()
-    unsafe = "; ".join(result.unsafe)
-    contact, log = table["contact"] or {}, table["attempt_log"]
-    row: Row = {"outcome": result.outcome, "attempts": result.attempts, "unsafe": unsafe, "cause": result.cause}
-    row["success"] = result.outcome == "contact" and not unsafe
-    row["first_attempt"] = bool(row["success"] and log and log[0]["outcome"] == "contact")
-    row |= {name: contact.get(key) for name, key in _CONTACT.items()}
-    row |= {name: table[name] for name in ("fuel_kg", "collided_with", "frames", "duration_s", "background")}
+    row: Row = {name: table[name] for name in _SAME} | {"unsafe": "; ".join(result.unsafe)}
+    row |= {name: (table["contact"] or {}).get(key) for name, key in _CONTACT.items()}
     row |= {f"nav_{key}": value for key, value in table["nav"].items()}
     row |= {name: json.dumps(table[name], allow_nan=False) for name in _LISTS}
     return row
@@ -62,16 +57,9 @@ def row_of(job: Job, answer: Answer) -> Row:
 def _asked(job: Job) -> Row:
     scenario = job.scenario
     row: Row = {"scenario": scenario.name, "seed": job.seed, "scenario_hash": job.scenario_hash}
-    row |= {"sensing": sensing_of(scenario), "navigator": scenario.navigation.navigator}
-    row["controller"] = getattr(scenario.guidance, "controller", "predictive")
+    row |= {"sensing": scenario.sensing, "navigator": scenario.navigation.navigator}
+    row["controller"] = scenario.guidance.controller
     return row | {f"{SET}{key}": value for key, value in job.drawn.items()}
-
-
-def sensing_of(scenario: Scenario) -> str:
-    """Return what the navigation of a scenario sees: "truth", "measurements" or "camera"."""
-    if scenario.navigation.is_truth:
-        return "truth"
-    return "measurements" if scenario.camera.sensing == "measurements" else "camera"
 
 
 def column_names(rows: Sequence[Mapping[str, Any]]) -> list[str]:

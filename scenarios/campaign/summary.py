@@ -9,7 +9,6 @@ import numpy as np
 from dockair.rotations import Array
 from dockair.scenarios.accept import Accept
 from dockair.scenarios.campaign.jobs import Job
-from dockair.scenarios.campaign.row import sensing_of
 from dockair.scenarios.report.groups import Group, Share, groups_of
 
 
@@ -20,7 +19,9 @@ def summary_of(rows: Sequence[Mapping[str, Any]], jobs: Sequence[Job]) -> list[d
         rows: of all flights.
         jobs: likewise; their scenarios say what is claimed, where the plan changes nothing of them.
     """
-    claims = {(job.scenario.name, sensing_of(job.scenario)): job.scenario.accept for job in jobs if job.as_written}
+    claims: dict[tuple[str, str], Accept] = {
+        (job.scenario.name, job.scenario.sensing): job.scenario.accept for job in jobs if job.as_written
+    }
     return [_group(group, claims.get((group.scenario, group.sensing))) for group in groups_of(rows)]
 
 

@@ -1,5 +1,6 @@
 """The rows as Parquet: the same rows make the same bytes."""
 
+import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -19,7 +20,10 @@ def write_table(rows: Sequence[Mapping[str, Any]], folder: Path) -> Path:
     columns = {}
     for name in column_names(rows):
         values = [row.get(name) for row in rows]
-        columns[name] = pa.array(values, kinds[COLUMNS.get(name) or _kind(values)])
+        kind = COLUMNS.get(name) or _kind(values)
+        if kind == "text":
+            values = [value if value is None or isinstance(value, str) else json.dumps(value) for value in values]
+        columns[name] = pa.array(values, kinds[kind])
     data = pa.BufferOutputStream()
     pq.write_table(pa.table(columns), data, compression="ZSTD")
     write_whole(folder / FILE_NAME, data.getvalue().to_pybytes())

@@ -32,7 +32,7 @@ _SOURCE = "linear prediction of the flight control's own design; gusts of MIL-F-
 _AIRSPEED_M_S, _ALTITUDE_M, _STEP_S, _SEED = 180.0, 6000.0, 2e-3, 6
 _AXES = ("forward", "left", "up")
 _SWINGS_HZ, _SWING_M_S = (0.1, 0.2, 0.33, 0.5, 0.7, 1.0), 0.4
-_SHARE_OF_LIMIT = 0.6  # of the reference's acceleration: swings stay linear
+_SHARE_OF_LIMIT = 0.6  # of the reference's acceleration and jerk: swings stay linear
 _STEP_M_S, _STEP_TIME_S, _GUST_TIME_S = 1.0, 6.0, 22.0
 _SIZE_IN, _DPI = (11.0, 8.0), 110
 
@@ -114,8 +114,9 @@ def swing_response(axis: int, hertz: float) -> complex:
     """The tip's velocity over the command's, both as complex amplitudes."""
     receiver, probe_B = make_receiver()
     w, e = 2.0 * np.pi * hertz, np.eye(3)[axis]
-    limit = load_parameters("flight_control", FlightControlParameters).acceleration_limit_m_s2[axis]
-    size = min(_SWING_M_S, _SHARE_OF_LIMIT * float(limit) / w)
+    limits = load_parameters("flight_control", FlightControlParameters).reference_limits
+    most = min(float(limits.acceleration_m_s2[axis]) / w, float(limits.jerk_m_s3[axis]) / w**2)
+    size = min(_SWING_M_S, _SHARE_OF_LIMIT * most)
 
     def command(t: float) -> ReceiverCommand:
         rate = size * w * np.cos(w * t)
@@ -136,9 +137,9 @@ def predicted_swing(axis: int, hertz: float) -> complex:
     model, gains = control.schedule.model, control.schedule.gains
     p = load_parameters("flight_control", FlightControlParameters)
     n, s = len(model.A), 2j * np.pi * hertz
-    A, B, E = np.zeros((n + 3, n + 3)), np.zeros((n + 3, 4)), np.zeros((n + 3, 6))
+    A, B, E = np.zeros((n + 3, n + 3)), np.zeros((n + 3, 4)), np.zeros((n + 3, 9))
     A[:n, :n], A[n:, :n], B[:n], E[n:, :3] = model.A, gains.C, model.B, -np.eye(3)
-    way = np.vstack([np.eye(3), s * np.eye(3)])[:, axis]
+    way = np.vstack([np.eye(3), s * np.eye(3), s * s * np.eye(3)])[:, axis]
     x = np.linalg.solve(s * np.eye(n + 3) - A + B @ gains.K_followed, (E - B @ gains.K_command) @ way)
     b, zeta = p.smoothing_bandwidth_rad_s, p.smoothing_damping
     return complex((gains.C @ x[:n])[axis] * b * b / (s * s + 2.0 * zeta * b * s + b * b))

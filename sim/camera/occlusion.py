@@ -65,6 +65,15 @@ def is_clear(obstacles: Obstacles, data: mujoco.MjData, p_W: Array, direction_W:
     return bool(hit < 0.0 or hit >= distance_m)
 
 
+def rays_are_clear(
+    obstacles: Obstacles, data: mujoco.MjData, starts_W: Array, directions_W: Array, distances_m: Array
+) -> NDArray[np.bool_]:
+    """(n,) `is_clear` of many rays, each from a start of its own (n, 3)."""
+    out = np.empty(len(starts_W), dtype=np.bool_)
+    _clear_rays(obstacles, data.geom_xpos, data.geom_xmat, starts_W, directions_W, distances_m, out)
+    return out
+
+
 def hidden(
     obstacles: Obstacles, data: mujoco.MjData, p_WC: Array, targets_W: Array, clearance_m: float
 ) -> NDArray[np.bool_]:
@@ -96,6 +105,24 @@ def first_hits(obstacles: Obstacles, data: mujoco.MjData, p_W: Array, directions
     _cast_at_meshes(obstacles.meshes, data.geom_xpos, data.geom_xmat, p_W, directions, out)
     out[out == reach] = -1.0
     return out
+
+
+@njit(cache=True)
+def _clear_rays(
+    obstacles: Obstacles,
+    xpos: Array,
+    xmat: Array,
+    starts: Array,
+    directions: Array,
+    distances: Array,
+    out: NDArray[np.bool_],
+) -> None:
+    """Fill (n,) whether no surface is nearer to a start than its distance."""
+    for i in range(len(starts)):
+        nearest = np.full(1, distances[i])
+        _cast(obstacles, xpos, xmat, starts[i], directions[i : i + 1], nearest)
+        _cast_at_meshes(obstacles.meshes, xpos, xmat, starts[i], directions[i : i + 1], nearest)
+        out[i] = nearest[0] >= distances[i]
 
 
 @njit(cache=True)

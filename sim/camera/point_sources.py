@@ -22,10 +22,10 @@ from numpy.typing import NDArray
 from dockair.rotations import Array
 from dockair.sim.as_built import AsBuilt
 from dockair.sim.camera.glints import glint_rows, starts_of_seen
-from dockair.sim.camera.led_reflections import is_lit, led_reflection_rows
+from dockair.sim.camera.led_reflections import led_reflection_rows
 from dockair.sim.camera.lobes import ROW
 from dockair.sim.camera.mirrors import Mirrors, Vector
-from dockair.sim.camera.occlusion import Obstacles, hidden, is_clear
+from dockair.sim.camera.occlusion import Obstacles, hidden, rays_are_clear
 from dockair.sim.camera.radiometry import Responses, led_electrons
 from dockair.sim.camera.sun_view import SunView
 
@@ -124,8 +124,9 @@ class PointSources:
         """(k,) whether the lens sees these of the candidates, and their light reaches them."""
         patches, leds_W = candidates.patches_W[which], candidates.patches_W[: self._count, :3]
         seen, starts = starts_of_seen(self._obstacles, data, p_WC, patches)
-        for k in np.flatnonzero(seen & (which >= self._count)):
-            seen[k] = self._is_lit(data, starts[k], patches[k, 9], leds_W)
+        mirrors = np.flatnonzero(seen & (which >= self._count))
+        if len(mirrors) > 0:
+            seen[mirrors] = self._are_lit(data, starts[mirrors], patches[mirrors, 9], leds_W)
         return seen
 
     def leds_W(self, data: mujoco.MjData) -> Array:
@@ -171,12 +172,16 @@ class PointSources:
             np.concatenate([points, glints[:, 7]]),
         )
 
-    def _is_lit(self, data: mujoco.MjData, start: Array, light: float, leds_W: Array) -> bool:
-        """Whether the way from a place (3,) to the Sun, or to an LED, is clear."""
-        if light == _SUN:
-            assert self._sun is not None
-            return is_clear(self._obstacles, data, start, self._sun.direction_W, np.inf)
-        return is_lit(self._obstacles, data, start, leds_W[int(light)], self._sheets.surfaces.led_seat_m)
+    def _are_lit(self, data: mujoco.MjData, starts: Array, lights: Array, leds_W: Array) -> NDArray[np.bool_]:
+        """(n,) whether the way from places (n, 3) to the Sun, or to an LED up to its seat, is clear."""
+        rays, reach = leds_W[lights.astype(np.int64)] - starts, np.full(len(starts), np.inf)  # the Sun's are put right
+        distances = np.sqrt(np.einsum("ij,ij->i", rays, rays))
+        rays /= distances[:, None]
+        of_leds = lights != _SUN
+        reach[of_leds] = distances[of_leds] - self._sheets.surfaces.led_seat_m
+        if self._sun is not None:
+            rays[~of_leds] = self._sun.direction_W
+        return rays_are_clear(self._obstacles, data, starts, rays, reach)
 
     def _ways_C(
         self, data: mujoco.MjData, pose: tuple[Array, Array], p_C: Array, count: int, exposure_s: float

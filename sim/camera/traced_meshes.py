@@ -199,10 +199,9 @@ def _draw_triangle(
         if left >= right:
             continue
         air = extinction, airlight, _F(1.0 + at * at), closest
-        edges = _line(e[0], at), _line(e[1], at), _line(e[2], at)
+        lines = _line(e[0], at), _line(e[1], at), _line(e[2], at), _line(total, at), _line(bright, at)
         right = min(left + (right - left + _LANES - 1) // _LANES * _LANES, x[2])
-        part, picture, depths = tangents[left:right], out[line, left:right], nearest[line, left:right]
-        _draw_row(edges, _line(total, at), _line(bright, at), solid, air, part, picture, depths)
+        _draw_row(lines, solid, air, tangents, out, nearest, (np.uint64(line), np.uint64(left), np.uint64(right)))
 
 
 @njit(cache=True)
@@ -264,27 +263,28 @@ def _line(e: Vector, y: float) -> Line:
 
 @njit(cache=True, error_model="numpy")
 def _draw_row(
-    edges: tuple[Line, Line, Line],
-    total: Line,
-    bright: Line,
+    lines: tuple[Line, Line, Line, Line, Line],
     volume: np.float32,
     air: Air,
     x: Row,
-    out: Row,
-    nearest: Row,
+    out: NDArray[np.float32],
+    nearest: NDArray[np.float32],
+    where: tuple[np.uint64, np.uint64, np.uint64],
 ) -> None:
     """Eqs. (1) and (2) of some blocks of a row; without branches, so that several are taken at once."""
-    e_a, e_b, e_c = edges
+    e_a, e_b, e_c, total, bright = lines
     extinction, airlight, beyond, near = air
-    for j in range(x.shape[0]):
+    row, left, right = where
+    for k in range(right - left):
+        j = left + np.uint64(k)
         at = x[j]
         a, b, c = e_a[0] + at * e_a[1], e_b[0] + at * e_b[1], e_c[0] + at * e_c[1]
-        k = _ONE / (total[0] + at * total[1])
-        t, radiance = volume * k, (bright[0] + at * bright[1]) * k
+        inverse = _ONE / (total[0] + at * total[1])
+        t, radiance = volume * inverse, (bright[0] + at * bright[1]) * inverse
         clear = _fading(extinction * t * np.sqrt(beyond + at * at))
         radiance = radiance * clear + airlight * (_ONE - clear)
-        seen = (min(a, b, c) >= _ZERO) & (t >= near) & (t < nearest[j])
-        out[j], nearest[j] = radiance if seen else out[j], t if seen else nearest[j]
+        seen = (min(a, b, c) >= _ZERO) & (t >= near) & (t < nearest[row, j])
+        out[row, j], nearest[row, j] = radiance if seen else out[row, j], t if seen else nearest[row, j]
 
 
 @njit(cache=True)

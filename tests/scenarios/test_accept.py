@@ -115,3 +115,10 @@ def test_the_acceptance_in_words_names_every_figure_asked_for():
 
 def test_what_was_unsafe_in_one_flight_is_a_shortfall_of_any_scenario():
     assert Accept().shortfalls("contact", 0.1, 1.2, ("touch at 2.70 m/s",)) == ["unsafe: touch at 2.70 m/s"]
+
+
+def test_a_figure_of_a_contact_that_could_not_be_measured_is_inside_no_limit():
+    flights = [row(0, radial_offset_m=None, closure_speed_m_s=None)]
+    speeds = {"closure_speed_min_m_s": 1.0, "closure_speed_max_m_s": 1.5}
+    assert len(Accept(closure_rate_min=0.1, radial_offset_median_max_m=0.1, **speeds).judge(flights)) == 2
+    assert Accept(radial_offset_max_m=0.15).judge(flights) == ["1 of 1 flights fall short: seeds 0"]

@@ -8,12 +8,14 @@ import signal
 import subprocess
 import sys
 import time
+from collections import Counter
 from pathlib import Path
 
 import pytest
 
 from dockair.errors import DockairError, MachineError
 from dockair.scenarios import campaign_command, cli
+from dockair.scenarios.campaign import manifest
 from dockair.scenarios.campaign import run as run_module
 from dockair.scenarios.campaign.folder import rows_of
 from dockair.scenarios.campaign.journal import Journal
@@ -56,6 +58,9 @@ def deadly(job):
         print("said on stdout")
     return quick(job)
 
+def who(job):
+    return {"outcome": "miss", "frames": os.getpid()}
+
 def sleeper(job):
     with open(os.environ["FLOWN"], "w") as file:
         file.write(f"{os.getpid()}\\n")
@@ -79,6 +84,8 @@ def fakes(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(str(folder))
     monkeypatch.setenv("FLOWN", str(tmp_path / "flown"))
     monkeypatch.setenv("PYTHONPATH", str(folder))
+    monkeypatch.setattr(manifest, "code_digest", lambda: "c0de")  # whoever edits the sources meanwhile
+    monkeypatch.setattr(manifest, "commit_of_the_code", lambda: ("abc", False))
     return tmp_path / "flown"
 
 
@@ -207,6 +214,37 @@ def test_a_background_left_to_the_machine_is_the_same_in_every_process(here, tmp
     monkeypatch.setattr("dockair.sim.opengl._trial", lambda: Trial("somebody"))
     with pytest.raises(DockairError, match="other background: analytic, now mujoco"):
         fly(source, tmp_path / "out")
+
+
+@pytest.mark.parametrize(
+    ("name", "counts"),
+    [
+        ("sim/air/wake.py", True),
+        ("nav/fusion.py", True),
+        ("assets/parameters/hose.toml", True),
+        ("scenarios/loop.py", True),
+        ("messages.py", True),
+        ("scenarios/report/page.py", False),
+        ("scenarios/library/still_air.toml", False),  # the job's key has it
+        ("nav/README.md", False),
+    ],
+)
+def test_the_digest_of_the_code_is_of_what_decides_flights(tmp_path, monkeypatch, name, counts):
+    path = tmp_path / "dockair" / name
+    for folder in ("sim", "nav", "scenarios", "assets"):
+        (tmp_path / "dockair" / folder).mkdir(parents=True)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    monkeypatch.setattr("dockair.__file__", str(tmp_path / "dockair/__init__.py"))
+    digests = []
+    for text in ("one", "two"):
+        path.write_text(text)
+        digests.append(manifest.code_digest())
+    assert (digests[0] != digests[1]) is counts
+
+
+def test_the_commit_is_that_of_the_sources_and_none_outside_git(tmp_path, monkeypatch):
+    monkeypatch.setattr("dockair.__file__", str(tmp_path / "__init__.py"))
+    assert manifest.commit_of_the_code() == (None, None)
 
 
 def test_an_error_is_a_row_and_is_flown_again_only_when_asked(here, tmp_path):
@@ -390,6 +428,13 @@ def test_a_process_that_dies_once_is_no_error(fakes, tmp_path):
 
 
 @pytest.mark.slow
+def test_a_process_flies_so_many_and_another_goes_on(fakes, tmp_path, monkeypatch):
+    monkeypatch.setattr("dockair.scenarios.campaign.pool.FLIGHTS_OF_A_PROCESS", 2)
+    flown = Counter(row["frames"] for row in fly(plan(tmp_path, 6), tmp_path / "out", "who").rows)
+    assert len(flown) >= 3 and max(flown.values()) <= 2
+
+
+@pytest.mark.slow
 def test_a_function_that_cannot_be_imported_is_said_once(fakes, tmp_path):
     with pytest.raises(DockairError, match="expected a function that flies an order, got 'fake_flights:none"):
         fly(plan(tmp_path, 50), tmp_path / "out", "none")
@@ -399,10 +444,12 @@ def test_a_function_that_cannot_be_imported_is_said_once(fakes, tmp_path):
 SERVER = """
 import os, sys
 from pathlib import Path
+from dockair.scenarios.campaign import manifest
 from dockair.scenarios.campaign.plan_file import PlanFile
 from dockair.scenarios.campaign.run import run
 
 if __name__ == "__main__":
+    manifest.code_digest = lambda: "c0de"
     for line in sys.stdin:
         child = os.fork()
         if child == 0:
@@ -415,6 +462,7 @@ if __name__ == "__main__":
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(900)  # eleven campaigns begin, each in new processes: a loaded machine is slow at that
 def test_a_campaign_killed_ten_times_at_random_makes_the_table_of_an_undisturbed_one(fakes, tmp_path):
     seeds, kills, out = 80, 10, tmp_path / "out"
     source = plan(tmp_path, seeds, scenarios='"truth_navigation", "still_air"')

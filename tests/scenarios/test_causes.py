@@ -168,10 +168,12 @@ def test_a_tip_inside_the_basket_that_was_not_held_and_one_that_was_called_off_o
     assert cause(flight(tip=lambda t: (0.0, -0.16)), outcome="given_up") == "control_limit"
 
 
-def test_one_called_off_is_judged_where_it_was_called_off_and_not_where_it_had_come_nearest(flight):
-    """The tip was on the line at its nearest, and 0.3 m off half a second later, when the navigation gave up."""
-    late = flight(tip=lambda t: (0.0, -0.3 if t > 4.3 else 0.0))
+def test_one_called_off_is_judged_by_the_worst_of_its_last_second_and_not_where_it_had_come_nearest(flight):
+    """The tip was on the line at its nearest, 0.3 m off at 4.3 s, on the line again when the navigation gave up."""
+    late = flight(tip=lambda t: (0.0, -0.3 if 4.29 < t < 4.31 else 0.0))
     assert cause(late, outcome="given_up", ended_s=4.5) == "control_limit"
+    assert cause(late, outcome="breakaway", ended_s=4.5) == "control_limit"
+    assert cause(late, outcome="given_up", ended_s=4.2) == "called_off"
     assert cause(late, outcome="miss", ended_s=4.5) == "not_held"
 
 

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from dockair.errors import MachineError
 from dockair.scenarios import envs_viewer
 from dockair.scenarios.envs_viewer import LiveViewer
 from dockair.scenarios.loop import Tick
@@ -64,6 +65,12 @@ def test_each_episode_is_a_recording_with_truth_and_belief_at_the_viewers_rate(s
         np.testing.assert_allclose(ranges[0], hand_made.tick(1)[3].p_PD_B[0])
         assert any(key.startswith("/world/receiver/belief:") for key in rows)
         assert any(key.startswith("/camera/window/pixels:") for key in rows)
+
+
+def test_without_the_viewers_program_the_machine_is_said_to_lack_it(hand_made, monkeypatch):
+    monkeypatch.setattr(envs_viewer.shutil, "which", lambda *args, **kwargs: None)
+    with pytest.raises(MachineError, match="render_mode: expected the rerun viewer"):
+        _show(LiveViewer(), hand_made, _flight(hand_made), 1)
 
 
 def test_a_viewer_that_is_asked_twice_for_one_tick_draws_it_once(hand_made, monkeypatch):

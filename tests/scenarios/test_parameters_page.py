@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from dockair.parameters import load_parameters, read_sheet, sheet_names
-from dockair.scenarios import build, build_receiver
+from dockair.scenarios import build, build_measured, build_receiver
 from dockair.scenarios.parameters_page import parameters_page
 from dockair.scenarios.schema import load_scenario
 from dockair.sim.camera import sheets
@@ -45,7 +45,7 @@ def test_every_sheet_fills_the_class_that_a_flight_is_built_with(monkeypatch: py
         loaded.setdefault(sheet, set()).add(cls)
         return load_parameters(sheet, cls, overrides)
 
-    for module in (build, build_receiver):
+    for module in (build, build_measured, build_receiver):
         monkeypatch.setattr(module, "load_parameters", recording)
     monkeypatch.setattr(sheets, "load_parameters", recording)
     monkeypatch.setattr(build, "SETTLE_S", 0.0)
@@ -53,6 +53,7 @@ def test_every_sheet_fills_the_class_that_a_flight_is_built_with(monkeypatch: py
         {"camera.filter": "long_pass", "hardware.imu": "mti"},
         {"camera.filter": "band_pass", "hardware.imu": "tactical"},
         {"hardware.imu": "consumer", "hardware.airframe": "unmanned", "flight.airspeed_m_s": 120.0, **UNMANNED},
+        {"camera.sensing": "measurements"},
     )
     for choice in choices:
         build.build(load_scenario("default", choice), 0)

@@ -1,0 +1,44 @@
+"""The loop's benchmark adds up; how fast it is belongs to the machine and is not tested."""
+
+import pytest
+
+from dockair.scenarios import bench_loop as loop
+
+
+def test_two_flights_at_once_are_compared_with_one_alone_of_the_same_kind(monkeypatch):
+    asked = []
+
+    def at_once(what, count):
+        asked.append((what, count))
+        return [{"x_real_time": 5.0 if count == 1 else speed} for speed in (4.0, 4.5)[:count]]
+
+    monkeypatch.setattr(loop, "_at_once", at_once)
+    monkeypatch.setattr(loop, "environment_speeds", lambda: {"dockair/DockFast-v0": 300.0, "Humanoid-v5": 200.0})
+    figures = loop.bench_loop()
+    assert asked == [(what, 1) for what in loop.CASES] + [("windowed, 50 Hz, one process", 2)]
+    assert list(figures["flights"]) == list(loop.CASES)
+    assert figures["ratios"] == {
+        "two flights at once over one": pytest.approx(8.5 / 5.0),
+        "steps a second, DockFast-v0 over Humanoid-v5": pytest.approx(1.5),
+    }
+
+
+def test_an_environment_that_cannot_be_made_here_is_left_out(monkeypatch):
+    monkeypatch.setattr(loop, "_at_once", lambda _, count: [{"x_real_time": 1.0}] * count)
+    monkeypatch.setattr(loop, "environment_speeds", lambda: {"dockair/DockFast-v0": 300.0})
+    assert list(loop.bench_loop()["ratios"]) == ["two flights at once over one"]
+
+
+def test_a_flight_that_fails_in_its_process_ends_the_bench(monkeypatch):
+    monkeypatch.setattr(loop, "_SCRIPT", "raise SystemExit(3)")
+    with pytest.raises(loop.subprocess.CalledProcessError):
+        loop.bench_loop()
+
+
+@pytest.mark.slow
+def test_speed_is_simulated_over_wall_time_without_the_first_second():
+    figures = loop.fly_timed("windowed, 50 Hz", seconds=0.5)
+    assert figures["simulated_s"] == pytest.approx(0.5)
+    assert figures["x_real_time"] == pytest.approx(figures["simulated_s"] / figures["wall_s"])
+    assert figures["frames_per_s"] * figures["wall_s"] == pytest.approx(25.0)
+    assert 0.0 < figures["flight_process_s"] and 0.0 < figures["camera_process_s"]

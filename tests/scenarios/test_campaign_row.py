@@ -1,0 +1,105 @@
+"""A flight's row: every column there, nothing that is not a number or a text, an error no success."""
+
+import json
+from dataclasses import fields
+
+import pytest
+
+from dockair.scenarios.attempts import Attempt
+from dockair.scenarios.campaign.jobs import jobs_of
+from dockair.scenarios.campaign.plan_file import PlanFile
+from dockair.scenarios.campaign.row import COLUMNS, column_names, columns_of, row_of
+from dockair.scenarios.campaign.table import read_table, write_table
+from dockair.scenarios.campaign.worker import Answer
+from dockair.scenarios.metrics import NavigationFigures, Result
+from dockair.scenarios.referee import Contact
+
+
+@pytest.fixture
+def job(tmp_path):
+    path = tmp_path / "p.toml"
+    path.write_text('name = "p"\nscenarios = ["truth_navigation"]\nseeds = [7]\n[draw."start.aft_m"]\nvalues = [5]')
+    return jobs_of(PlanFile(path))[0]
+
+
+def attempt(number: int, outcome: str) -> Attempt:
+    numbers = {f.name: 0.5 for f in fields(Attempt) if f.name.endswith(("_s", "_m", "_deg"))}
+    return Attempt(number=number, outcome=outcome, **numbers)
+
+
+def result(**changes) -> Result:
+    nav = {f.name: float("nan") for f in fields(NavigationFigures)} | {"nees_mean": 9.5, "frames_used": 61}
+    values = {
+        **{f.name: None for f in fields(Result)},
+        "outcome": "contact",
+        "success": True,
+        "first_attempt": False,
+        "cause": "gust",
+        "unsafe": (),
+        "attempts": 2,
+        "attempt_log": (attempt(1, "miss"), attempt(2, "contact")),
+        "contact": Contact(time_s=31.5, radial_offset_m=0.04, closure_speed_m_s=1.21, angle_deg=2.0),
+        "nav": NavigationFigures(**nav),
+        "fuel_kg": 12.5,
+        "collided_with": "",
+        "frames": 640,
+        "duration_s": 44.0,
+        "background": "analytic",
+    }
+    return Result(**(values | changes))
+
+
+def test_a_flight_fills_the_columns_with_what_its_result_says(job):
+    row = row_of(job, Answer(columns=columns_of(result())))
+    expected = {
+        "scenario": "truth_navigation", "seed": 7, "sensing": "truth", "navigator": "truth", "controller": "predictive",
+        "outcome": "contact", "success": True, "first_attempt": False, "attempts": 2, "cause": "gust", "unsafe": "",
+        "contact_time_s": 31.5, "radial_offset_m": 0.04, "closure_speed_m_s": 1.21, "angle_deg": 2.0, "fuel_kg": 12.5,
+        "nav_nees_mean": 9.5, "nav_range_rmse_m": None, "nav_frames_used": 61, "frames": 640, "duration_s": 44.0,
+        "error": "", "set.start.aft_m": 5, "scenario_hash": job.scenario_hash,
+    }  # fmt: skip
+    assert {name: row[name] for name in expected} == expected
+    assert [entry["outcome"] for entry in json.loads(row["attempt_log"])] == ["miss", "contact"]
+    assert set(row) == {*COLUMNS, "set.start.aft_m"}
+
+
+def test_without_contact_its_columns_are_empty_and_what_was_unsafe_is_one_text(job):
+    row = row_of(job, Answer(columns=columns_of(result(contact=None, outcome="miss", unsafe=("3.1 m/s", "rim")))))
+    assert row["unsafe"] == "3.1 m/s; rim"
+    assert [row[name] for name in ("contact_time_s", "radial_offset_m", "closure_speed_m_s", "angle_deg")] == [None] * 4
+
+
+def test_an_error_is_no_success_and_says_what_was_asked(job):
+    row = row_of(job, Answer(columns=None, error="ValueError: no"))
+    assert (row["outcome"], row["error"], row["success"], row["first_attempt"]) == (
+        "error",
+        "ValueError: no",
+        False,
+        False,
+    )
+    assert (row["scenario"], row["seed"], row["set.start.aft_m"], row["attempts"]) == ("truth_navigation", 7, 5, 0)
+    assert json.loads(row["attempt_log"]) == []
+
+
+def test_the_table_gives_back_the_rows(job, tmp_path):
+    rows = [row_of(job, Answer(columns=columns_of(result()))), row_of(job, Answer(columns=None, error="x"))]
+    write_table(rows, tmp_path)
+    assert read_table(tmp_path) == rows
+    assert list(read_table(tmp_path)[0]) == column_names(rows)
+
+
+@pytest.mark.parametrize(
+    ("values", "kept"),
+    [
+        ((1, 2), (1, 2)),
+        ((1, 2.5), (1.0, 2.5)),
+        ((True, False), (True, False)),
+        (("a", None), ("a", None)),
+        ((1, "x"), ("1", "x")),
+    ],
+)
+def test_a_drawn_keys_column_has_the_kind_of_its_values(job, tmp_path, values, kept):
+    rows = [row_of(job, Answer(columns=None)) | {"set.start.aft_m": value} for value in values]
+    write_table(rows, tmp_path)
+    back = [row["set.start.aft_m"] for row in read_table(tmp_path)]
+    assert [(type(value), value) for value in back] == [(type(value), value) for value in kept]
