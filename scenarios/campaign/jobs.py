@@ -6,6 +6,7 @@ that is done is known again when the plan has grown.
 
 import json
 import os
+import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from hashlib import blake2b
@@ -31,7 +32,19 @@ class Job:
     scenario_hash: str
     seed: int
     drawn: Point
-    as_written: bool  #: the plan changes nothing of the scenario, whose claims then hold or do not
+    file: str  #: name in the library, or path, of the scenario
+    settings: Mapping[str, Any]  #: dotted key -> value that the plan sets over the file
+
+    @property
+    def as_written(self) -> bool:
+        """Whether the plan changes nothing of the scenario, whose claims then hold or do not."""
+        return not self.settings
+
+    @property
+    def command(self) -> str:
+        """What flies this flight again."""
+        changes = [f"--set {shlex.quote(f'{key}={as_toml(value)}')}" for key, value in self.settings.items()]
+        return " ".join(["dockair fly", shlex.quote(self.file), f"--seed {self.seed}", *changes])
 
     @property
     def key(self) -> str:
@@ -50,11 +63,11 @@ def jobs_of(source: PlanFile) -> list[Job]:
     for index, entry in enumerate(source.plan.scenarios):
         seeds = [source.plan.first_seed + seed for seed in entry.seeds or source.plan.seeds]
         for point, seeds_there in _points(source.plan, seeds):
-            scenario = _scenario(source, index, entry, point)
+            settings = source.plan.set | entry.set | point | source.settings
+            file, scenario = _scenario(source, index, entry, point)
             digest = scenario_hash(scenario)
-            as_written = not (source.plan.set or entry.set or point or source.settings)
             jobs += [
-                Job(len(jobs) + k, scenario, digest, seed, point, as_written) for k, seed in enumerate(seeds_there)
+                Job(len(jobs) + k, scenario, digest, seed, point, file, settings) for k, seed in enumerate(seeds_there)
             ]
             if len(jobs) > MOST_JOBS:
                 raise DockairError(source.place("seeds"), expected=f"up to {MOST_JOBS} flights", got=len(jobs))
@@ -103,7 +116,7 @@ def _points(plan: Plan, seeds: Sequence[int]) -> list[tuple[Point, list[int]]]:
     return [(point, [seed]) for point, seed in zip(points, seeds, strict=True)]
 
 
-def _scenario(source: PlanFile, index: int, entry: Entry, point: Point) -> Scenario:
+def _scenario(source: PlanFile, index: int, entry: Entry, point: Point) -> tuple[str, Scenario]:
     own_file = entry.scenario.lower().endswith(".toml") or os.sep in entry.scenario
     name = str(source.folder / entry.scenario) if own_file else entry.scenario
     layers: tuple[tuple[str, Mapping[str, Any]], ...] = (
@@ -114,15 +127,15 @@ def _scenario(source: PlanFile, index: int, entry: Entry, point: Point) -> Scena
     )
     settings = {key: value for _, layer in layers for key, value in layer.items()}
     try:
-        return load_scenario(name, {key: _as_written(value) for key, value in settings.items()})
+        return name, load_scenario(name, {key: as_toml(value) for key, value in settings.items()})
     except DockairError as error:
         where = _blamed(error.where, layers, source.place(f"scenarios[{index}]"))
         raise DockairError(where, expected=error.expected, got=error.got, exists=error.exists) from None
 
 
-def _as_written(value: Any) -> Any:
-    """Return a text as TOML writes it, so that it stays a text; anything else as it is."""
-    return json.dumps(value, ensure_ascii=False) if isinstance(value, str) else value
+def as_toml(value: Any) -> str:
+    """Return a value as TOML writes it, so that a text stays a text; `--set` reads it."""
+    return json.dumps(value, ensure_ascii=False)
 
 
 def _blamed(where: str, layers: Sequence[tuple[str, Mapping[str, Any]]], otherwise: str) -> str:

@@ -33,7 +33,7 @@ COLUMNS: dict[str, str] = (
     | {f"nav_{f.name}": "int" if f.name == "frames_used" else "float" for f in fields(NavigationFigures)}
     | {"frames": "int", "duration_s": "float", "background": "text", "error": "text"}
     | dict.fromkeys(_LISTS, "text")
-    | {"scenario_hash": "text"}
+    | {"scenario_hash": "text", "command": "text"}
 )
 
 
@@ -57,6 +57,7 @@ def row_of(job: Job, answer: Answer) -> Row:
 def _asked(job: Job) -> Row:
     scenario = job.scenario
     row: Row = {"scenario": scenario.name, "seed": job.seed, "scenario_hash": job.scenario_hash}
+    row["command"] = job.command
     row |= {"sensing": scenario.sensing, "navigator": scenario.navigation.navigator}
     row["controller"] = scenario.guidance.controller
     return row | {f"{SET}{key}": value for key, value in job.drawn.items()}

@@ -145,7 +145,7 @@ def _timelines(ax: Axes, group: Group) -> None:
     for k, row in enumerate(shown):
         entries = json.loads(row.get("timeline") or "[]")
         ends = [entry["begun_s"] for entry in entries[1:]] + [row["duration_s"]]
-        for entry, end_s in zip(entries, ends, strict=True):
+        for entry, end_s in zip(entries, ends, strict=False):
             phase = entry["phase"]
             label = phase.replace("_", " ") if phase not in seen else None
             seen.add(phase)

@@ -67,7 +67,7 @@ def _failures(group: Group) -> list[dict[str, Any]]:
             "attempts": row["attempts"],
             "cause": (row["cause"] or "").replace("_", " "),
             "story": row["error"] or "; ".join(filter(None, [_story(row), row["unsafe"]])),
-            "command": row.get("command") or "",
+            "command": row["command"],
         }
         for row in group.rows
         if row["error"] or row["unsafe"] or not row["first_attempt"]

@@ -2,8 +2,11 @@
 
 import os
 import signal
+import time
+from pathlib import Path
 from types import SimpleNamespace
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -180,3 +183,29 @@ def test_a_flight_is_the_same_flight_with_the_camera_beside_it(tmp_path):
     first, second = (repr(result).replace(str(tmp_path / str(overlap)), "") for overlap, result in
                      zip((False, True), results, strict=True))  # fmt: skip
     assert first == second
+
+
+def test_the_cameras_process_ends_when_the_flights_is_killed():
+    reader, writer = os.pipe()
+    flight = os.fork()
+    if flight == 0:
+        model = mujoco.MjModel.from_xml_string("<mujoco/>")
+        camera = SimpleNamespace(full_window=Window(0, 4, 0, 4))
+        os.write(writer, OverlappedExposures(camera, model)._process.pid.to_bytes(4, "little"))
+        os.kill(os.getpid(), signal.SIGKILL)
+    os.waitpid(flight, 0)
+    left = int.from_bytes(os.read(reader, 4), "little")
+    for _ in range(1000):
+        if not runs(left):
+            break
+        time.sleep(0.01)
+    assert not runs(left)
+    os.close(reader)
+    os.close(writer)
+
+
+def runs(process):
+    try:
+        return "\nState:\tZ" not in Path(f"/proc/{process}/status").read_text()
+    except FileNotFoundError:
+        return False

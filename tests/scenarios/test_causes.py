@@ -157,6 +157,8 @@ def test_a_miss_away_from_the_nose_with_the_air_blowing_that_way_is_the_bow_wave
     right = dict(tip=lambda t: tuple(-0.25 * away), wind=lambda t: tuple(blown(t) * away))
     assert cause(flight(**right)) == "bow_wave"
     assert cause(flight(tip=lambda t: tuple(0.25 * away), wind=lambda t: tuple(-blown(t) * away))) == "control_limit"
+    steady = lambda t: 3.0 + 0.2 * np.sin(9.0 * t)  # noqa: E731  # it blew that way before
+    assert cause(flight(tip=lambda t: tuple(-0.25 * away), wind=lambda t: tuple(steady(t) * away))) == "control_limit"
     gusty = lambda t: 3.0 * np.sign(np.sin(9.0 * t)) + blown(t)  # noqa: E731  # as much as it varied by before
     assert cause(flight(tip=lambda t: tuple(-0.25 * away), wind=lambda t: tuple(gusty(t) * away))) == "control_limit"
 

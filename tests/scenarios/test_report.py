@@ -39,6 +39,7 @@ def _row(seed, *, scenario="light_gusts", sensing="camera", attempts=None, **cha
         "radial_offset_m": log[-1]["radial_offset_m"] if held else None, "closure_speed_m_s": 1.2 if held else None,
         "angle_deg": 3.0, "duration_s": 60.0, "error": "", "attempt_log": json.dumps(log), "timeline": "[]",
         "nav_by_range": "[]", "scenario_hash": f"{scenario}-{sensing}",
+        "command": f"dockair fly {scenario} --seed {seed}" + " --set x=1" * (sensing != "camera"),
     }  # fmt: skip
     return dict.fromkeys(COLUMNS) | values | changes
 
