@@ -36,9 +36,6 @@ from dockair.rotations import Array, exp
 
 _MERGE_CHI2 = 9.0  # squared distance in sigmas below which two are told as one: 3 sigma
 _LOG_NEGLIGIBLE = -14.0  # logarithm of the relative weight, about 1e-6, at which a hypothesis dies
-#: The other minimum is not looked at where it explains the frame worse by as much; ten times what the gate lets pass,
-#: since LEDs out of place may be a part of it.
-_UNLIKELY_CHI2 = 450.0
 _MOST = 2  # hypotheses: a flat ring has no more
 _POSE_ERRORS = np.arange(6)
 
@@ -93,9 +90,7 @@ def corrected(
 
 
 def _poses(frame: PoseEstimate) -> list[tuple[Array, Array]]:
-    other = frame.alternative
-    unlikely = other is None or other.chi2 - frame.chi2 > _UNLIKELY_CHI2
-    solutions = [frame] if other is None or unlikely else [frame, other]
+    solutions = [frame] if frame.alternative is None else [frame, frame.alternative]
     return [(one.R_CD, one.p_CD) for one in solutions]
 
 

@@ -61,24 +61,16 @@ class Explanation:
 
 
 def explanations(seen: Seen, sight: LinesOfSight, starts: list[tuple[Array, Array]]) -> list[Explanation]:
-    """Return every floor that is found from the belief and from the frame's own poses (R_CD, p_CD); none if none is.
-
-    The descent from the belief stands for that from the frame's pose on the same side.
-    """
+    """Return every floor that is found from the belief and from the frame's own poses (R_CD, p_CD); none if none is."""
     ab, whiten = _image(sight)
     begin = [np.zeros(POSE)] + [np.concatenate([log(R @ seen.R_CD.T), p - seen.p_CD]) for R, p in starts]
     ends: list[tuple[Explanation, Array]] = []
     shoulders: list[tuple[Explanation, Array]] = []
-    near = -1
     for k, pose in enumerate(begin):
-        if k == near:
-            continue
         numbers = fitted(seen.R_CD, seen.p_CD, seen.points_D, seen.C, ab, whiten, pose)
         settled = numbers[0]
         if settled > 0:
             _add(ends, _explanation(*numbers[1:7]), _SAME_FLOOR_CHI2)
-            if k == 0 and len(begin) > 1:
-                near = 1 + int(np.argmin([np.linalg.norm(numbers[3][:3] - other[:3]) for other in begin[1:]]))
         if settled >= 0 and k > 0:
             shoulders.append(_explanation(*numbers[7:]))
     for shoulder in shoulders:

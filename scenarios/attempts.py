@@ -8,7 +8,8 @@ begins when the tip touches the drogue or crosses the ring's plane.
 Radial offset, closing speed and angle of an attempt are those of the tip in drogue axes
 
     contact:   at the last crossing of the ring's plane from behind; the angle when the coupling takes hold
-    else:      at the crossing with the smallest offset; at the closest approach to the ring's centre without one
+    else:      at the crossing with the smallest offset; without one, at the closest approach to the ring's centre
+               before the attempt ended
 """
 
 from collections.abc import Sequence
@@ -140,7 +141,9 @@ class OpenAttempt:
         return self._ended_s is not None
 
     def watch(self, truth: Truth, p_DP: Array) -> None:
-        """Take note of one physics tick before the coupling holds."""
+        """Take note of one physics tick before the attempt is over."""
+        if self.is_over:
+            return
         away_m2 = float(p_DP @ p_DP)
         if away_m2 < self._closest_m2:
             self._closest, self._closest_m2 = truth, away_m2

@@ -1,8 +1,8 @@
 """How fast flights go on this machine, from the loop's own second core to two flights at once.
 
 Each line is a process of its own that flies a whole flight; its first second, in which kernels are loaded or compiled,
-is not counted. `x real time` is simulated over wall time. The processor's own time, of the flight and of the camera's
-process, says what a line would be with nothing else on the machine: the longer of the two where they overlap.
+is not counted. `x_real_time` is simulated over wall time. `x_of_own_time` is simulated over the processor's time of the
+flight or of the camera's process, whichever is longer: what it could be at most with nothing else on the machine.
 
     two at once over one = sum of the two speeds / speed of one alone, no flight with a second process
 
@@ -85,7 +85,10 @@ def fly_timed(what: str, seconds: float = 1e9) -> dict[str, float]:
             flight.close()
     children = resource.getrusage(resource.RUSAGE_CHILDREN)
     beside = children.ru_utime + children.ru_stime if overlap else 0.0
-    return figures | {"camera_process_s": beside}
+    own_time = figures["simulated_s"] / max(figures["flight_process_s"], beside)
+    return (
+        {"x_real_time": figures.pop("x_real_time"), "x_of_own_time": own_time} | figures | {"camera_process_s": beside}
+    )
 
 
 def environment_speeds() -> dict[str, float]:

@@ -6,7 +6,7 @@ the attitude, |log(R_true R_estimated')|. Beside each stands what the filter its
     sigma = sqrt(mean of u' P u)                                                                          (1)
 
 u being the unit vector toward the drogue for the range; for the lateral error the trace over the two axes across it,
-for the attitude over all three. Only ticks at which a new frame had just been used and the solution was valid are counted.
+for the attitude over all three. Only ticks at which a new frame had just been used and the solution was valid count.
 """
 
 from collections.abc import Sequence

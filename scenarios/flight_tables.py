@@ -51,7 +51,7 @@ class Rates(Table):
 
 
 class Tanker(Table):
-    """What the tanker flies, and which hose is out; how fast it rolls, and what it announces, sheet `tanker_path` says."""
+    """What the tanker flies, which hose is out; how fast it rolls, what it announces, sheet `tanker_path` says."""
 
     manoeuvre: Literal["straight", "racetrack", "toboggan"] = "straight"
     pod: Literal["centreline", "left_wing", "right_wing"] = "centreline"  #: the refuelling unit whose hose is out

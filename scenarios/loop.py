@@ -15,9 +15,9 @@ from dockair.scenarios.build import build
 from dockair.scenarios.camera_process import OverlappedExposures, can_overlap
 from dockair.scenarios.exposures import Exposures, ExposuresInTurn, Frame
 from dockair.scenarios.message_log import announce_to
-from dockair.scenarios.metrics import Result
 from dockair.scenarios.recorder import Recorder
 from dockair.scenarios.referee import Outcome, Referee
+from dockair.scenarios.result import Result
 from dockair.scenarios.schema import Scenario
 from dockair.scenarios.truth_navigation import TruthNavigator
 from dockair.sim.truth import Truth

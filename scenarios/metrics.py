@@ -1,4 +1,4 @@
-"""What a flight is judged by: errors of the navigation against the truth, and `result.json`.
+"""Errors of the navigation against the truth.
 
 With p the drogue's ring centre from the camera in body axes, e = p_estimated - p_true and l = p_true / |p_true|:
 
@@ -10,28 +10,15 @@ All three are taken where a new frame has just been used and the solution is val
 NEES equal to the number of states, 9 [Bar-Shalom, Li & Kirubarajan 2001, section 5.4].
 """
 
-import json
-import math
-import platform
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
-from importlib.metadata import version
-from pathlib import Path
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from dockair.calibration import Mounting
 from dockair.messages import NavSolution
 from dockair.rotations import Array, log
-from dockair.scenarios.attempts import Attempt, first_attempt_succeeded, succeeded
-from dockair.scenarios.causes import Flown, cause_of_flight, with_cause
-from dockair.scenarios.hold import Disconnect, Hold, hold_of
-from dockair.scenarios.referee import Contact, Outcome, Referee
 from dockair.sim.truth import Truth
-
-SCHEMA_VERSION = 1
-_PACKAGES = ("dockair", "mujoco", "numpy", "scipy", "opencv-python-headless", "numba", "filterpy")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,66 +34,6 @@ class NavigationFigures:
     nees_mean: float  #: of 9 states
     availability: float  #: fraction of control ticks with a valid solution, counted from the first valid one
     frames_used: int
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Result:
-    """One flight; the fields are the keys of `result.json`."""
-
-    schema_version: int = SCHEMA_VERSION
-    scenario: str
-    seed: int
-    outcome: str
-    success: bool  #: contact inside the limits in some attempt
-    first_attempt: bool  #: in the first
-    cause: str  #: of the last attempt that failed; "" if none did
-    unsafe: tuple[str, ...]  #: what was unsafe; empty when all was safe
-    attempts: int
-    attempt_log: tuple[Attempt, ...]
-    contact: Contact | None
-    hold: Hold | None
-    disconnect: Disconnect | None
-    fuel_kg: float  #: that was taken on
-    collided_with: str
-    sensing: str  #: what the navigation saw: "camera", "measurements" or "truth"
-    truth_navigation: bool
-    background: str  #: who drew what the camera saw, "mujoco" or "analytic"; "" without a camera
-    nav: NavigationFigures
-    frames: int
-    duration_s: float
-    real_time_factor: float
-    wall_time_s: float
-    versions: Mapping[str, str]
-    out_dir: str | None
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain values for JSON: NaN and infinity become None."""
-        return {key: _plain(value) for key, value in asdict(self).items()}
-
-    def to_json(self) -> str:
-        """Return one JSON object, keys in the order of the fields."""
-        return json.dumps(self.to_dict(), indent=2, allow_nan=False)
-
-    def write(self, out_dir: str | Path) -> Path:
-        """Write `result.json` into a folder and return its path."""
-        path = Path(out_dir) / "result.json"
-        path.write_text(self.to_json() + "\n", encoding="utf-8")
-        return path
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, Mapping):
-        return {key: _plain(entry) for key, entry in value.items()}
-    if isinstance(value, (tuple, list)):
-        return [_plain(entry) for entry in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
-
-
-def versions() -> dict[str, str]:
-    """Return the versions that decide a flight's bits."""
-    return {"python": platform.python_version()} | {package: version(package) for package in _PACKAGES}
 
 
 def line_of_sight_errors(estimated: Array, true: Array) -> tuple[Array, Array]:
@@ -196,68 +123,6 @@ def availability(valid: Sequence[bool]) -> float:
         return 0.0
     rest = list(valid)[list(valid).index(True) :]
     return sum(rest) / len(rest)
-
-
-def summarise(
-    *,
-    scenario: str,
-    seed: int,
-    outcome: str,
-    referee: Referee,
-    flown: Flown,
-    frames: int,
-    mounting: Mounting,
-    sensing: str,
-    background: str,
-    wall_time_s: float,
-    out_dir: str | Path | None,
-) -> Result:
-    """Return a flight's result.
-
-    Args:
-        scenario: its name.
-        seed: that was flown.
-        outcome: of the referee.
-        referee: that watched the flight.
-        flown: truth and belief, one a control tick.
-        frames: that were delivered to the navigation.
-        mounting: where the navigation believes its camera to be.
-        sensing: what the navigation saw: "camera", "measurements", or "truth" in place of `nav`.
-        background: who drew what the camera saw, "" without a camera.
-        wall_time_s: that the flight took.
-        out_dir: where the flight was written.
-    """
-    truths = flown.truths
-    hold, disconnect = hold_of(truths)
-    duration_s = truths[-1].time_s if truths else 0.0
-    log = referee.attempt_log(duration_s, Outcome(outcome))
-    attempts = tuple(with_cause(attempt, flown) for attempt in log)
-    return Result(
-        scenario=scenario,
-        seed=seed,
-        outcome=outcome,
-        success=succeeded(attempts),
-        first_attempt=first_attempt_succeeded(attempts),
-        cause=cause_of_flight(attempts, flown),
-        unsafe=referee.unsafe,
-        attempts=len(attempts),
-        attempt_log=attempts,
-        contact=referee.contact,
-        hold=hold,
-        disconnect=disconnect,
-        fuel_kg=truths[-1].fuel_kg if truths else 0.0,
-        collided_with=referee.collided_with,
-        sensing=sensing,
-        truth_navigation=sensing == "truth",
-        background=background,
-        nav=navigation_figures(flown.solutions, truths, mounting),
-        frames=frames,
-        duration_s=duration_s,
-        real_time_factor=duration_s / wall_time_s if wall_time_s > 0.0 else float("nan"),
-        wall_time_s=wall_time_s,
-        versions=versions(),
-        out_dir=None if out_dir is None else str(out_dir),
-    )
 
 
 def _rms(values: Array) -> float:

@@ -6,12 +6,13 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
 from dockair.errors import DockairError
+from dockair.messages import LedObservation
 from dockair.scenarios.causes import flown_of
 from dockair.scenarios.flight_log import FlightLog
 from dockair.scenarios.message_log import MessageLog, read_messages
-from dockair.scenarios.metrics import Result, summarise
 from dockair.scenarios.output_folder import prepare_output_folder
 from dockair.scenarios.referee import Outcome
+from dockair.scenarios.result import Result, summarise
 
 if TYPE_CHECKING:  # the loop imports this module
     from dockair.scenarios.loop import Flight, Tick
@@ -47,6 +48,7 @@ class Recorder:
         """Take one control tick."""
         self._log.append(tick.truth, tick.imu, tick.frame, tick.solution)
         if self._messages is not None:
+            assert not isinstance(tick.frame, LedObservation), "a flight without frames has no recipe"
             self._messages.append(tick.imu, tick.frame, tick.solution, tick.announcement)
 
     def __enter__(self) -> Self:

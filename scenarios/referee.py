@@ -76,7 +76,7 @@ class Referee:
             self._unsafe.append(f"collision with {self.collided_with}")
         if truth.latched and self._attempt(truth).latched is None:
             self._latch(truth)
-        elif self._open is not None and self._open.latched is None:
+        elif self._open is not None:
             self._open.watch(truth, p_DP)
 
     def judge(

@@ -37,7 +37,7 @@ class SwingSettings:
     frequency_hz: tuple[float, float, float] = (0.44, 0.31, 0.45)
     damping: tuple[float, float, float] = (0.2, 0.05, 0.12)
     gust_time_s: tuple[float, float, float] = (0.6, 0.7, 1.2)  # T
-    gust_density: tuple[float, float, float] = (0.5, 1.3, 3.0)  # of g' [m/s^3/sqrt(Hz)]
+    gust_density: tuple[float, float, float] = (0.2, 1.3, 3.0)  # of g' [m/s^3/sqrt(Hz)]
     drift_sigma_m_s: float = 0.4  # of d at the start: the inertial velocity's bias, twice its 0.2 m/s
     learning_s: float = 12.0  # after which the gains stay the same: drift and swing are told apart within a few periods
     drift_density: float = 0.03  # of d' [m/s^2/sqrt(Hz)]: the inertial velocity's drift, gusts far below the swing

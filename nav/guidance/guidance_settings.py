@@ -45,7 +45,7 @@ class GuidanceSettings:
     closure_speed_m_s: float = 1.2  # published practice 1.0-1.5 m/s
     join_up_speed_m_s: float = 1.5  # assumed: walking pace, as in practice from some tens of metres
     back_off_speed_m_s: float = 1.0  # breakaway practice 1-2 m/s
-    response_s: tuple[float, float, float] = (0.40, 0.17, 0.14)  # tau: delay of the tip at 0.3 Hz, computing included
+    response_s: tuple[float, float, float] = (0.28, 0.10, 0.10)  # tau: delay of the tip at 0.1-0.5 Hz, computing included
     acceleration_limit_m_s2: tuple[float, float, float] = (0.75, 1.9, 1.9)  # a little less than the flight control's
     velocity_limit_m_s: float = 3.5
     closure_acceleration_m_s2: float = 0.6  # how fast the closure speed is asked for

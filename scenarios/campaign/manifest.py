@@ -19,7 +19,7 @@ from dockair.errors import DockairError
 from dockair.scenarios.campaign.jobs import Job
 from dockair.scenarios.campaign.plan import Plan
 from dockair.scenarios.campaign.whole_file import write_whole
-from dockair.scenarios.metrics import versions
+from dockair.scenarios.result import versions
 
 FILE_NAME = "manifest.json"
 SCHEMA_VERSION = 1

@@ -10,7 +10,8 @@ from typing import Any
 
 from dockair.scenarios.campaign.jobs import Job
 from dockair.scenarios.campaign.worker import Answer
-from dockair.scenarios.metrics import NavigationFigures, Result
+from dockair.scenarios.metrics import NavigationFigures
+from dockair.scenarios.result import Result
 
 Row = dict[str, Any]
 

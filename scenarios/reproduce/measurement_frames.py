@@ -74,13 +74,14 @@ def joined(parts: list[Seen]) -> Seen:
     return Seen(**{f.name: np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(Seen)})
 
 
-def seen_in_flight(name: str, overrides: dict[str, Any], seed: int) -> Seen:
+def seen_in_flight(name: str, overrides: dict[str, Any], seed: int, until_s: float = np.inf) -> Seen:
     """Fly a scenario with the camera until the coupling takes the probe, and return what was measured.
 
     Args:
         name: of the scenario.
         overrides: dotted key -> value.
         seed: of the flight.
+        until_s: at most.
     """
     flight = Flight(load_scenario(name, overrides), seed)
     watched = _Watched(flight, seed)
@@ -95,7 +96,7 @@ def seen_in_flight(name: str, overrides: dict[str, Any], seed: int) -> Seen:
                 for row in watched.rows(tick.frame):
                     rows.append(row | {"flight": seed, "frame": number, "ring": ring, "named": named[row["led"]]})
                 number += 1
-            if tick.outcome is not None or tick.truth.latched:
+            if tick.outcome is not None or tick.truth.latched or tick.truth.time_s >= until_s:
                 break
     finally:
         flight.close()

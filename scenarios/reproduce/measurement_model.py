@@ -33,7 +33,8 @@ _STEP_S = 1.0
 _RANGES_M = (2.0, 2.7, 3.5, 4.5, 5.5, 6.5, 8.0, 16.0, 30.0)
 _FEWEST = 200  # rows of a range that is compared
 _SIZE_IN, _DPI = (11.0, 8.0), 110
-_Flight = tuple[str, dict[str, Any], int]
+_STANDING_S = 6.0
+_Flight = tuple[str, dict[str, Any], int, float]
 
 
 def _dimmed() -> list[dict[str, Any]]:
@@ -51,21 +52,25 @@ def _out() -> list[dict[str, Any]]:
 
 
 def _standing(aft_m: float, faults: list[dict[str, Any]]) -> dict[str, Any]:
-    """Six seconds at a stand-off."""
-    return {"start.aft_m": aft_m, "faults": faults, "flight.duration_s": 6.0, "guidance.stabilise_s": 60.0}
+    """Settings of a flight that stays at its stand-off."""
+    return {"start.aft_m": aft_m, "faults": faults, "guidance.stabilise_s": 60.0}
 
 
 FITTED: tuple[_Flight, ...] = (
-    ("default", {}, 0),
-    ("default", {}, 1),
-    ("light_gusts", {}, 2),
-    ("default", _standing(4.0, _dimmed()), 3),
-    ("default", _standing(12.0, _dimmed()), 4),
-    ("default", _standing(25.0, []), 5),
-    ("default", _standing(4.0, _out()), 6),
-    ("light_gusts", _standing(8.0, []), 7),
+    ("default", {}, 0, np.inf),
+    ("default", {}, 1, np.inf),
+    ("light_gusts", {}, 2, np.inf),
+    ("default", _standing(4.0, _dimmed()), 3, _STANDING_S),
+    ("default", _standing(12.0, _dimmed()), 4, _STANDING_S),
+    ("default", _standing(25.0, []), 5, _STANDING_S),
+    ("default", _standing(4.0, _out()), 6, _STANDING_S),
+    ("light_gusts", _standing(8.0, []), 7, _STANDING_S),
 )
-HELD_OUT: tuple[_Flight, ...] = (("default", {}, 8), ("light_gusts", {}, 9), ("default", _standing(10.0, []), 10))
+HELD_OUT: tuple[_Flight, ...] = (
+    ("default", {}, 8, np.inf),
+    ("light_gusts", {}, 9, np.inf),
+    ("default", _standing(10.0, []), 10, _STANDING_S),
+)
 
 
 def reproduce(out: Path | None) -> dict[str, Any]:

@@ -94,8 +94,9 @@ class Background:
         dirt: CoarseGrid | None = None,
         extinction_1_m: float = 0.0,
         place_m: Array | None = None,
+        out: NDArray[np.float32] | None = None,
     ) -> NDArray[np.float32]:
-        """Return (rows, columns) expected electrons of the window, a new array.
+        """Return (rows, columns) expected electrons of the window.
 
         Args:
             data: positions and attitudes up to date; not changed.
@@ -106,6 +107,7 @@ class Background:
             dirt: factor on both; holds the window.
             extinction_1_m: of the haze before the solids.
             place_m: (3,) of the camera in axes that stay with the air, for what passes below; None is their origin.
+            out: (rows, columns) that takes them; a new array by default.
 
         Raises:
             MachineError: backend "mujoco", and no off-screen OpenGL here.
@@ -119,7 +121,7 @@ class Background:
         self._sky.fill(picture, pose[0], x, y, place_m)
         self._solids.draw(picture, data, pose, x, y, haze)
         picture = blocks.to_sensor(picture, drawn, extent)
-        return blocks.to_pixels(picture, extent, window, white_e, stray, dirt)
+        return blocks.to_pixels(picture, extent, window, white_e, stray, dirt, out)
 
     def close(self) -> None:
         """Free the OpenGL context; twice is once."""

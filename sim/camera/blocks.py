@@ -128,6 +128,7 @@ class Blocks:
         white_e: float,
         stray: CoarseGrid | None,
         dirt: CoarseGrid | None,
+        out: NDArray[np.float32] | None = None,
     ) -> NDArray[np.float32]:
         """Return (rows, columns) expected electrons of the window, Eq. (1).
 
@@ -138,12 +139,13 @@ class Blocks:
             white_e: electrons of radiance 1 on the axis.
             stray: electrons added; None for none.
             dirt: factor; None for 1.
+            out: (rows, columns) that takes them; a new array by default.
         """
         rows = _cut(self._lines[0], window.row_start, window.row_stop)
         columns = _cut(self._lines[1], window.column_start, window.column_stop)
         scene = picture, rows, columns, (extent.row_start, extent.column_start), self._k
         fall_off = self._part(self._fall_off, extent)
-        out = np.empty(window.shape, dtype=np.float32)
+        out = np.empty(window.shape, dtype=np.float32) if out is None else out
         _to_pixels(out, scene, fall_off, np.float32(white_e), _layer(stray, window), _layer(dirt, window))
         return out
 

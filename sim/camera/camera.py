@@ -10,7 +10,7 @@ Time: `expose` is called with the world at the middle of the exposure; the frame
 Not modelled: motion of background and Sun during an exposure; glints move as if they stuck to their surfaces.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import mujoco
@@ -23,6 +23,7 @@ from dockair.rotations import Array
 from dockair.sim.as_built import AsBuilt
 from dockair.sim.camera.background import Background
 from dockair.sim.camera.blobs import Blobs
+from dockair.sim.camera.camera_noise import CameraNoise
 from dockair.sim.camera.coarse_grid import CoarseGrid
 from dockair.sim.camera.defects import Defects
 from dockair.sim.camera.dirt import Dirt
@@ -38,33 +39,10 @@ from dockair.sim.camera.sheets import CameraSheets
 from dockair.sim.camera.sky import Sky, Weather
 from dockair.sim.camera.sun_view import SunView
 from dockair.sim.faults import CameraFault, Faults
-from dockair.streams import counter_key, random_stream
+
+__all__ = ["CameraNoise", "NearInfraredCamera"]
 
 _EDGE_SIGMAS = 6.0  # how far the blurred edge of the Sun's disc is drawn
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class CameraNoise:
-    """Where a camera's random numbers come from: keys of those that are functions of a place, streams of the others."""
-
-    image: int
-    fixed_pattern: int
-    hot_pixels: int
-    clouds: int
-    transfer: np.random.Generator
-    dirt: np.random.Generator
-
-    @classmethod
-    def of(cls, seed: int) -> "CameraNoise":
-        """Return the named streams of a scenario's seed."""
-        return cls(
-            image=counter_key(seed, "image"),
-            fixed_pattern=counter_key(seed, "fixed_pattern"),
-            hot_pixels=counter_key(seed, "hot_pixels"),
-            clouds=counter_key(seed, "clouds"),
-            transfer=random_stream(seed, "frame_transfer"),
-            dirt=random_stream(seed, "dirt"),
-        )
 
 
 class NearInfraredCamera:
@@ -133,6 +111,7 @@ class NearInfraredCamera:
         self._pattern = FixedPattern(sheets.sensor, noise.fixed_pattern, camera.height_px, camera.width_px)
         self._control = ExposureControl(sheets.exposure, sheets.sensor, automatic=automatic_exposure)
         self._last: CameraFrame | None = None
+        self._memory = np.empty(0, dtype=np.float32)  # of each frame's expected electrons: new memory takes its time
 
     def expose(
         self, data: mujoco.MjData, time_s: float, frame_number: int, window: Window | None
@@ -158,7 +137,7 @@ class NearInfraredCamera:
             return replace(self._last, time_stamp_s=time_s)
         exposure_s = self.exposure_s(fault)
         start = window.row_start, window.column_start
-        expected = self.expected_electrons(data, window, time_s, exposure_s)
+        expected = self.expected_electrons(data, window, time_s, exposure_s, self._room_for(window))
         pixels = digitise(
             expected, self._sheets.sensor, self._pattern, self._noise.image, frame_number, start, exposure_s
         )
@@ -214,7 +193,12 @@ class NearInfraredCamera:
         self._background.close()
 
     def expected_electrons(
-        self, data: mujoco.MjData, window: Window, time_s: float = 0.0, exposure_s: float | None = None
+        self,
+        data: mujoco.MjData,
+        window: Window,
+        time_s: float = 0.0,
+        exposure_s: float | None = None,
+        out: NDArray[np.float32] | None = None,
     ) -> NDArray[np.float32]:
         """Return (rows, columns) expected electrons of the window, before any noise or clipping.
 
@@ -223,13 +207,14 @@ class NearInfraredCamera:
             window: inside the sensor.
             time_s: middle of the exposure, for faults.
             exposure_s: None for that of the next frame.
+            out: (rows, columns) that takes them; a new array by default.
         """
         exposure_s = self.exposure_s() if exposure_s is None else exposure_s
         pose, dirt = self.pose(data), self._defects.dirt(self._faults.camera(time_s).dirt_cover)
         veil = 1.0 if dirt is None else dirt.veil_factor
         sun_C, visible = self._sun_in_view(data, pose)
         stray = self._glare.stray(sun_C, visible, exposure_s, window, veil) if visible > 0.0 else None
-        image = self.background_electrons(data, window, exposure_s, stray, dirt)
+        image = self.background_electrons(data, window, exposure_s, stray, dirt, out)
         start = window.row_start, window.column_start
         if self._sun is not None and visible > 0.0:
             self._glare.add_fine(image, start, sun_C, visible, exposure_s, veil)
@@ -249,6 +234,7 @@ class NearInfraredCamera:
         exposure_s: float | None = None,
         stray: CoarseGrid | None = None,
         dirt: Dirt | None = None,
+        out: NDArray[np.float32] | None = None,
     ) -> NDArray[np.float32]:
         """Return (rows, columns) expected electrons of sky and scene alone, with stray light and dirt if given."""
         exposure_s = self.exposure_s() if exposure_s is None else exposure_s
@@ -262,7 +248,14 @@ class NearInfraredCamera:
             dirt=None if dirt is None else dirt.grid,
             extinction_1_m=self._extinction_1_m,
             place_m=pose[1] + np.array([self._airspeed_m_s * data.time, 0.0, 0.0]),
+            out=out,
         )
+
+    def _room_for(self, window: Window) -> NDArray[np.float32]:
+        rows, columns = window.shape
+        if self._memory.size < rows * columns:
+            self._memory = np.empty(rows * columns, dtype=np.float32)
+        return self._memory[: rows * columns].reshape(rows, columns)
 
     def _sun_in_view(self, data: mujoco.MjData, pose: tuple[Array, Array]) -> tuple[Array, float]:
         """(3,) unit vector toward the Sun in camera axes, and the part of its disc that the lens sees."""

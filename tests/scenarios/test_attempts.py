@@ -93,6 +93,8 @@ def test_the_offset_of_a_miss_is_the_smallest_of_its_crossings_and_that_of_one_c
     assert attempt.decided_s == 0.04
     called_off = pilot().fly("approach", AFT, (-1.0, 0.3, 0.4), (-2.0, 0.0, 0.0)).fly("back_off", AFT)
     assert called_off.log()[0].radial_offset_m == pytest.approx(0.5)
+    called_off.fly("pre_contact", (-0.9, 0.0, 0.0))  # blown nearer while it waits for its next attempt
+    assert called_off.log()[0].radial_offset_m == pytest.approx(0.5)
 
 
 def test_of_a_contact_offset_and_speed_are_those_of_the_last_crossing_and_the_angle_that_of_the_latch(pilot):

@@ -11,8 +11,9 @@ from dockair.scenarios.campaign.plan_file import PlanFile
 from dockair.scenarios.campaign.row import COLUMNS, column_names, columns_of, row_of
 from dockair.scenarios.campaign.table import read_table, write_table
 from dockair.scenarios.campaign.worker import Answer
-from dockair.scenarios.metrics import NavigationFigures, Result
+from dockair.scenarios.metrics import NavigationFigures
 from dockair.scenarios.referee import Contact
+from dockair.scenarios.result import Result
 
 
 @pytest.fixture

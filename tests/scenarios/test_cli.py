@@ -13,9 +13,10 @@ import pytest
 
 from dockair.errors import DockairError, MachineError
 from dockair.scenarios import cli, doctor
-from dockair.scenarios.metrics import NavigationFigures, Result
+from dockair.scenarios.metrics import NavigationFigures
 from dockair.scenarios.output_folder import prepare_output_folder
 from dockair.scenarios.referee import Contact
+from dockair.scenarios.result import Result
 from dockair.sim import opengl
 
 NAVIGATION = NavigationFigures(

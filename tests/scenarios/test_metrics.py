@@ -10,7 +10,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from dockair.rotations import exp
-from dockair.scenarios import metrics
+from dockair.scenarios import metrics, result
 from dockair.scenarios.causes import Flown
 from dockair.scenarios.flight_log import FlightLog
 from dockair.scenarios.hold import hold_of
@@ -30,7 +30,7 @@ def _summary(flight, log: FlightLog, **changes):
         flown=Flown(truths=log.truths, solutions=log.solutions, p_PN_B=np.array([-1.2, 0.9, -0.65])), frames=log.frames,
         mounting=flight.sheets.mounting, sensing="camera", background="mujoco", wall_time_s=2.0, out_dir=None,
     )  # fmt: skip
-    return metrics.summarise(**(values | changes))
+    return result.summarise(**(values | changes))
 
 
 def test_an_error_is_split_into_along_and_across_the_line_of_sight():
@@ -123,7 +123,8 @@ def test_result_json_has_the_documented_keys_and_no_others(hand_made, tmp_path):
     assert list(written) == [
         "schema_version", "scenario", "seed", "outcome", "success", "first_attempt", "cause", "unsafe", "attempts",
         "attempt_log", "contact", "hold", "disconnect", "fuel_kg", "collided_with", "sensing", "truth_navigation",
-        "background", "nav", "frames", "duration_s", "real_time_factor", "wall_time_s", "versions", "out_dir",
+        "background", "nav", "frames", "duration_s", "real_time_factor", "wall_time_s", "versions", "timeline",
+        "nav_by_range", "out_dir",
     ]  # fmt: skip
     page = (Path(__file__).parents[2] / "docs" / "results.md").read_text(encoding="utf-8")
     documented = page[page.index("## result.json") : page.index("## as_built.json")]

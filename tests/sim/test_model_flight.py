@@ -67,3 +67,16 @@ def test_model_flies_as_an_independent_integration_of_the_equations_of_motion() 
     np.testing.assert_allclose(flight.w_WB_B, expected[12:15], atol=4e-3)
     np.testing.assert_allclose(flight.actuators, expected[15:], atol=5e-3)
     np.testing.assert_allclose(flight.R_WB @ flight.R_WB.T, np.eye(3), atol=1e-12)
+
+
+def test_first_tick_turns_as_eulers_equations_say_with_the_rotor() -> None:
+    """Angular acceleration of one tick at 0.5 rad/s about all axes, to rounding."""
+    trim = steady_trim(AIRFRAME, 180.0, AIR)
+    flight, commands = started(trim)
+    w, inertia = np.array([0.5, 0.4, -0.3]), AIRFRAME.inertia_B
+    flight.start(trim.R_WB, trim.velocity_W, w, commands)
+    velocity_B = trim.R_WB.T @ trim.velocity_W
+    _, moment = trim.aerodynamics.force_and_moment(velocity_B, w, trim.surfaces_rad)
+    expected = np.linalg.solve(inertia, moment + rotor_moment(AIRFRAME, w) - np.cross(w, inertia @ w))
+    flight.step(velocity_B, commands)
+    np.testing.assert_allclose((flight.w_WB_B - w) / STEP_S, expected, rtol=1e-9, atol=1e-9)
