@@ -6,9 +6,9 @@ flight or of the camera's process, whichever is longer: what it could be at most
 
     two at once over one = sum of the two speeds / speed of one alone, no flight with a second process
 
-Beside it stands what others run: steps a second of `DockFast-v0`, 0.01 s each, beside gymnasium's `Humanoid-v5`,
-0.015 s each, by turns in one process, if gymnasium's MuJoCo extra is installed. Speeds are benchmarks, never tests:
-they belong to the machine that printed them.
+Beside it stands what others run: steps a second (of the processor's time) of `DockFast-v0`, 0.01 s each, beside
+gymnasium's `Humanoid-v5`, 0.015 s each, by turns, if gymnasium's MuJoCo extra is installed. Speeds are benchmarks,
+never tests: they belong to the machine that printed them.
 """
 
 import json
@@ -114,13 +114,13 @@ def environment_speeds() -> dict[str, float]:
 
 
 def _time_of_steps(environment: Any) -> float:
-    """Wall time of some steps [s]; resets are not counted."""
+    """The processor's time of some steps [s]; resets are not counted."""
     spent = 0.0
     for _ in range(_STEPS):
         action = environment.action_space.sample()
-        begun = time.perf_counter()
+        begun = time.process_time()
         _, _, terminated, truncated, _ = environment.step(action)
-        spent += time.perf_counter() - begun
+        spent += time.process_time() - begun
         if terminated or truncated:
             environment.reset()
     return spent

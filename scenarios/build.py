@@ -49,6 +49,10 @@ from dockair.streams import random_stream
 
 SETTLE_S = 12.0  # hose and gusts run this long before the flight: several periods of the drogue's swing
 ATTEMPT_S = 15.0  # before a flight's time is over: an approach begun then still ends, with the probe clear again
+RESPONSE_S = {  # delay of the probe's tip forward, left, up, behind a command at 0.1-0.4 Hz, a control tick included
+    "fighter": (0.28, 0.10, 0.10),
+    "unmanned": (0.40, 0.16, 0.10),
+}
 COMMANDED = 0.95  # of the accelerations that the flight control flies: what it cut off would be missing in guidance
 STAND_OFF_M = 4.0  # pre-contact: procedures say 3-5 m behind the drogue
 SUN_OVERHEAD = np.array([0.0, 0.0, 1.0])  # lights the scene of a scenario without Sun
@@ -175,16 +179,15 @@ def build(scenario: Scenario, seed: int) -> Parts:
 
 def guidance_settings(scenario: Scenario) -> GuidanceSettings:
     """Return the guidance that the scenario asks for, with what the nominal sheets say of the receiver."""
-    g = scenario.guidance
+    g, duration_s = scenario.guidance, scenario.flight.duration_s
     mounting = load_parameters(scenario.hardware.receiver_sheet("mounting"), MountingParameters)
     bow_wave = load_parameters("bow_wave", BowWaveParameters)
     source_B = bow_wave_coefficients(bow_wave, mounting.probe_tip_m, scenario.flight.airspeed_m_s)[:3]
     x, y, z = (float(value) for value in source_B - mounting.probe_tip_m)
     control = load_parameters(scenario.hardware.receiver_sheet("flight_control"), FlightControlParameters)
-    forward, left, up = (COMMANDED * float(limit) for limit in control.acceleration_limit_m_s2)
     limits = PhaseLimits(
         attempts_max=g.attempts_max,
-        slot_s=max(scenario.flight.duration_s - ATTEMPT_S, 0.5 * scenario.flight.duration_s),
+        slot_s=duration_s - ATTEMPT_S if duration_s >= 2.0 * ATTEMPT_S else float("inf"),
         stabilise_s=g.stabilise_s,
         capture_radius_m=g.capture_radius_m,
         take_in_m=g.take_in_m,
@@ -194,10 +197,17 @@ def guidance_settings(scenario: Scenario) -> GuidanceSettings:
         controller=g.controller,
         stand_off_m=STAND_OFF_M,
         closure_speed_m_s=g.closure_speed_m_s,
-        acceleration_limit_m_s2=(forward, left, up),
+        response_s=RESPONSE_S[scenario.hardware.airframe],
+        acceleration_limit_m_s2=_commanded(control.acceleration_limit_m_s2),
+        jerk_limit_m_s3=_commanded(control.jerk_limit_m_s3),
         bow_wave=BowWavePush(source_from_tip_m=(x, y, z), radius_m=bow_wave.radius_m),
         limits=limits,
     )
+
+
+def _commanded(limits: Array) -> tuple[float, float, float]:
+    forward, left, up = (COMMANDED * float(limit) for limit in limits)
+    return forward, left, up
 
 
 def _sheet(scenario: Scenario, name: str, cls: type[T]) -> T:

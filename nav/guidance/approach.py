@@ -48,10 +48,11 @@ class Guidance:
         self._controller = _controller(settings, self._dt)
         self._miss = PredictedMiss(settings.closing, self._dt)
         self._u: Array = np.zeros(3)
+        self._u_dot: Array = np.zeros(3)
         self._path, self._turn_rad_s, self._turn_error_m_s = AnnouncedPath(), 0.0, 0.0
         self._aim: Array = np.zeros(2)
         self._passed: Array | None = None  # where the ring was when the tip last came to its plane, left and up
-        self._closure, self._good, self._attempts = 0.0, False, 0
+        self._closure, self._good, self._attempts, self._docked = 0.0, False, 0, False
         self._time_s = self._in_phase_s = self._steady_s = self._waiting_s = 0.0
         self._unusable_s = self._doubtful_s = self._pushed_in_m = 0.0
 
@@ -73,7 +74,9 @@ class Guidance:
         self._change_phase(self._situation(ring, rate, coupling))
         u_dot = self._follow() if self._follows(state, ring) else self._hold_course()
         limit = np.array(self._settings.acceleration_limit_m_s2)
-        u_dot = np.clip(u_dot, -limit, limit)
+        change = self._dt * np.array(self._settings.jerk_limit_m_s3)
+        u_dot = np.clip(np.clip(u_dot, -limit, limit), self._u_dot - change, self._u_dot + change)
+        self._u_dot = u_dot
         self._u = _limited(self._u + u_dot * self._dt, self._settings.velocity_limit_m_s)
         self._controller.given(self._u)
         return self._command(state, u_dot)
@@ -146,6 +149,7 @@ class Guidance:
             closing_m_s=-float(rate[0]),
             pushed_in_m=self._pushed_in_m,
             attempts=self._attempts,
+            docked=self._docked,
         )
 
     def _change_phase(self, situation: Situation) -> None:
@@ -154,6 +158,7 @@ class Guidance:
         if transition is None:
             return
         self.phase, self.phase_reason, self._in_phase_s = transition.to, transition.reason, 0.0
+        self._docked = self._docked or self.phase is Phase.HOLD
         if self.phase is Phase.APPROACH:
             self._attempts, self._passed, self._good = self._attempts + 1, None, True
             self._closure = self._waiting_s = 0.0

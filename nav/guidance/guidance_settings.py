@@ -45,8 +45,9 @@ class GuidanceSettings:
     closure_speed_m_s: float = 1.2  # published practice 1.0-1.5 m/s
     join_up_speed_m_s: float = 1.5  # assumed: walking pace, as in practice from some tens of metres
     back_off_speed_m_s: float = 1.0  # breakaway practice 1-2 m/s
-    response_s: tuple[float, float, float] = (0.28, 0.10, 0.10)  # tau: delay of the tip at 0.1-0.5 Hz, computing included
-    acceleration_limit_m_s2: tuple[float, float, float] = (0.75, 1.9, 1.9)  # a little less than the flight control's
+    response_s: tuple[float, float, float] = (0.28, 0.10, 0.10)  # tau: delay of the tip, computing included
+    acceleration_limit_m_s2: tuple[float, float, float] = (0.75, 1.9, 1.9)  # less than the flight control's
+    jerk_limit_m_s3: tuple[float, float, float] = (3.8, 6.6, 7.6)  # likewise
     velocity_limit_m_s: float = 3.5
     closure_acceleration_m_s2: float = 0.6  # how fast the closure speed is asked for
     take_in_gain_1_s: float = 0.35  # speed into the refuelling range per metre to go; a third of the next: no overshoot

@@ -57,6 +57,8 @@ def a_result(scenario, seed, out, **changes) -> Result:
         "real_time_factor": 0.25,
         "wall_time_s": 80.0,
         "versions": {"dockair": "0.1.0"},
+        "timeline": (),
+        "nav_by_range": (),
         "out_dir": str(out),
     }
     return Result(**(values | changes))

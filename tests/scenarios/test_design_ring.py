@@ -58,13 +58,13 @@ def test_the_default_design_is_the_default_ring():
 
 
 def test_inner_leds_sit_on_the_ribs_between_rim_and_mouth():
-    """Rim tube 30 mm ahead at 250 mm, mouth 250 mm ahead at 64 + 8 mm: 200 mm ahead it is 250 - 178 x 17/22."""
-    assert inner_radius(DEEP) == pytest.approx(0.250 - 0.178 * 17.0 / 22.0)
+    """Rim tube 30 mm ahead at 250 mm, mouth 250 mm ahead at 50 + 8 mm: 200 mm ahead it is 250 - 192 x 17/22."""
+    assert inner_radius(DEEP) == pytest.approx(0.250 - 0.192 * 17.0 / 22.0)
     points = DEEP.points_D
     assert points.shape == (12, 3) and (points[8:, 0] == 0.2).all() and (points[:8, 0] == 0.0).all()
     np.testing.assert_allclose(np.hypot(points[8:, 1], points[8:, 2]), inner_radius(DEEP))
     assert inner_radius(replace(DEEP, depth_m=-0.1)) == 0.25
-    assert inner_radius(replace(DEEP, depth_m=0.25)) == pytest.approx(0.072)
+    assert inner_radius(replace(DEEP, depth_m=0.25)) == pytest.approx(0.058)
 
 
 def test_a_coded_ring_has_one_led_12_deg_off_its_place():
