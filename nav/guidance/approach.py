@@ -92,7 +92,7 @@ class Guidance:
         bow_wave = self._settings.bow_wave
         self._controller.observe(
             Sight(
-                place_m=ring if ring[0] > 0.0 else coupling,
+                place_m=ring if ring[0] > 0.0 else np.append(ring[:1], coupling[1:]),
                 rate_m_s=rate,
                 push_m_s2=bow_wave.at(ring),
                 push_then_m_s2=bow_wave.at(later),

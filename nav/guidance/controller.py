@@ -12,7 +12,7 @@ from dockair.rotations import Array
 class Sight:
     """The drogue in stabilised axes, forward, left, up."""
 
-    place_m: Array  #: (3,) where to bring the probe's tip, from there: ring centre, or the coupling once past it
+    place_m: Array  #: (3,) ring centre from the probe's tip; across the coupling's, once past the ring
     rate_m_s: Array  #: (3,) its rate
     push_m_s2: Array  #: (3,) what the bow wave does to it now
     push_then_m_s2: Array  #: (3,) and after the response time

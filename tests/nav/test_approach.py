@@ -121,11 +121,26 @@ def _swing(t):
 
 def test_prediction_meets_a_swing_that_the_pid_is_too_late_for():
     ours, theirs = Plant(drogue=_swing), Plant(drogue=_swing)
-    loose = dataclasses.replace(PID, limits=PhaseLimits(capture_radius_m=1.0))
-    fly(ours)
+    strong = {"acceleration_limit_m_s2": (0.75, 4.0, 4.0), "jerk_limit_m_s3": (4.0, 20.0, 20.0)}
+    loose = dataclasses.replace(PID, limits=PhaseLimits(capture_radius_m=1.0), **strong)
+    fly(ours, settings=dataclasses.replace(SETTINGS, **strong))
     fly(theirs, settings=loose)
     assert ours.radial_at_contact < 0.04  # of 0.3 m
     assert theirs.radial_at_contact > 0.1
+
+
+def test_a_swing_beyond_the_airframe_s_acceleration_is_waited_for_astern():
+    plant, late = Plant(drogue=lambda t: 3.0 * _swing(t)), []  # 6 m/s^2 where 1.9 may be flown
+
+    def watched(s):
+        late.extend([np.abs(plant.v[1:]).max()] if plant.t > 20.0 else [])
+        return s
+
+    phases, _ = fly(
+        plant, settings=dataclasses.replace(SETTINGS, limits=PhaseLimits(slot_s=45.0)), seconds=60.0, seen=watched
+    )
+    assert Phase.APPROACH not in phases and phases[-1] is Phase.CLEAR
+    assert max(late) < 0.7  # of the drogue's 2.3 m/s
 
 
 def test_a_drogue_that_cannot_be_followed_is_not_closed_upon():
