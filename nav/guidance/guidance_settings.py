@@ -22,6 +22,7 @@ class PredictiveSettings:
     integral_error_max_m: float = 0.2  # beyond this the receiver is on its way, not off by a wrong idea
     smoothing_1_s: float = 4.0  # how fast u goes to the u of Eq. (1) where it is not there
     bearable_share: float = 0.7  # of the limit of acceleration, rms: above it a swing's peaks are cut off every time
+    calm_share: float = 0.3  # of the gains, when a swing is only waited for: its middle moves in some 10 s
     bearing_s: float = 4.0  # over which that mean is taken: a swing and a half
     swing: SwingSettings = field(default_factory=SwingSettings)
 

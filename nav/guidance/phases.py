@@ -34,7 +34,7 @@ class PhaseLimits:
     steady_along_m: float = 0.35  # assumed: twice the way that moderate gusts push receiver and drogue apart
     steady_sigma_m: float = 0.05  # assumed: a third of the 0.15 m that a contact may be off
     capture_radius_m: float = 0.10  # assumed: a spread of 0.10 m leaves 2 % of the tips outside the rim's 0.19 m
-    waiting_s: float = 8.0  # assumed: two or three swings short of the basket without a good moment are enough
+    waiting_s: float = 20.0  # assumed: gusts that pass by have passed; a retry would wait as long
     coupling_reached_m: float = 0.05  # assumed: the coupling takes the tip within 0.03 m, the range errs by 0.02 m
     come_along_m: float = 0.2  # assumed: a drogue farther from the tip than this is not held by it
     take_in_m: float = 1.5  # inside the refuelling range 0.5-6 m (KDC-10 procedures)

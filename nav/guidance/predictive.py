@@ -12,7 +12,8 @@ y_D'. What the tip does otherwise than commanded is part of y_D too: it is predi
 own motion, with the same filter.
 
 A swing that asks for more than a share of the acceleration that the receiver may fly (rms over some swings) is not
-followed but waited for astern: then y_D is the middle of the swing.
+followed but waited for astern: then y_D is the middle of the swing, and k and s are smaller. In gusts that move the
+drogue so much the surfaces have no rate to spare for haste.
 
 Not modelled: limits of the airframe in advance; what they cut off is missing from y_r's scale until it is seen.
 """
@@ -26,6 +27,9 @@ from dockair.nav.guidance.own_path import OwnPath
 from dockair.rotations import Array
 
 
+_AT_FIRST = 1.5  # of what is bearable: a swing that nobody has seen yet is not followed
+
+
 class Predictive:
     """Eq. (1); see `controller.Controller`."""
 
@@ -36,8 +40,8 @@ class Predictive:
         self._gains = np.array([settings.along_gain_1_s, settings.across_gain_1_s, settings.across_gain_1_s])
         self._ahead: tuple[Array, Array, Array] = (np.zeros(3), np.zeros(3), np.zeros(3))
         self._integral: Array = np.zeros(2)  # k_i times it, left and up [m/s]
-        self._asked: Array = np.zeros(2)  # mean square of the drogue's acceleration, left and up
         self._bearable = (settings.bearable_share * limit_m_s2[1:]) ** 2
+        self._asked = _AT_FIRST * self._bearable  # mean square of the drogue's acceleration, left and up
         self._step_s, self._seen = step_s, False
 
     def observe(self, sight: Sight | None) -> None:
@@ -73,18 +77,20 @@ class Predictive:
         """(3,) du/dt of Eq. (1)."""
         bearable = wanted.must_follow or bool((self._asked <= self._bearable).all())
         place, velocity, acceleration = self._ahead if bearable else self._motion.mean_ahead()
+        calm = 1.0 if bearable else self._settings.calm_share
+        gains = calm * self._gains
         to_go = place - self._own.place_ahead_m
         to_go[1:] += wanted.aim_m
-        speed = self._gains * to_go
-        self._integrate(to_go[1:])
+        speed = gains * to_go
+        if bearable:
+            self._integrate(to_go[1:])
         speed[1:] += self._integral
+        change = gains * (velocity - u)
         if wanted.distance_m is None:
-            speed[0], change = wanted.speed_m_s, self._gains * (velocity - u)
-            change[0] = 0.0
+            speed[0], change[0] = wanted.speed_m_s, 0.0
         else:
-            speed[0] = clipped(self._gains[0] * (to_go[0] - wanted.distance_m), wanted.speed_m_s)
-            change = self._gains * (velocity - u)
-        return np.asarray(acceleration + change + self._settings.smoothing_1_s * (velocity + speed - u))
+            speed[0] = clipped(gains[0] * (to_go[0] - wanted.distance_m), wanted.speed_m_s)
+        return np.asarray(acceleration + change + calm * self._settings.smoothing_1_s * (velocity + speed - u))
 
     def _integrate(self, error_m: Array) -> None:
         """Go on with the integral; errors too large for it count no more than their limit."""

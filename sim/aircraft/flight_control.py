@@ -17,8 +17,8 @@ accelerometers feel across the body beyond what the on-board model of the airfra
 airspeed beyond that of the inertial velocity, through a first-order low pass. A pull of the hose looks like a gust and
 is countered like one. At its first step the control engages without a bump: the model starts from trim with the
 aircraft's velocity, g from its measurement, and z, in a trim of air that sinks, from what holds it.
-What keeps the model inside the actuators' limits are those of the reference; beyond them the aircraft falls behind its
-model, and comes back.
+What keeps the model inside the actuators' limits are those of the reference, which are taken back where a surface meets
+its rate limit (`rate_relief`); beyond them the aircraft falls behind its model, and comes back.
 
 Valid while the aircraft stays near the path's trim (attitude within some 30 degrees, airspeed within some 10 m/s).
 Not modelled: structural modes, quantisation, delay of computing beyond a tick; its model of the airframe is exact.
@@ -36,6 +36,7 @@ from dockair.sim.aircraft.flight_path import FlightPath
 from dockair.sim.aircraft.gain_schedule import RATE_0, SURFACES_0, THRUST_0, Design, GainSchedule
 from dockair.sim.aircraft.linear_model import ATTITUDE, STATES, SURFACES, THRUST
 from dockair.sim.aircraft.model_flight import ModelFlight
+from dockair.sim.aircraft.rate_relief import RateRelief
 from dockair.sim.aircraft.reference import Reference
 from dockair.sim.aircraft.regulator import FOLLOWED
 from dockair.sim.aircraft.trim import Trim
@@ -91,6 +92,8 @@ class FlightControl:
                 np.append(limits_rad, thrust.military_n / self._mass_kg),
             ]
         )
+        rates_rad_s = np.asarray(airframe.surface_rate_limits_rad_s)
+        self._relief = RateRelief(parameters.relief, airframe.actuator_bandwidth_rad_s, rates_rad_s, step_s)
         self.model = ModelFlight(airframe, trim.aerodynamics, step_s)
         self._x_m: Array = np.zeros(FOLLOWED)
         self._z: Array = np.zeros(3)
@@ -159,7 +162,8 @@ class FlightControl:
             self.reference.start(x[:3], R_FB, command)
         modelled = (model.R_WB, model.velocity_W, model.w_WB_B, model.actuators[:3], model.actuators[3])
         _state(path.axes(), *modelled, *about, R_FM, v_M, trim, x_m[:STATES])
-        chain = self.reference.step(R_FB, command, x_m[ATTITUDE.start])
+        share = self._relief.step(surfaces_command, surfaces_rad) if self._engaged else 1.0
+        chain = self.reference.step(R_FB, command, x_m[ATTITUDE.start], share)
         measured = (x, v_B, force_B, specific_force_B, airspeed_m_s, trim, chain)
         gains = (row.C, row.K, row.K_followed, row.K_command, row.gust_from_residual)
         memory = (x_m, self._w_m, self._z, self._gust, self._force_B)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from dockair.rotations import Array
 from dockair.sim.aircraft.flight_path import FlightPathParameters
 from dockair.sim.aircraft.own_sensors import OwnSensorsParameters
+from dockair.sim.aircraft.rate_relief import RateReliefParameters
 from dockair.sim.aircraft.reference import ReferenceLimits
 from dockair.sim.aircraft.regulator import Swing, Tolerances
 
@@ -36,6 +37,9 @@ class FlightControlParameters:
     jerk_limit_m_s3: Array  #: (3,)
     velocity_limit_m_s: float
     increment_bank_rad: Array  #: (2,)
+    relief_time_s: float
+    relief_busy_share: float
+    relief_least: float
     path_bandwidth_rad_s: float
     path_damping: float
     path_catching_up: float
@@ -93,6 +97,13 @@ class FlightControlParameters:
             jerk_m_s3=self.jerk_limit_m_s3,
             velocity_m_s=self.velocity_limit_m_s,
             bank_rad=self.increment_bank_rad,
+        )
+
+    @property
+    def relief(self) -> RateReliefParameters:
+        """Constants of what takes the reference back."""
+        return RateReliefParameters(
+            time_s=self.relief_time_s, busy_share=self.relief_busy_share, least=self.relief_least
         )
 
     @property

@@ -1,0 +1,54 @@
+"""Takes the reference back when a surface meets its rate limit, before haste and lag feed each other.
+
+A surface at its rate limit answers late; a loop that then asks for more drives it to the next stop, and an airframe
+that is not stable by itself departs. b is the part of the time, over T, for which some surface has been asked for more
+than its rate:
+
+    b' = (busy - b) / T,     busy = 1 where a |command - surface| > rate limit, else 0                    (1)
+    share = 1 - (1 - least) min(b / b_0, 1)                                                               (2)
+
+a is the actuators' bandwidth. The reference's limits of acceleration are multiplied by the share.
+Not modelled: a cause other than haste; surfaces that are busy with gusts alone take the reference back, too.
+Source: the idea of relieving a rate-limited loop is common practice against pilot-induced oscillations [Duda 1998,
+Flight control system design considering rate saturation, Aerospace Science and Technology 2(4)]; this form is our own.
+"""
+
+import math
+from dataclasses import dataclass
+
+from dockair.rotations import Array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RateReliefParameters:
+    """Constants of Eqs. (1) and (2)."""
+
+    time_s: float  #: T
+    busy_share: float  #: b_0
+    least: float
+
+
+class RateRelief:
+    """Eqs. (1) and (2), one tick at a time.
+
+    Args:
+        parameters: constants.
+        bandwidth_rad_s: a.
+        rate_limits_rad_s: (3,) of elevator, aileron and rudder.
+        step_s: length of a tick.
+    """
+
+    def __init__(
+        self, parameters: RateReliefParameters, bandwidth_rad_s: float, rate_limits_rad_s: Array, step_s: float
+    ) -> None:
+        self._parameters = parameters
+        self._largest = [float(rate) / bandwidth_rad_s for rate in rate_limits_rad_s]
+        self._keep = math.exp(-step_s / parameters.time_s)
+        self._busy = 0.0
+
+    def step(self, commands_rad: Array, surfaces_rad: Array) -> float:
+        """Return the share after a tick in which the surfaces (3,) were sent to the commands (3,)."""
+        busy = any(abs(commands_rad[i] - surfaces_rad[i]) > self._largest[i] for i in range(3))
+        self._busy = self._keep * self._busy + (1.0 - self._keep if busy else 0.0)
+        p = self._parameters
+        return 1.0 - (1.0 - p.least) * min(self._busy / p.busy_share, 1.0)
