@@ -26,7 +26,6 @@ from dockair.nav.guidance.guidance_settings import PredictiveSettings
 from dockair.nav.guidance.own_path import OwnPath
 from dockair.rotations import Array
 
-
 _AT_FIRST = 1.5  # of what is bearable: a swing that nobody has seen yet is not followed
 
 

@@ -50,7 +50,7 @@ HELD = {"ahead_m": 0.0, "ring_ahead_m": -0.3, "closing_m_s": 0.0}
         ("approach", {"lateral_m": 0.3, "ring_ahead_m": -0.01}, "breakaway"),
         ("approach", {"lateral_m": 0.2, "ring_ahead_m": -0.01}, None),
         ("approach", {"closing_m_s": 2.7}, "breakaway"),
-        ("approach", {"waiting_s": 8.1}, "back_off"),
+        ("approach", {"waiting_s": 20.1}, "back_off"),
         ("approach", {"ahead_m": 0.04}, "contact"),
         ("contact", HELD, None),
         ("contact", HELD | {"ahead_m": -0.3}, "back_off"),
