@@ -1,5 +1,6 @@
 """What a group's scenario claims, and what it lacks of the figures that it is held to."""
 
+import shlex
 from collections.abc import Sequence
 
 from dockair.errors import DockairError
@@ -8,9 +9,9 @@ from dockair.scenarios.schema import Scenario, load_scenario
 
 
 def scenario_of(group: Group) -> Scenario | None:
-    """Return the library's scenario of the group's name; None where the library has none."""
+    """Return the scenario as its file says it; None where that file is not to be found any more."""
     try:
-        return load_scenario(group.scenario)
+        return load_scenario(shlex.split(group.rows[0]["command"])[2])
     except DockairError:
         return None
 

@@ -30,7 +30,11 @@ def test_the_navigator_of_ones_own_flies_from_the_folder_one_stands_in_and_repla
     assert replayed.returncode == 0 and replayed.stdout.startswith("identical"), replayed.stderr
 
 
-PAGES = ["README.md", "docs/environments.md", "docs/heading.md", "docs/navigation.md", "docs/results.md"]
+PAGES = [
+    str(page.relative_to(ROOT))
+    for page in sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md")])
+    if "```python" in page.read_text(encoding="utf-8")
+]
 
 
 @pytest.mark.parametrize("page", PAGES)
@@ -39,6 +43,10 @@ def test_code_on_a_page_is_python(page):
     assert blocks
     for block in blocks:
         compile(block, page, "exec")
+
+
+def test_the_pages_with_code_are_found():
+    assert {"README.md", "docs/environments.md", "docs/tutorials/own_controller.md"} <= set(PAGES)
 
 
 def test_every_relative_link_leads_somewhere():
