@@ -62,8 +62,18 @@ def test_reference_takes_back_the_acceleration_to_the_side_as_the_bank_grows(sha
     limits = PARAMETERS.reference_limits
     first, last = limits.bank_rad
     bank = first * share if share < 1.0 else first + (share - 1.0) * (last - first)
-    reference, command = Reference(limits, 1e-3), ReceiverCommand(velocity_m_s=np.array([0.0, 9.0, 9.0]))
+    asked = np.array([0.0, 20.0, 20.0])  # m/s^2, beyond every limit
+    reference, command = Reference(limits, 1e-3), ReceiverCommand(acceleration_m_s2=asked)
     reference.start(np.zeros(3), np.eye(3), command)
     for _ in range(700):
         chain = reference.step(np.eye(3), command, -bank)
     np.testing.assert_allclose(chain[1, 1:], limits.acceleration_m_s2[1:] * [left, 1.0], rtol=0.02, atol=1e-12)
+
+
+def test_a_share_takes_back_the_acceleration_on_every_axis() -> None:
+    limits = PARAMETERS.reference_limits
+    reference, command = Reference(limits, 1e-3), ReceiverCommand(acceleration_m_s2=np.array([20.0, 20.0, 20.0]))
+    reference.start(np.zeros(3), np.eye(3), command)
+    for _ in range(1500):
+        chain = reference.step(np.eye(3), command, 0.0, 0.25)
+    np.testing.assert_allclose(chain[1], 0.25 * limits.acceleration_m_s2, rtol=0.02)
