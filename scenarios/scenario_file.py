@@ -1,14 +1,13 @@
 """Finds and reads a scenario's TOML and lays the settings of `--set` over it; what the keys mean is the schema's."""
 
-import os
-import tomllib
 from collections.abc import Mapping
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 from dockair.errors import DockairError
+from dockair.scenarios.toml_files import TomlFiles, read_toml, toml_value
 
+_SCENARIOS = TomlFiles("scenario", "a scenario of the library", "library")
 #: Setting the one replaces the other, which the file may have given.
 _ALTERNATIVES = {"turbulence.sigma_m_s": "intensity", "turbulence.intensity": "sigma_m_s"}
 _PATHS = ("camera", "ring")  # keys of [hardware] that name a file
@@ -16,7 +15,7 @@ _PATHS = ("camera", "ring")  # keys of [hardware] that name a file
 
 def scenario_names() -> list[str]:
     """Names in the library, the default first."""
-    return sorted(_library(), key=lambda name: (name != "default", name))
+    return sorted(_SCENARIOS.names(), key=lambda name: (name != "default", name))
 
 
 def scenario_text(name_or_path: str | Path) -> str:
@@ -28,7 +27,7 @@ def scenario_text(name_or_path: str | Path) -> str:
     Raises:
         DockairError: no such scenario.
     """
-    return _find(name_or_path).read_text(encoding="utf-8")
+    return _SCENARIOS.find(name_or_path).read_text(encoding="utf-8")
 
 
 class ScenarioFile:
@@ -46,13 +45,13 @@ class ScenarioFile:
     """
 
     def __init__(self, name_or_path: str | Path, settings: Mapping[str, object]) -> None:
-        path = _find(name_or_path)
-        self._shown = path.name if path.parent == _folder() else str(path)
+        path = _SCENARIOS.find(name_or_path)
+        self._shown = _SCENARIOS.shown(path)
         self._settings = tuple(settings)
-        self.table = _read(path)
+        self.table = read_toml(path)
         _resolve_hardware(self.table, path.parent)
         for key, value in settings.items():
-            _set(self.table, key, _value(value) if isinstance(value, str) else value)
+            _set(self.table, key, toml_value(value) if isinstance(value, str) else value)
 
     def place(self, where: str) -> str:
         """Return where a dotted key was written: `--set key`, or file and key."""
@@ -62,49 +61,12 @@ class ScenarioFile:
         return f"{self._shown}: {where}"
 
 
-def _folder() -> Path:
-    return Path(str(files("dockair.scenarios"))) / "library"
-
-
-def _library() -> dict[str, Path]:
-    return {path.stem: path for path in _folder().glob("*.toml")}
-
-
-def _find(name_or_path: str | Path) -> Path:
-    path = Path(name_or_path)
-    if isinstance(name_or_path, str) and path.suffix.lower() != ".toml" and os.sep not in name_or_path:
-        if name_or_path not in _library():
-            expected = "a scenario of the library, or the path of a TOML file"
-            raise DockairError("scenario", expected=expected, got=name_or_path, exists=scenario_names())
-        return _library()[name_or_path]
-    if not path.exists():
-        raise DockairError(str(path), expected="a scenario file", got="no such file")
-    return path
-
-
-def _read(path: Path) -> dict[str, Any]:
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise DockairError(str(path), expected="TOML", got=str(error)) from None
-    except OSError as error:
-        raise DockairError(str(path), expected="a file that can be read", got=error.strerror) from None
-
-
 def _resolve_hardware(table: dict[str, Any], folder: Path) -> None:
     """Take the file's paths from its own folder; those of `--set` are taken from where one stands."""
     hardware = table.get("hardware")
     if isinstance(hardware, dict):
         paths = {key: hardware[key] for key in _PATHS if isinstance(hardware.get(key), str)}
         hardware.update({key: str(folder / path) for key, path in paths.items()})
-
-
-def _value(text: str) -> object:
-    try:
-        table = tomllib.loads(f"value = {text}")
-    except tomllib.TOMLDecodeError:
-        return text  # a shell has eaten the quotes, or a name that needs none
-    return table["value"] if len(table) == 1 else text
 
 
 def _set(table: dict[str, Any], key: str, value: object) -> None:

@@ -1,9 +1,6 @@
 """Finds and reads a plan's TOML, lays what the command line says over it, and refuses what cannot be flown."""
 
-import os
-import tomllib
 from collections.abc import Mapping
-from importlib.resources import files
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -15,13 +12,15 @@ from dockair.scenarios.campaign.plan import Plan, RatesAsked
 from dockair.scenarios.refusal import refusal
 from dockair.scenarios.scenario_file import scenario_names
 from dockair.scenarios.table import Table
+from dockair.scenarios.toml_files import TomlFiles, read_toml, toml_value
 
 _T = TypeVar("_T", bound=Table)
+_PLANS = TomlFiles("plan", "a packaged plan", "plans")
 
 
 def plan_names() -> list[str]:
     """Names of the packaged plans."""
-    return sorted(_packaged())
+    return _PLANS.names()
 
 
 class PlanFile:
@@ -47,11 +46,11 @@ class PlanFile:
         changes: Mapping[str, object] | None = None,
         settings: Mapping[str, str] | None = None,
     ) -> None:
-        path = _find(name_or_path)
+        path = _PLANS.find(name_or_path)
         self.folder = path.parent
-        self._shown = path.name if path.parent == _packaged_folder() else str(path)
-        self.settings = {key: _value(text) for key, text in (settings or {}).items()}
-        table = _read(path)
+        self._shown = _PLANS.shown(path)
+        self.settings = {key: toml_value(text) for key, text in (settings or {}).items()}
+        table = read_toml(path)
         if isinstance(table.get("scenarios"), list):
             table["scenarios"] = _expanded(table["scenarios"], own_seeds="seeds" not in (changes or {}))
         self.plan = self._checked(Plan, table | dict(changes or {}), "")
@@ -94,40 +93,3 @@ def _expanded(entries: list[Any], *, own_seeds: bool) -> list[Any]:
         names = scenario_names() if table.get("scenario") == "*" else [table.get("scenario")]
         found += [kept | {"scenario": name} for name in names] if "scenario" in table else [entry]
     return found
-
-
-def _packaged_folder() -> Path:
-    return Path(str(files("dockair.scenarios"))) / "plans"
-
-
-def _packaged() -> dict[str, Path]:
-    return {path.stem: path for path in _packaged_folder().glob("*.toml")}
-
-
-def _find(name_or_path: str | Path) -> Path:
-    path = Path(name_or_path)
-    if isinstance(name_or_path, str) and path.suffix.lower() != ".toml" and os.sep not in name_or_path:
-        if name_or_path not in _packaged():
-            expected = "a packaged plan, or the path of a TOML file"
-            raise DockairError("plan", expected=expected, got=name_or_path, exists=plan_names())
-        return _packaged()[name_or_path]
-    if not path.exists():
-        raise DockairError(str(path), expected="a plan file", got="no such file")
-    return path
-
-
-def _read(path: Path) -> dict[str, Any]:
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise DockairError(str(path), expected="TOML", got=str(error)) from None
-    except OSError as error:
-        raise DockairError(str(path), expected="a file that can be read", got=error.strerror) from None
-
-
-def _value(text: str) -> object:
-    try:
-        table = tomllib.loads(f"value = {text}")
-    except tomllib.TOMLDecodeError:
-        return text  # a shell has eaten the quotes, or a name that needs none
-    return table["value"] if len(table) == 1 else text
