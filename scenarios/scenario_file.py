@@ -15,7 +15,7 @@ _PATHS = ("camera", "ring")  # keys of [hardware] that name a file
 
 def scenario_names() -> list[str]:
     """Names in the library, the default first."""
-    return sorted(_SCENARIOS.names(), key=lambda name: (name != "default", name))
+    return _SCENARIOS.names()
 
 
 def scenario_text(name_or_path: str | Path) -> str:

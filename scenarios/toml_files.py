@@ -24,8 +24,8 @@ class TomlFiles:
         return Path(str(files("dockair.scenarios"))) / self.subfolder
 
     def names(self) -> list[str]:
-        """Names of the packaged files."""
-        return sorted(path.stem for path in self.folder.glob("*.toml"))
+        """Names of the packaged files, the default first."""
+        return sorted((path.stem for path in self.folder.glob("*.toml")), key=lambda name: (name != "default", name))
 
     def find(self, name_or_path: str | Path) -> Path:
         """Return the path of a file.
