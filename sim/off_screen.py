@@ -33,11 +33,14 @@ class Canvas:
 
     def __init__(self, model: mujoco.MjModel, width: int, height: int, where: str, font: int = _SMALLEST_FONT) -> None:
         self._context, self._renderer = open_renderer(model, width, height, font, where)
+        self._shape = height, width
 
     def render(
         self, scene: mujoco.MjvScene, colours: NDArray[np.uint8], depths: NDArray[np.float32] | None = None
     ) -> None:
-        """Draw a scene into the buffer's lower left and read it, rows running upward.
+        """Draw a scene and read it, rows running upward.
+
+        The buffer is made as large as the picture: a part of it would be cleared pixel by pixel.
 
         Args:
             scene: what is drawn.
@@ -46,6 +49,9 @@ class Canvas:
         """
         rect = mujoco.MjrRect(0, 0, colours.shape[1], colours.shape[0])
         self._context.make_current()
+        if colours.shape[:2] != self._shape:
+            mujoco.mjr_resizeOffscreen(rect.width, rect.height, self._renderer)
+            self._shape = colours.shape[0], colours.shape[1]
         mujoco.mjr_render(rect, scene, self._renderer)
         mujoco.mjr_readPixels(colours, depths, rect, self._renderer)
 

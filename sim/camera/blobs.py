@@ -21,6 +21,7 @@ from dockair.sim.camera.point_sources import WIDE_PX, Sources
 from dockair.sim.camera.splat import reach_window
 
 _FAINTEST_E = 0.5  # a whole blob with fewer electrons is left out
+_WIDE = -1.0  # in the place of a size: drawn first, without the lens's blur
 _SQUARE_SIGMAS = float(np.sqrt(12.0))  # side of a square over its standard deviation
 
 Lens = tuple[float, float, float, float, float, float, float, float]  # f, c_u, c_v [px], k1, k2, p1, p2, k3
@@ -65,13 +66,14 @@ class Blobs:
         near = near[are_seen(near)]
         if dirt is not None:
             electrons[near] *= dirt.at(pixels[near])
-        is_wide = width_px[near] >= WIDE_PX
-        wide, narrow = near[is_wide], near[~is_wide]
-        if len(wide):
-            add_patches(image, start, pixels[wide], electrons[wide], width_px[wide] / _SQUARE_SIGMAS)
-        for size_m in sorted(set(size[narrow].tolist())):
-            of = narrow[size[narrow] == size_m]
-            self._spread.splat(image, start, pixels[of], electrons[of], sources.p_C[of, 0], size_m, smear[of])
+        sizes = size[near]
+        sizes[width_px[near] >= WIDE_PX] = _WIDE
+        for size_m in sorted(set(sizes.tolist())):
+            of = near[sizes == size_m]
+            if size_m == _WIDE:
+                add_patches(image, start, pixels[of], electrons[of], width_px[of] / _SQUARE_SIGMAS)
+            else:
+                self._spread.splat(image, start, pixels[of], electrons[of], sources.p_C[of, 0], size_m, smear[of])
 
 
 @njit(cache=True)

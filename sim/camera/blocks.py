@@ -33,7 +33,10 @@ Line = tuple[NDArray[np.int64], NDArray[np.float32]]
 Layer = tuple[NDArray[np.float32], Line, Line, tuple[int, int], int]  # nodes, rows, columns, first node, spacing [px]
 _NO_LINE: Line = (np.empty(0, dtype=np.int64), np.empty(0, dtype=np.float32))
 _NOTHING: Layer = (np.empty((0, 0), dtype=np.float32), _NO_LINE, _NO_LINE, (0, 0), 0)
-_ALIKE = np.empty((0, 0), dtype=np.float32)  # in the place of the fall-off: none
+#: The whole sensor's, and its row and column of the scene's first node: rows of a part of it would not be known to be
+#: contiguous, and so be worked on one number at a time.
+FallOff = tuple[NDArray[np.float32], int, int]
+_ALIKE: FallOff = (np.empty((0, 0), dtype=np.float32), 0, 0)  # none
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,6 +82,7 @@ class Blocks:
                 self.drawn = self.drawn_for(self.whole)
             else:
                 a, b = np.meshgrid(x, y)
+        self._drawn_tangents = self._tangents(self.drawn)
         self._fall_off = (1.0 / (1.0 + a**2 + b**2) ** 2).astype(np.float32)
 
     @property
@@ -89,9 +93,12 @@ class Blocks:
     def around(self, window: Window) -> Extent:
         """Blocks that the pixels of a window are interpolated from."""
         k = self._k
-        first = [(2 * pixel + 1 - k) // (2 * k) for pixel in (window.row_start, window.column_start)]
-        last = [(2 * pixel - 1 - k) // (2 * k) + 1 for pixel in (window.row_stop, window.column_stop)]
-        return Extent(first[0], last[0] + 1, first[1], last[1] + 1)
+        return Extent(
+            (2 * window.row_start + 1 - k) // (2 * k),
+            (2 * window.row_stop - 1 - k) // (2 * k) + 2,
+            (2 * window.column_start + 1 - k) // (2 * k),
+            (2 * window.column_stop - 1 - k) // (2 * k) + 2,
+        )
 
     def drawn_for(self, extent: Extent) -> Extent:
         """Blocks of the pinhole's picture that blocks of the sensor are taken from."""
@@ -108,8 +115,12 @@ class Blocks:
         )
 
     def tangents(self, extent: Extent) -> tuple[Array, Array]:
-        """Tangents x (columns,) to the right and y (rows,) below the axis, of the pinhole's blocks."""
-        return self._tangents(extent)
+        """Tangents x (columns,) to the right and y (rows,) below the axis, of some of the pinhole's blocks."""
+        (x, y), drawn = self._drawn_tangents, self.drawn
+        return (
+            x[extent.column_start - drawn.column_start : extent.column_stop - drawn.column_start],
+            y[extent.row_start - drawn.row_start : extent.row_stop - drawn.row_start],
+        )
 
     def to_sensor(self, picture: NDArray[np.float32], drawn: Extent, extent: Extent) -> NDArray[np.float32]:
         """Take the sensor's blocks from the pinhole's."""
@@ -144,7 +155,8 @@ class Blocks:
         rows = _cut(self._lines[0], window.row_start, window.row_stop)
         columns = _cut(self._lines[1], window.column_start, window.column_stop)
         scene = picture, rows, columns, (extent.row_start, extent.column_start), self._k
-        fall_off = self._part(self._fall_off, extent)
+        down, right = extent.row_start - self.whole.row_start, extent.column_start - self.whole.column_start
+        fall_off = self._fall_off, down, right
         out = np.empty(window.shape, dtype=np.float32) if out is None else out
         _to_pixels(out, scene, fall_off, np.float32(white_e), _layer(stray, window), _layer(dirt, window))
         return out
@@ -218,7 +230,7 @@ def _take(
 def _to_pixels(
     out: NDArray[np.float32],
     scene: Layer,
-    fall_off: NDArray[np.float32],
+    fall_off: FallOff,
     white_e: np.float32,
     stray: Layer,
     dirt: Layer,
@@ -244,7 +256,7 @@ def _to_pixels(
 @njit(cache=True)
 def _lines_around(
     layer: Layer,
-    fall_off: NDArray[np.float32],
+    fall_off: FallOff,
     white_e: np.float32,
     r: int,
     width: int,
@@ -252,14 +264,14 @@ def _lines_around(
     held: NDArray[np.int64],
 ) -> tuple[NDArray[np.float32], NDArray[np.float32], np.float32]:
     """Rows of nodes before and after row r of the window, spread to pixels, and the part of the way between them."""
-    nodes, (rows, down), columns, first, spacing = layer
+    (nodes, (rows, down), columns, first, spacing), (whole, top, left) = layer, fall_off
     i = rows[r] - first[0]
     for node in range(max(i, held[0] + 2), i + 2):
         line = nodes[node]
-        if fall_off.size > 0:
-            line = lines[2]
-            for k in range(nodes.shape[1]):
-                line[k] = nodes[node, k] * fall_off[node, k] * white_e
+        if whole.size > 0:
+            line, bright, factor = lines[2], nodes[node], whole[top + node, left : left + nodes.shape[1]]
+            for k in range(bright.shape[0]):
+                line[k] = bright[k] * factor[k] * white_e
         _spread(line, columns, first[1], spacing, lines[node % 2, :width])
     held[0] = i
     return lines[i % 2, :width], lines[(i + 1) % 2, :width], down[r]

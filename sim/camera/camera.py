@@ -114,7 +114,12 @@ class NearInfraredCamera:
         self._memory = np.empty(0, dtype=np.float32)  # of each frame's expected electrons: new memory takes its time
 
     def expose(
-        self, data: mujoco.MjData, time_s: float, frame_number: int, window: Window | None
+        self,
+        data: mujoco.MjData,
+        time_s: float,
+        frame_number: int,
+        window: Window | None,
+        exposure_s: float = np.nan,
     ) -> CameraFrame | None:
         """Return the frame of the world as it stands; None when the camera has dropped out.
 
@@ -123,6 +128,7 @@ class NearInfraredCamera:
             time_s: middle of the exposure.
             frame_number: which of the noise's frames this is.
             window: what to read; None for the full frame.
+            exposure_s: asked for, within the sheet's limits, and no business of the exposure control; NaN: its own.
 
         Raises:
             DockairError: the window is not inside the sensor.
@@ -135,14 +141,16 @@ class NearInfraredCamera:
             return None
         if fault.stuck and self._last is not None:
             return replace(self._last, time_stamp_s=time_s)
-        exposure_s = self.exposure_s(fault)
+        asked, sheet = bool(np.isfinite(exposure_s)) and fault.exposure_s is None, self._sheets.exposure
+        exposure_s = min(max(exposure_s, sheet.shortest_s), sheet.longest_s) if asked else self.exposure_s(fault)
         start = window.row_start, window.column_start
         expected = self.expected_electrons(data, window, time_s, exposure_s, self._room_for(window))
         pixels = digitise(
             expected, self._sheets.sensor, self._pattern, self._noise.image, frame_number, start, exposure_s
         )
         self._defects.whiten(pixels, window, fault.hot_pixels)
-        self._control.step(pixels, exposure_s)
+        if not asked:
+            self._control.step(pixels, exposure_s)
         pixels.setflags(write=False)
         self._last = CameraFrame(
             time_stamp_s=time_s,

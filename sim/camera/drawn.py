@@ -150,7 +150,8 @@ class DrawnSolids:
         near, far = self._limits_m
         left, right, top, bottom = frustum
         outward_C = [[left, 1, 0], [-right, -1, 0], [top, 0, 1], [-bottom, 0, -1], [-1, 0, 0], [1, 0, 0]]
-        planes = np.column_stack([outward_C @ R_WC.T, [0.0, 0.0, 0.0, 0.0, -near, far]])
+        planes = np.zeros((6, 4))
+        planes[:, :3], planes[4, 3], planes[5, 3] = outward_C @ R_WC.T, -near, far
         meshes = np.empty_like(self._meshes)
         pieces = meshes, self._places, self._turns, self._colours
         count = _pieces(self._table, centres, axes, planes, self._scale, pieces)

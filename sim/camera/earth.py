@@ -46,8 +46,10 @@ def unit(directions: Array) -> Array:
 
 
 @njit(cache=True)
-def columns_below(R: Array, x: Array, y: Array, sine: float, out: Interval) -> None:
+def columns_below(R: Array, x: Array, y: Array, sine: float, out: Interval) -> tuple[int, int, bool]:
     """Fill (rows, 2) the columns whose rays point down by more than an angle; there they are one after the other.
+
+    Returns the first row with others and one past the last such row, and whether any column points down so much.
 
     Args:
         R: attitude of the camera.
@@ -56,7 +58,7 @@ def columns_below(R: Array, x: Array, y: Array, sine: float, out: Interval) -> N
         sine: of the angle, positive.
         out: first column and one past the last of each row.
     """
-    k2 = sine * sine
+    k2, first_row, stop_row, any_below = sine * sine, 0, 0, False
     for i in range(len(y)):
         a, b = R[2, 0] - y[i] * R[2, 2], R[2, 1]  # the ray's z is a - x b
         square, half, rest = b * b - k2, a * b, a * a - k2 * (1.0 + y[i] * y[i])
@@ -79,3 +81,7 @@ def columns_below(R: Array, x: Array, y: Array, sine: float, out: Interval) -> N
                 low, high = -np.inf, first
         out[i, 0] = np.searchsorted(x, low)
         out[i, 1] = max(np.searchsorted(x, high), out[i, 0]) if low <= high else out[i, 0]
+        any_below = any_below or out[i, 0] < out[i, 1]
+        if out[i, 0] > 0 or out[i, 1] < len(x):
+            first_row, stop_row = (i if stop_row == 0 else first_row), i + 1
+    return first_row, stop_row, any_below

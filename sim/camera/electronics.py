@@ -25,6 +25,8 @@ Sources: EMVA 1288 release 4.0 (linear model); CMV2000 data sheet v3.8; Cornish 
 Flood 2014 (SplitMix64, rows), C. Wellons, hash-prospector (lowbias32, pixels).
 """
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -46,28 +48,21 @@ def dark_current_e_s(sensor: SensorParameters) -> float:
 
 
 def _chain(sensor: SensorParameters, pattern: FixedPattern, exposure_s: float, bits: int) -> Chain:
-    f = np.float32
-    full_well, reach = sensor.full_well_e, _REACH * float(np.sqrt(sensor.full_well_e))
+    full_well, reach = sensor.full_well_e, _REACH * math.sqrt(sensor.full_well_e)
     return Chain(
-        dark_e=f(dark_current_e_s(sensor) * exposure_s),
-        full_well_e=f(full_well),
-        near_e=f(full_well - reach),
-        far_e=f(full_well + reach),
-        read_noise_e=f(sensor.read_noise_e),
-        variance_e2=f(sensor.read_noise_e**2),
-        gain_step=f(pattern.gain_step),
-        offset_step_e=f(pattern.offset_step_e),
-        gain_dn_e=f(output_gain(sensor, sensor.converter_bits)),
-        black_dn=f(output_black(sensor, sensor.converter_bits) + 0.5),
-        top_dn=f(2**sensor.converter_bits - 1),
-        shift=np.int32(sensor.converter_bits - bits),
+        dark_e=dark_current_e_s(sensor) * exposure_s,
+        full_well_e=full_well,
+        near_e=full_well - reach,
+        far_e=full_well + reach,
+        read_noise_e=sensor.read_noise_e,
+        variance_e2=sensor.read_noise_e**2,
+        gain_step=pattern.gain_step,
+        offset_step_e=pattern.offset_step_e,
+        gain_dn_e=output_gain(sensor, sensor.converter_bits),
+        black_dn=output_black(sensor, sensor.converter_bits) + 0.5,
+        top_dn=2.0**sensor.converter_bits - 1.0,
+        shift=sensor.converter_bits - bits,
     )
-
-
-def _row_gain(sensor: SensorParameters, first: int, rows: int, exposure_s: float) -> NDArray[np.float32]:
-    """1 + P w/t of Eq. (1) for rows of the sensor."""
-    wait_s = overhead_time_s(sensor) + (first + np.arange(rows)) * row_time_s(sensor)
-    return (1.0 + sensor.parasitic_light_sensitivity * wait_s / exposure_s).astype(np.float32)
 
 
 def _check(
@@ -76,7 +71,8 @@ def _check(
     if bits not in (OUTPUT_BITS, sensor.converter_bits):
         exists = [str(OUTPUT_BITS), str(sensor.converter_bits)]
         raise DockairError("digitise.bits", expected="the output's or the converter's", got=bits, exists=exists)
-    if not all(0 <= first <= size - part for first, size, part in zip(start, whole, window, strict=True)):
+    row, column = start
+    if not (0 <= row <= whole[0] - window[0] and 0 <= column <= whole[1] - window[1]):
         expected = f"{window[0]} x {window[1]} pixels inside the sensor's {whole[0]} x {whole[1]}"
         raise DockairError("digitise.start", expected=expected, got=start)
 
@@ -107,7 +103,6 @@ def digitise(
         DockairError: other bits; pixels outside the pattern.
     """
     _check(expected.shape, start, pattern.shape, sensor, bits)
-    row_gain = _row_gain(sensor, start[0], expected.shape[0], exposure_s)
     out = np.empty(expected.shape, dtype=np.uint8 if bits == OUTPUT_BITS else np.uint16)
     digitise_rows(
         np.ascontiguousarray(expected, dtype=np.float32),
@@ -118,7 +113,7 @@ def digitise(
         np.uint64(key),
         frame_number,
         start,
-        row_gain,
+        (sensor.parasitic_light_sensitivity, exposure_s, overhead_time_s(sensor), row_time_s(sensor)),
         _chain(sensor, pattern, exposure_s, bits),
         sensor.read_noise_e < EXACT_BELOW_E,
         POISSON_CDF,

@@ -13,11 +13,14 @@ Sources: metering by a high quantile of the histogram is common practice; the fi
 """
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from dockair.errors import DockairError
 from dockair.sim.camera.electronics import OUTPUT_BITS, output_black, output_gain
 from dockair.sim.camera.sheets import ExposureParameters, SensorParameters
+
+_LEVELS = 1 << OUTPUT_BITS
 
 
 class ExposureControl:
@@ -81,8 +84,33 @@ def brightest_level(pixels: NDArray[np.uint8], n: int) -> int:
     """
     if pixels.shape[0] < n:
         return int(np.sort(pixels, axis=None)[max(pixels.size - n, 0)])
-    of_rows = pixels.max(axis=1)
-    floor = np.partition(of_rows, -n)[-n]
-    rows = pixels[of_rows > floor]
-    brighter = rows[rows > floor]
-    return int(floor if brighter.size < n else np.partition(brighter, -n)[-n])
+    return int(_brightest_level(pixels, n))
+
+
+@njit(cache=True)
+def _brightest_level(pixels: NDArray[np.uint8], n: int) -> int:
+    """As `brightest_level`, of a picture with at least n rows."""
+    of_rows, counts = np.zeros(pixels.shape[0], np.uint8), np.zeros(_LEVELS, np.int64)
+    for i in range(pixels.shape[0]):
+        highest = np.uint8(0)
+        for level in pixels[i]:
+            highest = max(highest, level)
+        of_rows[i] = highest
+        counts[highest] += 1
+    floor = _level_of(counts, n, 0)
+    counts[:] = 0
+    for row in pixels[of_rows > floor]:
+        for level in row:
+            counts[level] += 1
+    return _level_of(counts, n, floor)
+
+
+@njit(cache=True)
+def _level_of(counts: NDArray[np.int64], n: int, floor: int) -> int:
+    """Level of the n-th brightest of those counted, no less than the floor."""
+    above = 0
+    for level in range(_LEVELS - 1, floor, -1):
+        above += counts[level]
+        if above >= n:
+            return level
+    return floor

@@ -129,9 +129,8 @@ def glint_rows(
         surfaces.patch_step_rad,
     )
     balls, tubes = mirrors.balls, mirrors.tubes
-    wanted = np.ones((1, len(balls.geom) + len(tubes.geom)), dtype=np.bool_)
-    spots = np.empty((wanted.size + 2, SPOT))
-    n = round_spots(balls, tubes, xpos, xmat, sun, 0.0, wanted, eye, spots)
+    spots = np.empty((mirrors.all_wanted.size + 2, SPOT))
+    n = round_spots(balls, tubes, xpos, xmat, sun, 0.0, mirrors.all_wanted, eye, spots)
     n += ellipsoid_spots(balls, xpos, xmat, sun, 0.0, eye, spots[n:])
     if mirrors.rim is not None:
         n += rim_spots(mirrors.rim.torus_W(data), float(METAL), mirrors.rim.skin_m, sun, 0.0, eye, spots[n:])
@@ -141,5 +140,16 @@ def glint_rows(
     ahead = (0.0, 0.0, 0.0) if ahead_W is None else vector(ahead_W)
     which = facets_that_may_shine(facets, poses, (s, variance), eye, ahead, finish, surfaces.faintest_radiance)
     count = facet_rows(facets, which, poses, (s, 0.0, variance), eye, finish, limits, rows, count)
-    rows = rows[:count]
-    return rows if ahead_W is None else rows[(rows[:, :3] - p_WC) @ ahead_W > 0.0]
+    return rows[: count if ahead_W is None else _keep_ahead(rows, count, eye, ahead)]
+
+
+@njit(cache=True)
+def _keep_ahead(rows: Array, count: int, eye: Vector, ahead: Vector) -> int:
+    """Leave out, of the first rows, those behind the lens; return how many remain."""
+    kept = 0
+    for i in range(count):
+        x, y, z = rows[i, 0] - eye[0], rows[i, 1] - eye[1], rows[i, 2] - eye[2]
+        if x * ahead[0] + y * ahead[1] + z * ahead[2] > 0.0:
+            rows[kept] = rows[i]
+            kept += 1
+    return kept

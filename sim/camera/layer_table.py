@@ -258,6 +258,7 @@ def _mark(
 ) -> bool:
     """Mark what is not known of the tiles of every stride-th block and their neighbours; say whether that is any."""
     tiles, any_missing, g = known.shape[0], False, _single(geometry)
+    last = -1, -1
     half = np.float32(0.5 * (side - 2))
     for line in range(0, len(y) + stride - 1, stride):
         i = min(line, len(y) - 1)
@@ -272,6 +273,9 @@ def _mark(
             )
             v, u = _node(to_x, to_y, to_z, half)
             row, column = int(v) // _TILE, int(u) // _TILE
+            if (row, column) == last:
+                continue
+            last = row, column
             for a in range(row - 1, row + 2):
                 for b in range(column - 1, column + 2):
                     r, c = a, b

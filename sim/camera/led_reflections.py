@@ -91,11 +91,13 @@ def led_reflection_rows(
 
     Arguments as of `find_led_reflections`.
     """
-    p_WC, leds_W, axis = np.asarray(p_WC, dtype=float), np.asarray(leds_W, dtype=float), vector(axis_W)
+    leds_W, axis = np.asarray(leds_W, dtype=float), vector(axis_W)
     intensity_w_sr = np.asarray(intensity_w_sr, dtype=float)
-    limit = surfaces.faintest_reflection * float(intensity_w_sr.max(initial=0.0))
-    wanted = _bound(data, mirrors, p_WC, leds_W, axis_W, surfaces) * intensity_w_sr[:, None] >= limit
-    rows = _rows(data, mirrors, p_WC, leds_W, wanted, surfaces)
+    limit = surfaces.faintest_reflection * max(0.0, *intensity_w_sr.tolist())
+    eye, near, poses = vector(p_WC), (mirrors.near_balls, mirrors.near_tubes), (data.geom_xpos, data.geom_xmat)
+    bound = _bound(near, poses, leds_W, axis, eye, finishes(surfaces), surfaces.led_side_light)
+    wanted = _wanted(bound, intensity_w_sr, limit)
+    rows = _rows(data, mirrors, eye, leds_W, wanted, surfaces)
     intensity = np.empty(len(rows))
     count = _reflect(rows, leds_W, axis, intensity_w_sr, (pattern_exponent, surfaces.led_side_light), limit, intensity)
     return rows[:count], intensity[:count]
@@ -125,26 +127,36 @@ def _reflect(
     return count
 
 
+@njit(cache=True)
+def _wanted(bound: Array, intensity_w_sr: Array, limit: float) -> NDArray[np.bool_]:
+    """(m, n) which pairs may be above the limit."""
+    out = np.empty(bound.shape, dtype=np.bool_)
+    for j in range(len(bound)):
+        for i in range(bound.shape[1]):
+            out[j, i] = bound[j, i] * intensity_w_sr[j] >= limit
+    return out
+
+
+@njit(cache=True)
 def _bound(
-    data: mujoco.MjData, mirrors: Mirrors, p_WC: Array, leds_W: Array, axis_W: Array, surfaces: SurfaceParameters
+    mirrors: tuple[Balls, Tubes], poses: Poses, leds_W: Array, axis: Vector, eye: Vector, finish: Array, side: float
 ) -> Array:
     """(m, balls + tubes) what A I(psi)/(I_0 d1^2) cannot exceed, Eqs. (1) and (2)."""
-    balls, tubes, axis = mirrors.near_balls, mirrors.near_tubes, vector(axis_W)
-    share, side, poses = finishes(surfaces)[:, 2], surfaces.led_side_light, (data.geom_xpos, data.geom_xmat)
+    balls, tubes = mirrors
     bound = np.empty((len(leds_W), len(balls.geom) + len(tubes.geom)))
-    _bound_of_balls(balls, poses, leds_W, axis, share, side, bound)
-    _bound_of_tubes(tubes, poses, leds_W, axis, vector(p_WC), share, side, bound[:, len(balls.geom) :])
+    _bound_of_balls(balls, poses, leds_W, axis, finish, side, bound)
+    _bound_of_tubes(tubes, poses, leds_W, axis, eye, finish, side, bound[:, len(balls.geom) :])
     return bound
 
 
 @njit(cache=True)
 def _bound_of_balls(
-    balls: Balls, poses: Poses, leds_W: Array, axis: Vector, share: Array, side: float, bound: Array
+    balls: Balls, poses: Poses, leds_W: Array, axis: Vector, finish: Array, side: float, bound: Array
 ) -> None:
     xpos, xmat = poses
     for i in range(len(balls.geom)):
         g, radius = balls.geom[i], balls.axes[i].max()
-        most = share[balls.material[i]] * radius**2 / 4.0
+        most = finish[balls.material[i], 2] * radius**2 / 4.0
         for j in range(len(leds_W)):
             p = _from_led(xpos[g], xmat[g], balls.at_z[i], leds_W[j])
             d = max(math.sqrt(_dot(p, p)) - radius, _CLOSEST_M)
@@ -153,13 +165,13 @@ def _bound_of_balls(
 
 @njit(cache=True)
 def _bound_of_tubes(
-    tubes: Tubes, poses: Poses, leds_W: Array, axis: Vector, eye: Vector, share: Array, side: float, bound: Array
+    tubes: Tubes, poses: Poses, leds_W: Array, axis: Vector, eye: Vector, finish: Array, side: float, bound: Array
 ) -> None:
     xpos, xmat = poses
     for i in range(len(tubes.geom)):
         g, radius, half = tubes.geom[i], tubes.radius[i], tubes.half_length[i]
         z = (xmat[g, 2], xmat[g, 5], xmat[g, 8])
-        reach, most = half * abs(_dot(z, axis)) + radius, 0.5 * share[tubes.material[i]] * radius
+        reach, most = half * abs(_dot(z, axis)) + radius, 0.5 * finish[tubes.material[i], 2] * radius
         for j in range(len(leds_W)):
             p = _from_led(xpos[g], xmat[g], 0.0, leds_W[j])
             along = _dot(p, z)
@@ -195,13 +207,13 @@ def is_lit(obstacles: Obstacles, data: mujoco.MjData, start: Array, led_W: Array
 def _rows(
     data: mujoco.MjData,
     mirrors: Mirrors,
-    p_WC: Array,
+    eye: Vector,
     leds_W: Array,
     wanted: NDArray[np.bool_],
     surfaces: SurfaceParameters,
 ) -> Array:
     """(n, ROW) reflections, faint and hidden ones among them."""
-    eye, balls, tubes = vector(p_WC), mirrors.near_balls, mirrors.near_tubes
+    balls, tubes = mirrors.near_balls, mirrors.near_tubes
     xpos, xmat = data.geom_xpos, data.geom_xmat
     spots = np.empty((wanted.size + 2 * len(leds_W), SPOT))
     n = round_spots(balls, tubes, xpos, xmat, leds_W, 1.0, wanted, eye, spots)

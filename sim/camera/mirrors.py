@@ -14,6 +14,7 @@ A material follows from the geom's name. Not modelled: planes, height fields.
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import NamedTuple
 
 import mujoco
@@ -96,6 +97,7 @@ class Mirrors:
     tubes: Tubes
     facets: Facets
     rim: Rim | None
+    all_wanted: NDArray[np.bool_]  #: (1, balls + tubes) True, for `round_spots`
     near_balls: Balls  #: those that the LEDs shine on from nearby
     near_tubes: Tubes
 
@@ -119,6 +121,7 @@ class Mirrors:
             tubes=_tube_table(tubes),
             facets=_facet_table(facets),
             rim=rim,
+            all_wanted=np.ones((1, len(balls) + len(tubes)), dtype=np.bool_),
             near_balls=_ball_table([ball for ball in balls if near[ball[0]]]),
             near_tubes=_tube_table([tube for tube in tubes if near[tube[0]]]),
         )
@@ -131,10 +134,11 @@ def material_of(geom: str) -> int:
     return next((material for prefix, material in _MATERIALS.items() if geom.startswith(prefix)), PAINT)
 
 
+@lru_cache(maxsize=16)
 def finishes(surfaces: SurfaceParameters) -> Array:
     """(4, 4) a row a material: refractive index (0 for metal), normal reflectance of metal, share, rms slope."""
     p, n = surfaces, surfaces.refractive_index
-    return np.array(
+    table = np.array(
         [
             [n, 0.0, p.paint_share, p.paint_roughness_rad],
             [0.0, p.metal_reflectance, p.metal_share, p.metal_roughness_rad],
@@ -142,11 +146,14 @@ def finishes(surfaces: SurfaceParameters) -> Array:
             [n, 0.0, p.glass_share, p.glass_roughness_rad],
         ]
     )
+    table.setflags(write=False)
+    return table
 
 
 def vector(a: Array) -> Vector:
     """Three numbers as the kernels take them."""
-    return float(a[0]), float(a[1]), float(a[2])
+    x, y, z = a.tolist()
+    return float(x), float(y), float(z)
 
 
 def rim_of(model: mujoco.MjModel) -> Rim | None:

@@ -11,6 +11,7 @@ lens in focus is coarsely sampled, and its pixels bend the centroid as real ones
 
 import math
 from dataclasses import replace
+from functools import cache
 from typing import Final
 
 import numpy as np
@@ -68,7 +69,6 @@ class PointSpread:
             size_m: side of the sources, squares that face the lens; 0 for points.
             smear_px: (n, 2) way (du, dv) during the exposure.
         """
-        pixels, electrons, depth_m = (np.asarray(a, dtype=float) for a in (pixels, electrons, depth_m))
         side, size_m = _divided(size_m)
         if side > 1:
             step_px = self._camera.focal_length_px * size_m / np.maximum(depth_m, NEAREST_M)
@@ -77,7 +77,6 @@ class PointSpread:
             smear_px = smear_px.repeat(side**2, axis=0)
         cores = self._cores_of(size_m)
         levels = cores.levels(depth_m)
-        pixels, electrons, smear_px = (np.ascontiguousarray(a, dtype=float) for a in (pixels, electrons, smear_px))
         splat(image, start, pixels, electrons, smear_px, levels, cores.tables, self._sharp.wing)
 
     @property
@@ -116,10 +115,12 @@ def _divided(size_m: float) -> tuple[int, float]:
     return side, size_m / side
 
 
+@cache
 def _grid(side: int) -> Array:
     """(side^2, 2) places in a square grid of step 1 about 0."""
     along, out = np.arange(side) - 0.5 * (side - 1), np.empty((side, side, 2))
     out[..., 0], out[..., 1] = along, along[:, None]
+    out.setflags(write=False)
     return out.reshape(-1, 2)
 
 

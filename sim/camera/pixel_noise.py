@@ -25,10 +25,12 @@ from dockair.rotations import Array
 Reals = NDArray[np.float32]
 Bytes = NDArray[np.int8]
 Levels = NDArray[np.unsignedinteger]
+Real = float | np.float32
 
 EXACT_BELOW_E = 4.0  #: read noise [e-] under which shot noise is drawn from the exact law
 POISSON_LIMIT = 30.0  #: electrons above which the exact law gives way to a normal number with the right skew
 _STEPS = 4  # tabled Poisson laws per electron
+_LANES = 16  # pixels that are worked on at once
 _GUIDE = 64  # cells of the guide into each tabled law
 
 #: ln(1 + m) on [sqrt(1/2) - 1, sqrt(2) - 1] to 9e-6; highest power first.
@@ -41,20 +43,20 @@ _QUANTILE = tuple(
 
 
 class Chain(NamedTuple):
-    """Eqs. (1) to (4) in single precision."""
+    """Eqs. (1) to (4); the rows are done in single precision."""
 
-    dark_e: np.float32
-    full_well_e: np.float32
-    near_e: np.float32  #: from here to the next both noises are drawn
-    far_e: np.float32
-    read_noise_e: np.float32
-    variance_e2: np.float32  #: of the read noise
-    gain_step: np.float32
-    offset_step_e: np.float32
-    gain_dn_e: np.float32
-    black_dn: np.float32  #: half a level included, for the rounding
-    top_dn: np.float32
-    shift: np.int32
+    dark_e: Real
+    full_well_e: Real
+    near_e: Real  #: from here to the next both noises are drawn
+    far_e: Real
+    read_noise_e: Real
+    variance_e2: Real  #: of the read noise
+    gain_step: Real
+    offset_step_e: Real
+    gain_dn_e: Real
+    black_dn: Real  #: half a level included, for the rounding
+    top_dn: Real
+    shift: int | np.int32
 
 
 def _poisson_tables() -> tuple[Array, NDArray[np.int16]]:
@@ -243,6 +245,15 @@ def _count_between(x: Reals, low: np.float32, high: np.float32) -> int:
 
 
 @njit(cache=True)
+def _single(a: Chain) -> Chain:
+    f = np.float32
+    return Chain(
+        *(f(a.dark_e), f(a.full_well_e), f(a.near_e), f(a.far_e), f(a.read_noise_e), f(a.variance_e2)),
+        *(f(a.gain_step), f(a.offset_step_e), f(a.gain_dn_e), f(a.black_dn), f(a.top_dn), np.int32(a.shift)),
+    )
+
+
+@njit(cache=True)
 def digitise_rows(
     x: Reals,
     gain: Bytes,
@@ -252,26 +263,37 @@ def digitise_rows(
     key: np.uint64,
     frame_number: int,
     start: tuple[int, int],
-    row_gain: Reals,
-    chain: Chain,
+    parasitic: tuple[float, float, float, float],
+    in_double: Chain,
     exact: bool,
     cdf: Array,
     guide: NDArray[np.int16],
 ) -> None:
-    """Fill `out` with the levels of a window that starts at `start`; gain, offset and column are the sensor's."""
+    """Fill `out` with the levels of a window that starts at `start`; gain, offset and column are the sensor's.
+
+    `parasitic` are P, t, the first row's wait and a row's time, of Eq. (1) there.
+    """
     rows, columns = x.shape
-    first, last = start[1], start[1] + columns
+    first, chain = start[1], _single(in_double)
+    # A row goes on into the next, whose turn is later, up to whole lanes: single pixels take ten times as long
+    padded = min((columns + _LANES - 1) // _LANES * _LANES, gain.shape[1] - first)
+    flat, levels = x.ravel(), out.ravel()
+    sensitivity, exposure_s, overhead_s, row_s = parasitic
     for r in range(rows):
+        waits_s = overhead_s + (start[0] + r) * row_s
+        row_gain = np.float32(1.0 + sensitivity * waits_s / exposure_s)
         bits = row_key(key, frame_number, r + start[0])
         step = np.uint32(bits >> np.uint64(32)) | np.uint32(1)  # odd: no two columns alike
         seed = np.uint32(np.uint32(bits & np.uint64(0xFFFFFFFF)) + np.uint32(first) * step)
+        begin, end = r * columns, min(r * columns + padded, flat.size)
+        last = first + end - begin
         g, o, c = gain[r + start[0], first:last], offset[r + start[0], first:last], column[first:last]
         if exact:
-            _row_exact(x[r], g, o, c, out[r], seed, step, row_gain[r], chain, cdf, guide)
+            _row_exact(x[r], g, o, c, out[r], seed, step, row_gain, chain, cdf, guide)
             continue
-        _row(x[r], g, o, c, out[r], seed, step, row_gain[r], chain)
+        _row(flat[begin:end], g, o, c, levels[begin:end], seed, step, row_gain, chain)
         widest = np.float32(1.0) + np.float32(128.0) * chain.gain_step
-        low = (chain.near_e - chain.dark_e) / (row_gain[r] * widest) - np.float32(1.0)
-        high = chain.far_e / (row_gain[r] * (np.float32(2.0) - widest)) + np.float32(1.0)
+        low = (chain.near_e - chain.dark_e) / (row_gain * widest) - np.float32(1.0)
+        high = chain.far_e / (row_gain * (np.float32(2.0) - widest)) + np.float32(1.0)
         if _count_between(x[r], low, high) > 0:
-            _row_near_full_well(x[r], g, o, c, out[r], seed, step, row_gain[r], chain)
+            _row_near_full_well(x[r], g, o, c, out[r], seed, step, row_gain, chain)

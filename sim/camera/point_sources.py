@@ -24,7 +24,7 @@ from dockair.sim.as_built import AsBuilt
 from dockair.sim.camera.glints import glint_rows, starts_of_seen
 from dockair.sim.camera.led_reflections import led_reflection_rows
 from dockair.sim.camera.lobes import ROW
-from dockair.sim.camera.mirrors import Mirrors, Vector
+from dockair.sim.camera.mirrors import Mirrors, Vector, vector
 from dockair.sim.camera.occlusion import Obstacles, hidden, rays_are_clear
 from dockair.sim.camera.radiometry import Responses, led_electrons
 from dockair.sim.camera.sun_view import SunView
@@ -104,17 +104,19 @@ class PointSources:
         R_WC, p_WC = pose
         leds_W, intensity = self.leds_W(data), self._as_built.led_intensity_w_sr * led_factors
         axis_W, count = data.xmat[self._drogue].reshape(3, 3) @ _LED_AXIS_D, self._count
-        mirrored, electrons_m2_s, size_m = self._mirrored(data, pose, leds_W, axis_W, intensity)
         leds, f_px = self._sheets.leds, self._as_built.camera.focal_length_px
-        patches = np.concatenate([self._led_rows(leds_W), mirrored])
+        reflections, intensity_w_sr, glints = self._mirrored(data, pose, leds_W, axis_W, intensity)
+        beam = 0.0 if self._sun is None else self._sun.beam
+        all_light = self._response.led_e_m2_sr_w_s, self._response.glint_e_m2_s * beam
+        total = count + len(reflections) + len(glints)
+        patches, electrons, sizes = np.empty((total, ROW)), np.empty(total), np.empty(total)
+        own = leds_W, leds.die_size_m, leds.occlusion_clearance_m
+        _join(own, (reflections, intensity_w_sr), glints, all_light, patches, electrons, sizes)
         p_C = (patches[:, :3] - p_WC) @ R_WC
-        electrons, sizes = np.empty(len(patches)), np.full(len(patches), leds.die_size_m)
         electrons[:count] = led_electrons(
             self._response, leds, intensity, p_C[:count], axis_W @ R_WC, 1.0, self._extinction_1_m
         )
-        electrons[count:], sizes[count:] = electrons_m2_s, size_m
-        _as_received(p_C[count:], self._extinction_1_m, f_px, electrons[count:], sizes[count:])
-        electrons *= exposure_s
+        _as_received(p_C, count, self._extinction_1_m, f_px, exposure_s, electrons, sizes)
         ways = self._ways_C(data, pose, p_C, count, exposure_s)
         return Sources(p_C=p_C, electrons=electrons, size_m=sizes, way_C_m=ways, patches_W=patches)
 
@@ -139,48 +141,26 @@ class PointSources:
         clearance = self._sheets.leds.occlusion_clearance_m
         return np.logical_not(hidden(self._obstacles, data, p_WC, self.leds_W(data), clearance))
 
-    def _led_rows(self, leds_W: Array) -> Array:
-        """(n, ROW) the LEDs as patches for `starts_of_seen`."""
-        rows = np.zeros((len(leds_W), ROW))
-        rows[:, :3], rows[:, 8] = leds_W, self._sheets.leds.occlusion_clearance_m
-        return rows
-
     def _mirrored(
         self, data: mujoco.MjData, pose: tuple[Array, Array], leds_W: Array, axis_W: Array, intensity: Array
     ) -> tuple[Array, Array, Array]:
-        """What may mirror the LEDs, then the Sun, hidden places among them.
-
-        Returns:
-            (n, ROW) patches, the last column which LED or _SUN; (n,) electrons per second times m^2; (n,) sizes [m].
-        """
+        """What may mirror the LEDs (n, ROW), how brightly (n,) [W/sr], and the Sun (m, ROW), hidden or not."""
         (R_WC, p_WC), sun = pose, self._sun
-        leds, surfaces, response = self._sheets.leds, self._sheets.surfaces, self._response
+        leds, surfaces = self._sheets.leds, self._sheets.surfaces
         reflections, intensity_w_sr = led_reflection_rows(
             data, self._mirrors, p_WC, leds_W, axis_W, intensity, leds.pattern_exponent, surfaces
         )
-        reflected_e_m2_s, points = response.led_e_m2_sr_w_s * intensity_w_sr, np.zeros(len(reflections))
         if sun is None or sun.beam <= 0.0:
-            return reflections, reflected_e_m2_s, points
-        glints = glint_rows(
-            data, self._mirrors, p_WC, sun.direction_W, surfaces, self._sheets.light, np.ascontiguousarray(R_WC[:, 0])
-        )
-        glints[:, 9] = _SUN
-        glint_e_m2_s = response.glint_e_m2_s * sun.beam * glints[:, 6]
-        return (
-            np.concatenate([reflections, glints]),
-            np.concatenate([reflected_e_m2_s, glint_e_m2_s]),
-            np.concatenate([points, glints[:, 7]]),
-        )
+            return reflections, intensity_w_sr, np.empty((0, ROW))
+        light = self._sheets.light
+        glints = glint_rows(data, self._mirrors, p_WC, sun.direction_W, surfaces, light, R_WC[:, 0])
+        return reflections, intensity_w_sr, glints
 
     def _are_lit(self, data: mujoco.MjData, starts: Array, lights: Array, leds_W: Array) -> NDArray[np.bool_]:
         """(n,) whether the way from places (n, 3) to the Sun, or to an LED up to its seat, is clear."""
-        rays, reach = leds_W[lights.astype(np.int64)] - starts, np.full(len(starts), np.inf)  # the Sun's are put right
-        distances = np.sqrt(np.einsum("ij,ij->i", rays, rays))
-        rays /= distances[:, None]
-        of_leds = lights != _SUN
-        reach[of_leds] = distances[of_leds] - self._sheets.surfaces.led_seat_m
-        if self._sun is not None:
-            rays[~of_leds] = self._sun.direction_W
+        sun = (0.0, 0.0, 0.0) if self._sun is None else vector(self._sun.direction_W)
+        rays, reach = np.empty_like(starts), np.empty(len(starts))
+        _toward_lights(starts, lights, leds_W, self._sheets.surfaces.led_seat_m, sun, rays, reach)
         return rays_are_clear(self._obstacles, data, starts, rays, reach)
 
     def _ways_C(
@@ -226,17 +206,74 @@ def _ways(
 
 
 @njit(cache=True)
-def _as_received(p_C: Array, extinction_1_m: float, focal_length_px: float, rates: Array, size_m: Array) -> None:
-    """Turn (n,) electrons per second times m^2 into electrons per second, and round (n,) sizes, in place.
+def _join(
+    leds: tuple[Array, float, float],
+    reflections: tuple[Array, Array],
+    glints: Array,
+    light: tuple[float, float],
+    patches: Array,
+    electrons: Array,
+    size_m: Array,
+) -> None:
+    """Fill patches, electrons per second times m^2, and sizes: of LEDs (no electrons), their reflections, the Sun's.
 
-    The first with cos t/r^2 and what is left of the light on its way; the second to powers of two of a millimetre, so
-    that few spread functions serve all. Patches under half a pixel are points; those from WIDE_PX on keep their size,
-    for they are drawn without the lens.
+    Args:
+        leds: (k, 3) places, size of a die, how near to one nothing hides it.
+        reflections: (n, ROW) patches and (n,) intensities [W/sr].
+        glints: (m, ROW).
+        light: electrons per m^2 and W/sr of an LED, per m^2 of a glint.
+        patches: (k + n + m, ROW), written.
+        electrons: (k + n + m,), written.
+        size_m: (k + n + m,), written.
     """
-    for i in range(len(p_C)):
+    (leds_W, die_m, clearance_m), (mirrored, intensity_w_sr) = leds, reflections
+    k, n = len(leds_W), len(leds_W) + len(mirrored)
+    patches[:k], size_m[:k] = 0.0, die_m
+    patches[:k, :3], patches[:k, 8] = leds_W, clearance_m
+    patches[k:n], electrons[k:n], size_m[k:n] = mirrored, light[0] * intensity_w_sr, 0.0
+    patches[n:], electrons[n:], size_m[n:] = glints, light[1] * glints[:, 6], glints[:, 7]
+    patches[n:, 9] = _SUN
+
+
+@njit(cache=True)
+def _toward_lights(
+    starts: Array, lights: Array, leds_W: Array, seat_m: float, sun: Vector, rays: Array, reach: Array
+) -> None:
+    """Fill (n, 3) unit vectors from places to the Sun, or to an LED, and (n,) how far the way has to be clear."""
+    for i in range(len(starts)):
+        if lights[i] == _SUN:
+            rays[i, 0], rays[i, 1], rays[i, 2] = sun
+            reach[i] = math.inf
+            continue
+        led = leds_W[int(lights[i])]
+        x, y, z = led[0] - starts[i, 0], led[1] - starts[i, 1], led[2] - starts[i, 2]
+        distance = math.sqrt(x * x + y * y + z * z)
+        rays[i, 0], rays[i, 1], rays[i, 2] = x / distance, y / distance, z / distance
+        reach[i] = distance - seat_m
+
+
+@njit(cache=True)
+def _as_received(
+    p_C: Array,
+    leds: int,
+    extinction_1_m: float,
+    focal_length_px: float,
+    exposure_s: float,
+    electrons: Array,
+    size_m: Array,
+) -> None:
+    """Turn (n,) electrons per second, of what mirrors times m^2, into electrons, and round its (n,) sizes, in place.
+
+    What mirrors comes after the LEDs. Its light falls with cos t/r^2 and what is left of it on its way; its sizes go
+    to powers of two of a millimetre, so that few spread functions serve all. Patches under half a pixel are points;
+    those from WIDE_PX on keep their size, for they are drawn without the lens.
+    """
+    electrons[:leds] *= exposure_s
+    for i in range(leds, len(p_C)):
         x = p_C[i, 0]
         r = math.sqrt(x * x + p_C[i, 1] * p_C[i, 1] + p_C[i, 2] * p_C[i, 2])
-        rates[i] *= min(max(x / r, 0.0), 1.0) * math.exp(-extinction_1_m * r) / r**2
+        electrons[i] *= min(max(x / r, 0.0), 1.0) * math.exp(-extinction_1_m * r) / r**2
+        electrons[i] *= exposure_s
         width_px = size_m[i] * focal_length_px / max(x, _NEAREST_M)
         if width_px < _SMALLEST_PX:
             size_m[i] = 0.0

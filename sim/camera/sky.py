@@ -110,12 +110,11 @@ class Sky:
         R, x, y = np.ascontiguousarray(R_WC, dtype=float), np.asarray(x, dtype=float), np.asarray(y, dtype=float)
         below = np.empty((len(y), 2), dtype=np.int64)
         height_m = self._altitude_m + float(place[2]) - self._top_m
-        columns_below(R, x, y, dip_sine(self._p.earth_radius_m + self._top_m, height_m), below)
-        partly = np.flatnonzero((below[:, 0] > 0) | (below[:, 1] < len(x)))
-        if len(partly) > 0:
-            rows = slice(int(partly[0]), int(partly[-1]) + 1)
-            self._table.fill(out[rows], R, x, y[rows])
-        if np.any(below[:, 0] < below[:, 1]):
+        sine = dip_sine(self._p.earth_radius_m + self._top_m, height_m)
+        first, stop, any_below = columns_below(R, x, y, sine, below)
+        if first < stop:
+            self._table.fill(out[first:stop], R, x, y[first:stop])
+        if any_below:
             ground = self._ground_table.nodes(place, R, x, y, below)
             deck = self._deck_table.nodes(place, R, x, y, below) if self._has_deck else ground
             lay_under(out, R, x, y, below, ground, deck, self._has_deck)

@@ -94,7 +94,8 @@ def _step(x: Array) -> float:
 
 def _places_around(x: Array, per_tangent: float) -> tuple[int, Array]:
     """Number of the first of the even places that evenly spaced tangents lie between, and all of them."""
-    low, high = sorted((float(x[0]), float(x[-1])))
+    one, other = float(x[0]), float(x[-1])
+    low, high = min(one, other), max(one, other)
     first, last = math.floor(low * per_tangent), math.floor(high * per_tangent) + 1
     return first, np.arange(first, last + 1) / per_tangent
 
@@ -218,6 +219,7 @@ def _mark(
     No block in between lies farther than a tile.
     """
     tiles, any_missing = known.shape[0], False
+    last = -1, -1
     half = np.float32(0.5 * cells)
     for i in range(0, len(y) + stride - 1, stride):
         y_i = y[min(i, len(y) - 1)]
@@ -230,6 +232,9 @@ def _mark(
                 half,
             )
             row, column = int(v) // _TILE, int(u) // _TILE
+            if (row, column) == last:
+                continue
+            last = row, column
             for a in range(row - 1, row + 2):
                 for b in range(column - 1, column + 2):
                     r, c = a, b

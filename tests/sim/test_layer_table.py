@@ -69,12 +69,15 @@ def test_the_columns_below_are_those_whose_rays_point_below_the_dip() -> None:
     for seed in range(60):
         R = exp(np.random.default_rng(seed).normal(0.0, 1.5, 3))
         below = np.empty((len(Y), 2), dtype=np.int64)
-        columns_below(R, X, Y, sine, below)
+        first, stop, any_below = columns_below(R, X, Y, sine, below)
         x, y = np.meshgrid(X, Y)
         up = R[2, 0] - x * R[2, 1] - y * R[2, 2]
         wanted = up / np.sqrt(1.0 + x * x + y * y) < -sine
         column = np.arange(len(X))
         assert np.array_equal((column >= below[:, :1]) & (column < below[:, 1:]), wanted)
+        others = np.flatnonzero(~wanted.all(axis=1))
+        assert any_below == wanted.any()
+        assert (first, stop) == ((others[0], others[-1] + 1) if len(others) else (0, 0))
 
 
 def test_a_deck_lies_over_the_ground_by_its_light_and_transmittance() -> None:

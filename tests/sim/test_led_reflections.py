@@ -11,7 +11,7 @@ from dockair.rotations import exp, quaternion_from_matrix
 from dockair.sim.camera import led_reflections
 from dockair.sim.camera.glints import find_glints
 from dockair.sim.camera.led_reflections import LedReflections, find_led_reflections
-from dockair.sim.camera.mirrors import Mirrors
+from dockair.sim.camera.mirrors import Mirrors, finishes, vector
 from dockair.sim.camera.sheets import LightParameters, SurfaceParameters
 
 SHEET = load_parameters("surfaces", SurfaceParameters)
@@ -67,6 +67,16 @@ def _find(
     return find_led_reflections(
         *world, Mirrors.of(world[0]), EYE, leds, axis, np.full(len(leds), 2.0), exponent, surfaces
     )
+
+
+def _bound(
+    world: tuple[mujoco.MjModel, mujoco.MjData], led: np.ndarray, axis: np.ndarray, surfaces: SurfaceParameters
+) -> float:
+    """Of the only pair there is, on an LED of 1 W/sr."""
+    (model, data), side = world, surfaces.led_side_light
+    mirrors, poses = Mirrors.of(model), (data.geom_xpos, data.geom_xmat)
+    near = mirrors.near_balls, mirrors.near_tubes
+    return led_reflections._bound(near, poses, led[None], vector(axis), vector(EYE), finishes(surfaces), side).max()
 
 
 def _mirror_error_rad(p: np.ndarray, n: np.ndarray, led: np.ndarray) -> float:
@@ -284,7 +294,7 @@ def test_the_bound_that_spares_faint_pairs_drops_none_that_counts(make_world, mo
     for ahead_m in (0.0, 0.4, 3.0):
         spared = _scene(make_world, ahead_m, surfaces)
         with monkeypatch.context() as patch:
-            patch.setattr(led_reflections, "_bound", lambda *_: np.full((8, 1), np.inf) * np.ones((8, 116)))
+            patch.setattr(led_reflections, "_bound", lambda *_: np.full((8, 116), np.inf))
             every = _scene(make_world, ahead_m, surfaces)
         assert len(every.p_W) > 5
         assert np.array_equal(spared.p_W, every.p_W)
@@ -303,7 +313,7 @@ def test_the_bound_is_above_every_reflection_and_not_far_above_the_best() -> Non
             world = _world(geom)
             for axis in (_unit(*(centre - led)), _unit(*(led - centre))):
                 found = _find(world, led, side, axis=axis, exponent=1e-6)
-                bound = led_reflections._bound(world[1], Mirrors.of(world[0]), EYE, led[None], axis, side).max()
+                bound = _bound(world, led, axis, side)
                 for intensity in found.intensity_w_sr:
                     assert intensity / 2.0 <= bound
                     best[kind] = max(best[kind], intensity / 2.0 / bound)

@@ -62,12 +62,7 @@ def test_the_renderer_has_no_multisampling_and_the_model_keeps_its_own() -> None
         context.free()
 
 
-@pytest.mark.gl
-def test_a_canvas_reads_colours_and_depths_from_the_bottom_row_up() -> None:
-    """A ball in the lower half of the view, 4 m away; depth is 0 at the near plane, 1 at the far one."""
-    model = mujoco.MjModel.from_xml_string(
-        "<mujoco><worldbody><geom size='0.2' pos='4 0 -0.8' rgba='1 1 1 1'/></worldbody></mujoco>"
-    )
+def _balls_scene(model: mujoco.MjModel) -> mujoco.MjvScene:
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     view = mujoco.MjvCamera()
@@ -76,6 +71,33 @@ def test_a_canvas_reads_colours_and_depths_from_the_bottom_row_up() -> None:
     everything = mujoco.mjtCatBit.mjCAT_ALL.value
     mujoco.mjv_updateScene(model, data, mujoco.MjvOption(), None, view, everything, scene)
     scene.flags[mujoco.mjtRndFlag.mjRND_SKYBOX] = 0
+    return scene
+
+
+@pytest.mark.gl
+def test_a_picture_does_not_depend_on_how_large_the_one_before_was() -> None:
+    """Smaller, the same, larger than the buffer was made; nothing of another picture is left in it."""
+    model = mujoco.MjModel.from_xml_string(
+        "<mujoco><worldbody><geom size='0.2' pos='4 0 -0.8' rgba='1 1 1 1'/></worldbody></mujoco>"
+    )
+    scene, canvas = _balls_scene(model), Canvas(model, 100, 90, "camera")
+    pictures: dict[tuple[int, int], list[bytes]] = {}
+    for shape in ((90, 100), (60, 80), (130, 120), (61, 80), (60, 80), (90, 100), (130, 120)):
+        colours, depths = np.empty((*shape, 3), dtype=np.uint8), np.empty(shape, dtype=np.float32)
+        canvas.render(scene, colours, depths)
+        assert colours.max() > 30
+        pictures.setdefault(shape, []).append(colours.tobytes() + depths.tobytes())
+    canvas.close()
+    assert all(len(set(same)) == 1 for same in pictures.values())
+
+
+@pytest.mark.gl
+def test_a_canvas_reads_colours_and_depths_from_the_bottom_row_up() -> None:
+    """A ball in the lower half of the view, 4 m away; depth is 0 at the near plane, 1 at the far one."""
+    model = mujoco.MjModel.from_xml_string(
+        "<mujoco><worldbody><geom size='0.2' pos='4 0 -0.8' rgba='1 1 1 1'/></worldbody></mujoco>"
+    )
+    scene = _balls_scene(model)
     colours, depths = np.empty((60, 80, 3), dtype=np.uint8), np.empty((60, 80), dtype=np.float32)
     canvas = Canvas(model, 100, 90, "camera")
     canvas.render(scene, colours, depths)
