@@ -1,14 +1,15 @@
 """What is believed about the drogue relative to the receiver: a Gaussian, or two while the image allows two attitudes.
 
-State and errors, and how they move, are in `belief_motion`; what a frame shows of them, in `belief_sight`. The errors
-of camera and LEDs do not change during a flight, no averaging lessens them, and what could be estimated of them is told
-from motion and tilt by second-order terms alone: they are considered [Schmidt 1966], that is carried in the covariance
-with all their correlations and left at zero.
+State and errors, and how they move, are in `belief_motion`; what a frame shows of them, in `belief_sight`. The camera's
+errors do not change during a flight, no averaging lessens them, and frames cannot tell them from place and attitude:
+they are considered [Schmidt 1966], that is carried in the covariance with all their correlations and left at zero. The
+LEDs' places are told from tilt by how the ring's image changes as receiver and drogue turn. Of what a frame says of
+them a share s is taken [Brink 2017]: far away tilt enters by its square, and the whole would be believed too soon.
 
 `belief_frame` fits the pose as seen and the LEDs' places to a frame. The rest follows from the same linearisation, in
 Joseph's form:
 
-    e = K nu,   P+ = (I - K H) P (I - K H)' + K K',   K = P H' S^-1, but 0 for what is considered     (1)
+    e = K nu,   P+ = (I - K H) P (I - K H)' + K K',   K = P H' S^-1, times 0 for the camera, s for LEDs     (1)
 
 Loosely coupled, the frame's own pose and covariance are averaged with the belief.
 
@@ -26,7 +27,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dockair.nav.belief_frame import Explanation, explanations
-from dockair.nav.belief_motion import ERRORS, HARDWARE, RING, V
+from dockair.nav.belief_motion import CALIBRATION, ERRORS, HARDWARE, REST, RING, V
 from dockair.nav.belief_sight import Apparent, Belief, Sight
 from dockair.nav.pose.difference import pose_difference
 from dockair.nav.pose.estimate import PoseEstimate
@@ -47,6 +48,7 @@ class Taking:
     tight: bool = True  #: whether a pose's lines of sight are fitted together with the belief
     memory: float = 1.0  #: of Eq. (2), per frame
     share: float = 1.0
+    ring: float = 0.0  #: s of Eq. (1)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -100,7 +102,7 @@ def _fitted(
     """Return the beliefs after a frame, and their chi2, lines of sight and belief fitted together."""
     seen, M = sight.shown(belief, lines)
     return [
-        (_updated(belief, after.H @ M, after, _weight(belief, after, taking)), after.chi2)
+        (_updated(belief, after.H @ M, after, taking.ring, _weight(belief, after, taking)), after.chi2)
         for after in explanations(seen, lines, poses)
     ]
 
@@ -118,11 +120,12 @@ def _weight(belief: Belief, after: Explanation | PosePosterior, taking: Taking) 
     return taking.memory * belief.log_weight + taking.share * after.log_evidence
 
 
-def _updated(belief: Belief, H: Array, after: Explanation, log_weight: float) -> Belief:
+def _updated(belief: Belief, H: Array, after: Explanation, ring: float, log_weight: float) -> Belief:
     """Return a belief after a frame, Eq. (1); H is per error of the belief."""
     HP = H @ belief.P
     K = np.linalg.solve(HP @ H.T + np.eye(len(H)), HP).T
-    K[HARDWARE] = 0.0
+    K[CALIBRATION] = 0.0
+    K[RING] *= ring
     A = np.eye(ERRORS) - K @ H
     return _moved(belief, K @ after.nu, A @ belief.P @ A.T + K @ K.T, log_weight)
 
@@ -135,12 +138,13 @@ def _regressed(belief: Belief, seen: Apparent, after: PosePosterior, log_weight:
     A = np.eye(ERRORS) - K @ M
     P_after = A @ P @ A.T + K @ after.covariance @ K.T
     P_after[HARDWARE, HARDWARE] = P[HARDWARE, HARDWARE]
+    e[HARDWARE] = 0.0
     return _moved(belief, e, P_after, log_weight)
 
 
 def _moved(belief: Belief, e: Array, P: Array, log_weight: float) -> Belief:
-    x = belief.x + e[3 : HARDWARE.start].reshape(6, 3)
-    return Belief(exp(e[:3]) @ belief.R_BD, x, 0.5 * (P + P.T), log_weight)
+    x = belief.x + e[3 : HARDWARE.start].reshape(belief.x.shape)
+    return Belief(exp(e[:3]) @ belief.R_BD, x, 0.5 * (P + P.T), log_weight, belief.ring + e[RING])
 
 
 def mixture(beliefs: Sequence[Belief]) -> Belief:
@@ -159,10 +163,10 @@ def mixture(beliefs: Sequence[Belief]) -> Belief:
 
 
 def _difference(belief: Belief, other: Belief) -> Array:
-    """(44,) errors by which a belief is off from another."""
+    """(47,) errors by which a belief is off from another."""
     pose = pose_difference(belief.R_BD, belief.p_ID, other.R_BD, other.p_ID)
-    hardware = np.zeros(HARDWARE.stop - HARDWARE.start)
-    return np.concatenate([pose, (belief.x[V:] - other.x[V:]).ravel(), hardware])
+    calibration = np.zeros(CALIBRATION.stop - CALIBRATION.start)
+    return np.concatenate([pose, (belief.x[V:] - other.x[V:]).ravel(), calibration, belief.ring - other.ring])
 
 
 def _kept(found: list[Belief]) -> list[Belief]:
@@ -181,26 +185,29 @@ def _kept(found: list[Belief]) -> list[Belief]:
     return [replace(b, log_weight=b.log_weight - kept[0].log_weight) for b in kept]
 
 
-def widened(belief: Belief, sigmas: tuple[float, float, float]) -> Belief:
-    """Return a belief with less certainty of attitude [rad], place [m] and velocity [m/s], each axis."""
+def widened(belief: Belief, sigmas: tuple[float, float, float], led_place_sigma_m: float) -> Belief:
+    """Return a belief with less certainty of attitude [rad], place [m], velocity [m/s], each axis, and of the LEDs."""
     P = belief.P.copy()
     P[np.arange(9), np.arange(9)] += np.repeat(np.square(sigmas), 3)
+    P[range(RING.start, RING.stop), range(RING.start, RING.stop)] += led_place_sigma_m**2
     return replace(belief, P=P)
 
 
 def rolled(belief: Belief, roll_rad: float, led_place_variance_m2: float) -> Belief:
     """Return a belief whose drogue is rolled about its axis.
 
-    Its attitude's errors are told apart from all others, and what correlates with the LEDs' places is forgotten: they
-    were those of other LEDs.
+    The errors of its attitude and of its way to rest are told apart from all others, and what is known of the LEDs'
+    places is forgotten: it was of other LEDs.
     """
     P = belief.P.copy()
-    own = np.full(3, np.diag(P)[:3].max())
-    P[:3], P[:, :3], P[RING], P[:, RING] = 0.0, 0.0, 0.0, 0.0
-    P[range(3), range(3)] = own
+    attitude = np.r_[:3, REST]
+    own = P[np.ix_(attitude, attitude)]
+    own[range(3), range(3)] += own[:3, :3].diagonal().max()
+    P[attitude], P[:, attitude], P[RING], P[:, RING] = 0.0, 0.0, 0.0, 0.0
+    P[np.ix_(attitude, attitude)] = own
     P[range(RING.start, RING.stop), range(RING.start, RING.stop)] = led_place_variance_m2
     R_BD = belief.R_BD @ exp(np.array([roll_rad, 0.0, 0.0]))
-    return replace(belief, R_BD=R_BD, P=P)
+    return replace(belief, R_BD=R_BD, P=P, ring=np.zeros_like(belief.ring))
 
 
 def felt_first(belief: Belief, force_B: Array) -> Belief:

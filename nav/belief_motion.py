@@ -4,23 +4,27 @@ Held in body axes B, from the place I of the accelerometers; u' is the rate of c
 
     R = R_BD,  s = p_ID_B,  v = s',  n = swing of the drogue about its place of rest,  m = n',
     b = bias of the gyro,   c = gravity less the steady acceleration of the formation
+    u = turn from the drogue's attitude to that of rest, R_rest = exp(u) R
     a = -W^2 n - 2 z W m + white drive                                                                (1)
     s' = v,   v' = a - (f + c),   n' = m,   m' = a,   w = w_gyro - b                                  (2)
+    phi' = u / T + white turning,   u' = -phi'                                                        (3)
 
 W = diag(0, W_left, W_up): along the hose nothing pulls the drogue back, and n, m stay 0 there. f is the accelerometers'
 specific force, so that f + c is the receiver's acceleration beyond the formation's, which the belief need not guess;
-their bias is part of c, from which it cannot be told. In body axes every vector turns with E = exp(-[w x] dt). Errors
+their bias is part of c, from which it cannot be told. The drogue turns about an attitude of rest that hose and air give
+it, which stays and walks a little, as the LEDs' places do for what is not modelled of them. In body axes every vector
+turns with E = exp(-[w x] dt). Errors
 
-    e = (phi, ds, dv, dn, dm, db, dc, calibration, ring),   R_true = exp(phi) R,   dw = -db - noise             (3)
+    e = (phi, ds, dv, dn, dm, db, dc, du, calibration, ring),   R_true = exp(phi) R,   dw = -db - noise         (4)
 
 so that a turn that the gyro did not measure enters phi with +1 and each vector u with -[u x]. One step is Eq. (2) to
-second order in dt, then E; the steps are at most `longest_step_s`.
+second order in dt (Eq. (3) to first), then E; the steps are at most `longest_step_s`.
 
 Between two samples the rate is linear, after the last it is held. The truth departs from that by an angular
 acceleration of sigma_A: a steady one since the last sample, or one that changes its sign half-way between two. A time t
 after the last, or between two that are T apart, the gyro's squared noise density grows by
 
-    sigma_A^2 t^3,   or   sigma_A^2 T^3 / 64,   but at most by that of a rate that is not known at all             (4)
+    sigma_A^2 t^3,   or   sigma_A^2 T^3 / 64,   but at most by that of a rate that is not known at all             (5)
 
 The receiver's acceleration is taken for white where no two samples of it stand near.
 
@@ -36,10 +40,10 @@ from dockair.rotations import Array
 
 PHI, PLACE, VELOCITY = slice(0, 3), slice(3, 6), slice(6, 9)
 SWING, SWING_RATE, BIAS, FORMATION = slice(9, 12), slice(12, 15), slice(15, 18), slice(18, 21)
-CALIBRATION, RING, HARDWARE = slice(21, 28), slice(28, 44), slice(21, 44)
-ERRORS = 44  #: how many errors a belief has
-S, V, N, M, B, C = range(6)  #: rows of the state (6, 3)
-_MOVING = 21  # errors that move; those of calibration and ring do not
+REST, CALIBRATION, RING, HARDWARE = slice(21, 24), slice(24, 31), slice(31, 47), slice(24, 47)
+ERRORS = 47  #: how many errors a belief has
+S, V, N, M, B, C, U = range(7)  #: rows of the state (7, 3)
+_MOVING = 24  # errors that move; those of calibration and ring do not
 
 
 class Motion(NamedTuple):
@@ -48,6 +52,9 @@ class Motion(NamedTuple):
     stiffness: Array  #: (3,) W^2 [1/s^2]
     friction: Array  #: (3,) 2 z W [1/s]
     attitude2: float  #: drogue's turning [rad^2/s]
+    return_1_s: float  #: 1/T of Eq. (3)
+    rest2: float  #: walk of the attitude of rest [rad^2/s]
+    ring2: float  #: walk of the LEDs' places [m^2/s]
     drive2: float  #: of Eq. (1) [m^2/s^3]
     receiver2: float  #: receiver's acceleration where it is not measured [m^2/s^3]
     accelerometer2: float  #: [m^2/s^3]
@@ -55,7 +62,7 @@ class Motion(NamedTuple):
     bias2: float  #: walk of the gyro's bias [rad^2/s^3]
     formation2: float  #: walk of c [m^2/s^5]
     scale2: float  #: the gyro's noise by its scale factor, per squared rate [s]
-    held_turn2: float  #: sigma_A^2 of Eq. (4) [rad^2/s^4]
+    held_turn2: float  #: sigma_A^2 of Eq. (5) [rad^2/s^4]
     held_most2: float  #: noise density of a rate that is not known [rad^2/s]
     longest_gap_s: float  #: between two samples of acceleration that are used
     longest_step_s: float
@@ -84,42 +91,63 @@ def _turn(w: Array, dt: float) -> Array:
 
 
 @njit(cache=True)
-def _errors_moved(P: Array, E: Array, x: Array, dt: float, felt: bool, stiffness: Array, friction: Array) -> None:
-    """P <- F P in place; x (6, 3) is the state after the step."""
-    for j in range(P.shape[1]):
-        for i in range(3):
-            a = -stiffness[i] * P[9 + i, j] - friction[i] * P[12 + i, j]
-            a = a - 0.5 * dt * (stiffness[i] * P[12 + i, j] + friction[i] * a)  # half-way
-            relative = a - P[18 + i, j] if felt else a
-            P[3 + i, j] += dt * P[6 + i, j] + 0.5 * dt * dt * relative
-            P[6 + i, j] += dt * relative
-            P[9 + i, j] += dt * P[12 + i, j] + 0.5 * dt * dt * a
-            P[12 + i, j] += dt * a
-        b0, b1, b2 = dt * P[15, j], dt * P[16, j], dt * P[17, j]
-        for block in range(7):
-            if block == 5:  # the gyro's bias stays in the body
-                continue
-            r = 3 * block
-            p0, p1, p2 = P[r, j], P[r + 1, j], P[r + 2, j]
-            q0 = E[0, 0] * p0 + E[0, 1] * p1 + E[0, 2] * p2
-            q1 = E[1, 0] * p0 + E[1, 1] * p1 + E[1, 2] * p2
-            q2 = E[2, 0] * p0 + E[2, 1] * p1 + E[2, 2] * p2
+def _driven(P: Array, dt: float, felt: bool, stiffness: Array, friction: Array, return_1_s: float) -> None:
+    """Eqs (2), (3) for the rows of P, row after row (47 * 47,): a width known to the compiler lets it go in fours."""
+    for i in range(3):
+        W2, zW2 = stiffness[i], friction[i]
+        s, v, n, m, c = (3 + i) * ERRORS, (6 + i) * ERRORS, (9 + i) * ERRORS, (12 + i) * ERRORS, (18 + i) * ERRORS
+        for j in range(ERRORS):
+            a = -W2 * P[n + j] - zW2 * P[m + j]
+            a = a - 0.5 * dt * (W2 * P[m + j] + zW2 * a)  # half-way
+            relative = a - P[c + j] if felt else a
+            P[s + j] += dt * P[v + j] + 0.5 * dt * dt * relative
+            P[v + j] += dt * relative
+            P[n + j] += dt * P[m + j] + 0.5 * dt * dt * a
+            P[m + j] += dt * a
+        phi, u = i * ERRORS, (21 + i) * ERRORS
+        for j in range(ERRORS):
+            back = dt * return_1_s * P[u + j]
+            P[phi + j] += back
+            P[u + j] -= back
+
+
+@njit(cache=True)
+def _errors_moved(
+    P: Array, E: Array, x: Array, dt: float, felt: bool, stiffness: Array, friction: Array, return_1_s: float
+) -> None:
+    """P <- F P in place, P row after row (47 * 47,); x (7, 3) is the state after the step."""
+    _driven(P, dt, felt, stiffness, friction, return_1_s)
+    e00, e01, e02, e10, e11, e12 = E[0, 0], E[0, 1], E[0, 2], E[1, 0], E[1, 1], E[1, 2]
+    e20, e21, e22 = E[2, 0], E[2, 1], E[2, 2]
+    bias = P[15 * ERRORS : 18 * ERRORS]  # the gyro's stays in the body
+    for block in (0, 1, 2, 3, 4, 6, 7):
+        rows = P[3 * block * ERRORS : 3 * (block + 1) * ERRORS]
+        state = max(block - 1, 0)
+        u0, u1, u2 = x[state, 0], x[state, 1], x[state, 2]
+        for j in range(ERRORS):
+            p0, p1, p2 = rows[j], rows[ERRORS + j], rows[2 * ERRORS + j]
+            b0, b1, b2 = dt * bias[j], dt * bias[ERRORS + j], dt * bias[2 * ERRORS + j]
+            q0 = e00 * p0 + e01 * p1 + e02 * p2
+            q1 = e10 * p0 + e11 * p1 + e12 * p2
+            q2 = e20 * p0 + e21 * p1 + e22 * p2
             if block == 0:
-                P[r, j], P[r + 1, j], P[r + 2, j] = q0 + b0, q1 + b1, q2 + b2
-                continue
-            u = x[5] if block == 6 else x[block - 1]
-            P[r, j] = q0 - (u[1] * b2 - u[2] * b1)
-            P[r + 1, j] = q1 - (u[2] * b0 - u[0] * b2)
-            P[r + 2, j] = q2 - (u[0] * b1 - u[1] * b0)
+                rows[j], rows[ERRORS + j], rows[2 * ERRORS + j] = q0 + b0, q1 + b1, q2 + b2
+            else:
+                rows[j] = q0 - (u1 * b2 - u2 * b1)
+                rows[ERRORS + j] = q1 - (u2 * b0 - u0 * b2)
+                rows[2 * ERRORS + j] = q2 - (u0 * b1 - u1 * b0)
 
 
 @njit(cache=True)
 def _noise_added(P: Array, x: Array, dt: float, gyro2: float, drive2: float, other2: float, rest: Array) -> None:
-    """P <- P + Q in place; `other2` drives the velocity alone, `rest` is of attitude, bias and formation."""
+    """P <- P + Q in place; `other2` drives the velocity alone, `rest` is of all others."""
     for i in range(3):
         P[i, i] += rest[0] * dt
         P[15 + i, 15 + i] += rest[1] * dt
         P[18 + i, 18 + i] += rest[2] * dt
+        P[21 + i, 21 + i] += (rest[0] + rest[3]) * dt
+        P[i, 21 + i] -= rest[0] * dt
+        P[21 + i, i] -= rest[0] * dt
         swings = i > 0
         for row, powers in ((3, 1), (6, 0), (9, 1), (12, 0)):
             for column, more in ((3, 1), (6, 0), (9, 1), (12, 0)):
@@ -129,12 +157,14 @@ def _noise_added(P: Array, x: Array, dt: float, gyro2: float, drive2: float, oth
                 order = powers + more
                 share = 1.0 if order == 0 else (0.5 * dt if order == 1 else dt * dt / 3.0)
                 P[row + i, column + i] += q * dt * share
+    for i in range(RING.start, RING.stop):
+        P[i, i] += rest[4] * dt
     G = np.zeros((_MOVING, 3))
     for i in range(3):
         G[i, i] = 1.0
-    for block in range(1, 7):
+    for block in range(1, 8):
         if block != 5:
-            u, r = (x[5] if block == 6 else x[block - 1]), 3 * block
+            u, r = x[block - 1], 3 * block
             G[r, 1], G[r, 2], G[r + 1, 2] = u[2], -u[1], u[0]
             G[r + 1, 0], G[r + 2, 0], G[r + 2, 1] = -u[2], u[1], -u[0]
     for i in range(_MOVING):
@@ -144,7 +174,7 @@ def _noise_added(P: Array, x: Array, dt: float, gyro2: float, drive2: float, oth
 
 @njit(cache=True)
 def _held_noise(after: float, before: float, turn2: float, most2: float) -> float:
-    """Mean of sigma_A^2 t^3 over a piece of time, t from `before` to `after`, at most `most2` (Eq. (4))."""
+    """Mean of sigma_A^2 t^3 over a piece of time, t from `before` to `after`, at most `most2` (Eq. (5))."""
     corner = (most2 / turn2) ** (1.0 / 3.0) if turn2 > 0.0 else np.inf
     if after <= before or corner <= before:
         return most2 if turn2 > 0.0 else 0.0
@@ -156,12 +186,12 @@ def _held_noise(after: float, before: float, turn2: float, most2: float) -> floa
 def propagated(
     R: Array, x: Array, P: Array, t0: float, t1: float, times: Array, rates: Array, forces: Array, motion: Motion
 ) -> tuple[Array, Array, Array]:
-    """Return R (3, 3), x (6, 3), P at t1 [s], from those at t0 <= t1 and the samples about.
+    """Return R (3, 3), x (7, 3), P at t1 [s], from those at t0 <= t1 and the samples about.
 
     Args:
         R: (3, 3) R_BD.
-        x: (6, 3) s, v, n, m, b, c.
-        P: (44, 44) covariance of the errors.
+        x: (7, 3) s, v, n, m, b, c, u.
+        P: (47, 47) covariance of the errors.
         t0: time of the belief.
         t1: time wanted.
         times: (k,) stamps of the samples, increasing.
@@ -172,7 +202,7 @@ def propagated(
     R, x, P = R.copy(), x.copy(), P.copy()
     n, t = len(times), t0
     k = int(np.searchsorted(times, t0, side="right")) - 1
-    rest = np.array([motion.attitude2, motion.bias2, motion.formation2])
+    rest = np.array([motion.attitude2, motion.bias2, motion.formation2, motion.rest2, motion.ring2])
     while t < t1:
         knot = min(times[k + 1], t1) if k + 1 < n else t1
         pieces = max(int(np.ceil((knot - t) / motion.longest_step_s - 1e-9)), 1)
@@ -210,12 +240,13 @@ def propagated(
                 x[2, i] += dt * x[3, i] + 0.5 * dt * dt * a
                 x[3, i] += dt * a
             E = _turn(w, dt)
-            R = np.dot(E, R)
-            for row in (0, 1, 2, 3, 5):
+            R = np.dot(E, np.dot(_turn(-motion.return_1_s * x[6], dt), R))
+            x[6] = x[6] * (1.0 - dt * motion.return_1_s)
+            for row in (0, 1, 2, 3, 5, 6):
                 x[row] = _turned(E, x[row])
-            _errors_moved(P, E, x, dt, felt, motion.stiffness, motion.friction)
+            _errors_moved(P.ravel(), E, x, dt, felt, motion.stiffness, motion.friction, motion.return_1_s)
             P = P.T.copy()
-            _errors_moved(P, E, x, dt, felt, motion.stiffness, motion.friction)
+            _errors_moved(P.ravel(), E, x, dt, felt, motion.stiffness, motion.friction, motion.return_1_s)
             gyro2 = motion.gyro2 + held2 + motion.scale2 * size2
             other2 = motion.accelerometer2 if felt else motion.receiver2
             _noise_added(P, x, dt, gyro2, motion.drive2, other2, rest)

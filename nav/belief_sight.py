@@ -12,16 +12,18 @@ and each LED is off its place in the ring's plane by d. A pose solved with the L
 Not modelled: LEDs out of the ring's plane, which are seen at the sine of the tilt; errors of the lens's distortion.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
+from numba import njit
+from numpy.typing import NDArray
 
 from dockair.calibration import Camera, Mounting
 from dockair.nav.belief_frame import Seen
-from dockair.nav.belief_motion import CALIBRATION, ERRORS, RING, B, S, V
+from dockair.nav.belief_motion import CALIBRATION, RING, B, S, V
 from dockair.nav.pose.measurement import LinesOfSight
 from dockair.nav.pose.prior import PosePrior
-from dockair.rotations import Array, skew
+from dockair.rotations import Array
 
 _TILT_FLOOR = 1e-9  # of the largest information: below it a pose is not determined, and the LEDs' places move nothing
 
@@ -31,9 +33,11 @@ class Belief:
     """One Gaussian."""
 
     R_BD: Array  #: (3, 3)
-    x: Array  #: (6, 3) rows of `belief_motion`: p_ID, v_ID, swing, its rate, the gyro's bias, formation
-    P: Array  #: (44, 44) of the errors
+    x: Array  #: (7, 3) rows of `belief_motion`: p_ID, v_ID, swing, its rate, the gyro's bias, formation, turn to rest
+    P: Array  #: (47, 47) of the errors
     log_weight: float = 0.0
+    ring: Array = field(default_factory=lambda: np.zeros(RING.stop - RING.start))
+    #: (16,) how far each LED is off its place in the ring's plane [m]
 
     @property
     def p_ID(self) -> Array:
@@ -57,7 +61,7 @@ class Apparent:
 
     R_CD: Array  #: (3, 3)
     p_CD: Array  #: (3,) [m]
-    M: Array  #: (6, 44) its errors (phi, delta) in camera axes, per error of the belief
+    M: Array  #: (6, 47) its errors (phi, delta) in camera axes, per error of the belief
     covariance: Array  #: (6, 6)
 
     @property
@@ -80,33 +84,21 @@ class Sight:
             belief: what is believed.
             solved: the pose that is found of a frame with the LEDs taken to be where the sheet says.
         """
-        R_CB = self.mounting.R_BC.T
         p_CD_B = belief.p_ID + self.mounting.p_BI - self.mounting.p_BC
-        R_CD, p_CD = R_CB @ belief.R_BD, R_CB @ p_CD_B
-        M = np.zeros((6, ERRORS))
-        M[:3, :3] = M[3:, 3:6] = R_CB
-        first = CALIBRATION.start
-        M[:3, first : first + 3] = -R_CB
-        M[3:, first : first + 3] = R_CB @ skew(p_CD_B)
-        M[3:, first + 3 : first + 6] = -R_CB
-        M[3:, first + 6] = -p_CD
+        R_CD, p_CD, M, covariance = _seen(self.mounting.R_BC, belief.R_BD, p_CD_B, belief.P, CALIBRATION.start)
         if solved:
             M[:, RING] = ring_sensitivity(R_CD, p_CD, self.points_D)
-        covariance = M @ belief.P @ M.T
-        return Apparent(R_CD=R_CD, p_CD=p_CD, M=M, covariance=0.5 * (covariance + covariance.T))
+            covariance = M @ belief.P @ M.T
+            covariance = 0.5 * (covariance + covariance.T)
+        return Apparent(R_CD=R_CD, p_CD=p_CD, M=M, covariance=covariance)
 
     def shown(self, belief: Belief, sight: LinesOfSight) -> tuple[Seen, Array]:
-        """Return what the LEDs of a frame should show, and (6 + 2n, 44) its errors per error of the belief."""
-        apart2 = ((sight.points_D[:, None, :] - self.points_D[None, :, :]) ** 2).sum(axis=2)
-        numbers = apart2.argmin(axis=1)
+        """Return what the LEDs of a frame should show, and (6 + 2n, 47) its errors per error of the belief."""
         seen = self.apparent(belief)
-        M = np.zeros((6 + 2 * len(numbers), ERRORS))
-        M[:6] = seen.M
-        rows = 6 + np.arange(2 * len(numbers))
-        M[rows, RING.start + (2 * numbers[:, None] + np.arange(2)).ravel()] = 1.0
-        C = M @ belief.P @ M.T
-        points = np.ascontiguousarray(self.points_D[numbers])
-        return Seen(R_CD=seen.R_CD, p_CD=seen.p_CD, points_D=points, C=0.5 * (C + C.T)), M
+        numbers, M, C = _with_leds(seen.M, seen.covariance, belief.P, self.points_D, sight.points_D, RING.start)
+        points = self.points_D[numbers]
+        points[:, 1:] += belief.ring.reshape(-1, 2)[numbers]
+        return Seen(R_CD=seen.R_CD, p_CD=seen.p_CD, points_D=points, C=C), M
 
     def led_pixels(self, belief: Belief, camera: Camera) -> tuple[Array, Array]:
         """Where the LEDs should be seen.
@@ -116,22 +108,106 @@ class Sight:
             the centroid's noise, the lens's distortion neglected.
         """
         seen = self.apparent(belief)
-        a = self.points_D @ seen.R_CD.T
+        points_D = self.points_D.copy()
+        points_D[:, 1:] += belief.ring.reshape(-1, 2)
+        a = points_D @ seen.R_CD.T
         pixels = camera.pixels_from_points(a + seen.p_CD)
-        x, y, z = np.where(np.isfinite(pixels[:, :1]), a + seen.p_CD, np.nan).T
-        G, arm = np.zeros((len(a), 2, 3)), np.zeros((len(a), 3, 3))
-        G[:, 0, 0], G[:, 1, 0], G[:, 0, 1] = y / x**2, z / x**2, -1.0 / x
-        G[:, 1, 2] = G[:, 0, 1]
-        arm[:, 0, 1], arm[:, 0, 2], arm[:, 1, 2] = a[:, 2], -a[:, 1], a[:, 0]
-        arm[:, 1, 0], arm[:, 2, 0], arm[:, 2, 1] = -a[:, 2], a[:, 1], -a[:, 0]
-        H = (G @ arm) @ seen.M[:3] + G @ seen.M[3:]
-        moved = G @ seen.R_CD[:, 1:]
-        for k in range(len(a)):
-            H[k, :, RING.start + 2 * k : RING.start + 2 * k + 2] += moved[k]
-        S = H @ belief.P @ H.transpose(0, 2, 1)
-        half, cross = 0.5 * (S[:, 0, 0] - S[:, 1, 1]), S[:, 0, 1]
-        largest = 0.5 * (S[:, 0, 0] + S[:, 1, 1]) + np.sqrt(half**2 + cross**2)  # eigenvalue
-        return pixels, camera.focal_length_px * np.sqrt(largest)
+        variances = _led_variances(a, seen.R_CD, seen.p_CD, seen.M, belief.P, CALIBRATION.start, RING.start)
+        return pixels, camera.focal_length_px * np.sqrt(variances)
+
+
+@njit(cache=True)
+def _seen(R_BC: Array, R_BD: Array, p_CD_B: Array, P: Array, turn: int) -> tuple[Array, Array, Array, Array]:
+    """R_CD, p_CD, M (6, 47) and M P M' of Eq. (1); `turn` is the calibration's first column.
+
+    Columns come as arguments: the compiler's cache would not see it when they changed in another file.
+    """
+    R_CD, p_CD, M, MP, covariance = (
+        np.zeros((3, 3)),
+        np.zeros(3),
+        np.zeros((6, len(P))),
+        np.zeros((6, 13)),
+        np.empty((6, 6)),
+    )
+    x, y, z = p_CD_B[0], p_CD_B[1], p_CD_B[2]
+    for i in range(3):
+        u, v, w = R_BC[0, i], R_BC[1, i], R_BC[2, i]  # axis i of the camera
+        for j in range(3):
+            R_CD[i, j] = u * R_BD[0, j] + v * R_BD[1, j] + w * R_BD[2, j]
+            M[i, j] = M[3 + i, 3 + j] = R_BC[j, i]
+            M[i, turn + j] = M[3 + i, turn + 3 + j] = -R_BC[j, i]
+        p_CD[i] = u * x + v * y + w * z
+        M[3 + i, turn], M[3 + i, turn + 1], M[3 + i, turn + 2] = v * z - w * y, w * x - u * z, u * y - v * x
+        M[3 + i, turn + 6] = -p_CD[i]
+    for i in range(6):
+        for a in range(13):  # columns of M that are not zero: phi, delta, calibration
+            column = a if a < 6 else turn + a - 6
+            for b in range(13):
+                row = b if b < 6 else turn + b - 6
+                MP[i, a] += M[i, row] * P[row, column]
+        for j in range(i + 1):
+            covariance[i, j] = 0.0
+            for a in range(13):
+                covariance[i, j] += MP[i, a] * M[j, a if a < 6 else turn + a - 6]
+            covariance[j, i] = covariance[i, j]
+    return R_CD, p_CD, M, covariance
+
+
+@njit(cache=True)
+def _with_leds(
+    M_pose: Array, covariance: Array, P: Array, ring: Array, points: Array, first: int
+) -> tuple[NDArray[np.int64], Array, Array]:
+    """Numbers (n,) of LEDs at points (n, 3) of a ring (8, 3), M (6 + 2n, 47) of pose and LEDs, M P M'."""
+    n = len(points)
+    numbers, M, C = np.empty(n, np.int64), np.zeros((6 + 2 * n, len(P))), np.empty((6 + 2 * n, 6 + 2 * n))
+    place = np.empty(2 * n, np.int64)
+    M[:6], C[:6, :6] = M_pose, covariance
+    for k in range(n):
+        nearest = np.inf
+        for m in range(len(ring)):
+            apart2 = ((points[k] - ring[m]) ** 2).sum()
+            if apart2 < nearest:
+                nearest, numbers[k] = apart2, m
+        place[2 * k], place[2 * k + 1] = first + 2 * numbers[k], first + 2 * numbers[k] + 1
+    for i in range(2 * n):
+        M[6 + i, place[i]] = 1.0
+        for j in range(6):
+            C[j, 6 + i] = 0.0
+            for m in range(len(P)):
+                C[j, 6 + i] += M_pose[j, m] * P[m, place[i]]
+            C[6 + i, j] = C[j, 6 + i]
+        for j in range(2 * n):
+            C[6 + i, 6 + j] = P[place[i], place[j]]
+    return numbers, M, C
+
+
+@njit(cache=True)
+def _led_variances(a: Array, R_CD: Array, p_CD: Array, M: Array, P: Array, turn: int, ring: int) -> Array:
+    """(n,) largest variance of the image, focal length 1, of LEDs at a (n, 3) from the ring's centre, NaN behind."""
+    columns, H, HP, out = np.empty(15, np.int64), np.empty((2, 15)), np.empty((2, 15)), np.full(len(a), np.nan)
+    for i in range(13):  # columns of M that are not zero, then the LED's own
+        columns[i] = i if i < 6 else turn + i - 6
+    for k in range(len(a)):
+        x, y, z = a[k, 0] + p_CD[0], a[k, 1] + p_CD[1], a[k, 2] + p_CD[2]
+        if not x > 0.0:
+            continue
+        columns[13], columns[14] = ring + 2 * k, ring + 2 * k + 1
+        for i in range(2):
+            g0, g1, g2 = (y if i == 0 else z) / x**2, (-1.0 / x if i == 0 else 0.0), (-1.0 / x if i == 1 else 0.0)
+            t0, t1, t2 = g2 * a[k, 1] - g1 * a[k, 2], g0 * a[k, 2] - g2 * a[k, 0], g1 * a[k, 0] - g0 * a[k, 1]
+            for c in range(13):
+                m = M[:, columns[c]]
+                H[i, c] = t0 * m[0] + t1 * m[1] + t2 * m[2] + g0 * m[3] + g1 * m[4] + g2 * m[5]
+            for c in range(2):
+                H[i, 13 + c] = g0 * R_CD[0, 1 + c] + g1 * R_CD[1, 1 + c] + g2 * R_CD[2, 1 + c]
+        for i in range(2):
+            for c in range(15):
+                HP[i, c] = 0.0
+                for b in range(15):
+                    HP[i, c] += H[i, b] * P[columns[b], columns[c]]
+        uu, uv, vv = (HP[0] * H[0]).sum(), (HP[0] * H[1]).sum(), (HP[1] * H[1]).sum()
+        out[k] = 0.5 * (uu + vv) + np.sqrt(0.25 * (uu - vv) ** 2 + uv**2)  # eigenvalue
+    return out
 
 
 def ring_sensitivity(R_CD: Array, p_CD: Array, points_D: Array) -> Array:

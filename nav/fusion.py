@@ -17,7 +17,7 @@ turns or speeds up but by the walk of c.
 
 from bisect import bisect_right
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.stats import chi2
@@ -76,6 +76,10 @@ class RelativeFilter:
         self._settings = settings or FusionSettings()
         self._sheets = sheets
         self._sight = Sight(mounting=sheets.mounting, points_D=sheets.ring.positions_D)
+        self._p_IP = sheets.mounting.p_BP - sheets.mounting.p_BI
+        self._to_tip = np.eye(9, motion.ERRORS)  # from the errors to those of Eq. (1)
+        self._to_tip[6:, motion.BIAS] = -skew(self._p_IP)
+        self._lever2 = skew(self._p_IP) @ skew(self._p_IP).T
         probability = self._settings.gate_probability
         self._gates = [0.0, *(float(chi2.ppf(probability, freedom)) for freedom in range(1, 17))]
         self._taking = taking_of(self._settings)
@@ -108,6 +112,8 @@ class RelativeFilter:
             if self._record.take(sample):
                 taken += 1
                 self._after_sample(before_s)
+        if taken:
+            self._renew_head()
         return taken
 
     def update(self, pose: PoseEstimate, time_stamp_s: float) -> bool:
@@ -151,20 +157,16 @@ class RelativeFilter:
         """Return the belief at a time; at that of the newest message if none is given."""
         if time_s is None:
             time_s = self._newest_s() if self._nodes else 0.0
-        belief, mounting = mixture(self._beliefs(time_s)), self._sheets.mounting
-        r, average_s = mounting.p_BP - mounting.p_BI, self._settings.rate_average_s
-        w = self._record.mean_rate_B(time_s - average_s, time_s) - belief.bias
-        T = np.zeros((9, motion.ERRORS))
-        T[:, :9] = np.eye(9)
-        T[6:, motion.BIAS] = -skew(r)
-        covariance = T @ belief.P @ T.T
-        covariance[6:, 6:] += self._rate_variance(time_s) * skew(r) @ skew(r).T
+        belief, r, average_s = mixture(self._beliefs(time_s)), self._p_IP, self._settings.rate_average_s
+        w_cross = skew(self._record.mean_rate_B(time_s - average_s, time_s) - belief.bias)
+        covariance = self._to_tip @ belief.P @ self._to_tip.T
+        covariance[6:, 6:] += self._rate_variance(time_s) * self._lever2
         return FilterState(
             time_s=time_s,
             R_BD=belief.R_BD,
             p_PD_B=belief.p_ID - r,
-            v_PD_B=belief.v_ID - np.cross(w, r),
-            rate_PD_B=belief.v_ID - np.cross(w, belief.p_ID),
+            v_PD_B=belief.v_ID - w_cross @ r,
+            rate_PD_B=belief.v_ID - w_cross @ belief.p_ID,
             gyro_bias_B=belief.bias.copy(),
             covariance=0.5 * (covariance + covariance.T),
         )
@@ -209,8 +211,9 @@ class RelativeFilter:
             self._feel(self._record.forces_B[-1])
         if self._nodes[-1].time_s > before_s:
             self._run_from(bisect_right(self._nodes, before_s, key=_time))  # those after it had to guess the rate
-        self._renew_head()
-        if self._head is not None and time_s - self._nodes[-1].time_s >= self._settings.node_interval_s:
+        if time_s - self._nodes[-1].time_s >= self._settings.node_interval_s:
+            self._renew_head()
+            assert self._head is not None  # no frame is newer
             self._nodes.append(self._head)
         oldest_s = time_s - self._settings.buffer_s
         if len(self._nodes) > 1 and self._nodes[1].time_s <= oldest_s:
@@ -271,10 +274,10 @@ class RelativeFilter:
         self._head = _Node(newest_s, None, self._moved(begin, newest_s))
 
     def _widened(self, beliefs: list[Belief]) -> list[Belief]:
-        """Return the beliefs with less certainty of motion and place: the drogue has been struck or let go."""
+        """Return the beliefs with less certainty: the drogue has been struck or let go, or is seen from elsewhere."""
         s = self._settings
         sigmas = (s.doubt_attitude_sigma_rad, s.doubt_position_sigma_m, s.doubt_velocity_sigma_m_s)
-        return [widened(belief, sigmas) for belief in beliefs]
+        return [widened(belief, sigmas, s.led_place_sigma_m) for belief in beliefs]
 
     def _beliefs(self, time_s: float) -> list[Belief]:
         """Return the belief at a time; the oldest kept if it is older."""
@@ -293,5 +296,5 @@ class RelativeFilter:
         moved = []
         for belief in node.beliefs:
             R, x, P = propagated(belief.R_BD, belief.x, belief.P, node.time_s, time_s, *samples, self._motion)
-            moved.append(replace(belief, R_BD=R, x=x, P=P))
+            moved.append(Belief(R, x, P, belief.log_weight, belief.ring))
         return moved

@@ -35,7 +35,15 @@ class FusionSettings:
     )
     formation_walk_m_s2_rts: float = 0.3  # entry of a turn: 4 m/s^2 within some seconds; costs little (docs/fusion.md)
     start_formation_sigma_m_s2: float = 0.5  # gusts and manoeuvre at the first sample
-    attitude_density: float = 0.015  # turning of the drogue [rad/sqrt(s)]; in light gusts 0.006 over 0.2 s to 1 s
+    #: Turning of the drogue [rad/sqrt(s)] about its attitude of rest, and how fast it goes back there: 0.7 degrees rms.
+    #: In light gusts it turns by 0.4 degrees to the sides and 0.5 up and down, and has forgotten it after 1 s.
+    attitude_density: float = 0.015
+    attitude_time_s: float = 1.5
+    #: Attitude of rest against the start's: hose, trim and heading are known to 0.7 degrees, the ring's roll to 1.1.
+    rest_sigma_rad: tuple[float, float, float] = (0.02, 0.012, 0.012)
+    rest_walk_rad_rts: float = (
+        0.0017  # 0.3 degrees in 10 s: slow wander of the receiver's heading and of the air's direction
+    )
     start_velocity_sigma_m_s: float = 1.0  # assumed: joining up ends within this of the drogue's velocity
     #: A rate that is not measured departs from that of the last sample: 3 degrees/s within a quarter of a second, the
     #: rolling of a receiver that flies in light gusts; then nothing is known of it but this.
@@ -44,9 +52,9 @@ class FusionSettings:
     manoeuvre_s: float = 1.0  # how long the gyro's error of scale keeps its sign: of one roll or pitch movement
     saturated_share: float = 0.999  # of the gyro's range; the last digit may be rounded down
     gate_probability: float = 0.9999  # a good frame is refused once in 10 000
-    #: Which of two minima is right: a frame counts a tenth, because the LEDs are as far off in the next one, and is
-    #: forgotten within fifty, so that what they say for the wrong one does not add up.
-    evidence_share: float = 0.1
+    #: Which of two minima is right: a frame counts three tenths, because the LEDs are as far off in the next one, and
+    #: is forgotten within fifty, so that what they say for the wrong one does not add up.
+    evidence_share: float = 0.3
     evidence_memory: float = 0.98
     #: A drogue that is struck or let go changes its velocity at once, which white acceleration does not foresee. After
     #: so many frames refused in a row the belief is widened: by the closure speed, its way over the refused frames, and
@@ -66,6 +74,9 @@ class FusionSettings:
     camera_place_sigma_m: float = 2e-3
     camera_scale_sigma: float = 7.8e-4
     led_place_sigma_m: float = 3e-4  # each LED, in the ring's plane
+    led_place_share: float = 0.3  # of what a frame says of the LEDs' places (docs/fusion.md)
+    #: LEDs out of the ring's plane and the lens's distortion show as places that change with the view: 0.03 mm in 10 s.
+    led_place_walk_m_rts: float = 1e-5
     rate_average_s: float = (
         0.01  # gyro samples averaged for Eq. (1) of `fusion`: noise against lag, 5 samples at 500 Hz
     )
@@ -78,7 +89,12 @@ class FusionSettings:
 
 def taking_of(settings: FusionSettings) -> Taking:
     """Return how frames are taken."""
-    return Taking(tight=settings.coupling == "tight", memory=settings.evidence_memory, share=settings.evidence_share)
+    return Taking(
+        tight=settings.coupling == "tight",
+        memory=settings.evidence_memory,
+        share=settings.evidence_share,
+        ring=settings.led_place_share,
+    )
 
 
 def motion_of(settings: FusionSettings, gyro: GyroSheet) -> Motion:
@@ -89,6 +105,9 @@ def motion_of(settings: FusionSettings, gyro: GyroSheet) -> Motion:
         stiffness=omega**2,
         friction=2.0 * settings.swing_damping * omega,
         attitude2=settings.attitude_density**2,
+        return_1_s=1.0 / settings.attitude_time_s,
+        rest2=settings.rest_walk_rad_rts**2,
+        ring2=settings.led_place_walk_m_rts**2,
         drive2=settings.drogue_acceleration_density**2,
         receiver2=settings.receiver_acceleration_density**2,
         accelerometer2=gyro.accelerometer_noise_density_m_s2_rthz**2,
@@ -109,21 +128,24 @@ def start_of(settings: FusionSettings, sheets: NavigationSheets) -> Belief:
     omega = 2.0 * np.pi * np.array(settings.swing_frequency_hz)
     swing_rate2 = np.append(0.0, settings.drogue_acceleration_density**2 / (4.0 * settings.swing_damping * omega))
     swing2 = np.append(0.0, swing_rate2[1:] / omega**2)
+    turning2 = 0.5 * settings.attitude_density**2 * settings.attitude_time_s
     variances = np.concatenate(
         [
-            np.full(3, start.sigma_R_rad**2),
+            np.square(np.minimum(settings.rest_sigma_rad, start.sigma_R_rad)) + turning2,
             np.square(start.sigma_p_m),
             settings.start_velocity_sigma_m_s**2 + swing_rate2,
             swing2,
             swing_rate2,
             np.full(3, gyro.bias_sigma_rad_s**2),
             np.full(3, settings.start_formation_sigma_m_s2**2 + gyro.accelerometer_bias_sigma_m_s2**2),
+            np.full(3, turning2),
             _hardware_variances(settings, len(sheets.ring.positions_D)),
         ]
     )
     P = np.diag(variances)
     P[np.arange(6, 9), np.arange(12, 15)] = P[np.arange(12, 15), np.arange(6, 9)] = swing_rate2
-    x = np.zeros((6, 3))
+    P[np.arange(3), np.arange(21, 24)] = P[np.arange(21, 24), np.arange(3)] = -turning2
+    x = np.zeros((7, 3))
     x[0] = start.p_PD_B + sheets.mounting.p_BP - sheets.mounting.p_BI
     return Belief(np.array(start.R_BD, dtype=float), x, P)
 

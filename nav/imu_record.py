@@ -5,6 +5,8 @@ gyro's limit, which says no more than that the true one is beyond. A stamp that 
 second one near it says the same.
 """
 
+import math
+
 import numpy as np
 
 from dockair.calibration import GyroSheet, Mounting
@@ -26,9 +28,9 @@ class Stamps:
 
     def believed(self, time_s: float, newest_s: float) -> bool:
         """Whether a stamp is, where the newest of all that is known is `newest_s` (-inf: nothing)."""
-        near = time_s - newest_s <= self._leap_s or not np.isfinite(newest_s)
+        near = time_s - newest_s <= self._leap_s or not math.isfinite(newest_s)
         again = 0.0 < time_s - self._doubtful_s <= self._leap_s
-        if np.isfinite(time_s) and (near or again):
+        if math.isfinite(time_s) and (near or again):
             self._doubtful_s = np.nan
             self.newest_s = max(self.newest_s, time_s)
             return True
@@ -76,15 +78,17 @@ class ImuRecord:
 
     def take(self, sample: ImuSample) -> bool:
         """Keep a sample; False if it is not taken."""
-        rate_I = sample.angular_rate_rad_s
-        inside = bool((np.abs(rate_I) < self._limit_rad_s).all())  # false for what is not a number
+        rate_I, limit = sample.angular_rate_rad_s, self._limit_rad_s
+        x, y, z = rate_I.tolist()
+        inside = abs(x) < limit and abs(y) < limit and abs(z) < limit  # false for what is not a number
         if not (inside and self.newest_s < sample.time_stamp_s < np.inf):
             return False
         if self._end == len(self._times):
             self._make_room()
         k = self._end
-        self._times[k], self._rates[k] = sample.time_stamp_s, self._R_BI @ rate_I
-        self._forces[k] = self._R_BI @ sample.specific_force_m_s2
+        self._times[k] = sample.time_stamp_s
+        np.matmul(self._R_BI, rate_I, out=self._rates[k])
+        np.matmul(self._R_BI, sample.specific_force_m_s2, out=self._forces[k])
         self._end += 1
         return True
 

@@ -17,6 +17,8 @@ from dockair.errors import DockairError
 from dockair.messages import CameraFrame, ImuSample, LedObservation, NavSolution, TankerAnnouncement
 from dockair.nav.fusion import FusionSettings, RelativeFilter
 from dockair.nav.guidance.approach import Guidance, GuidanceSettings, RelativeState
+from dockair.nav.guidance.phases import Phase
+from dockair.nav.heading.own_heading import OwnHeading, OwnHeadingSettings
 from dockair.nav.identify.code import CodeSettings, code_of
 from dockair.nav.identify.perspective import SLOTS
 from dockair.nav.image.detect import DetectSettings
@@ -25,6 +27,7 @@ from dockair.nav.integrity.fault_test import IntegritySettings
 from dockair.nav.integrity.monitor import Integrity, IntegrityStatus, check_integrity
 from dockair.nav.pose.estimate import PoseStatus, solve_pose
 from dockair.nav.pose.measurement import lines_of_sight_from_pixels
+from dockair.nav.pose.prior import AttitudePrior
 from dockair.nav.ring_finder import FewSettings, RingFinder
 from dockair.nav.track import TrackSettings
 from dockair.rotations import Array
@@ -44,7 +47,11 @@ class NavigatorSettings:
     contact: ContactLimits = field(default_factory=ContactLimits)
     fusion: FusionSettings = field(default_factory=FusionSettings)
     guidance: GuidanceSettings = field(default_factory=GuidanceSettings)
+    heading: OwnHeadingSettings | None = None  # none: docking needs no heading, and each of its frames shows no LEDs
     led_position_sigma_m: float = 3e-4  # as-built tolerance of an LED's place on the ring; 0.3 px at 3 m
+    #: LEDs from which on a frame is tested by itself. Of four any three fit: the range could be off by 0.3 m unseen,
+    #: of five by as much near the frontal attitude. Fewer are tested with the attitude that the frames before showed.
+    alone_leds: int = 6
     usable_sigma_m: float = 0.10  # lateral 1 sigma above which the state may not be flown on
     turned_rad: float = np.radians(10.0)  # roll by which a belief is off that its own gate may no longer bridge
     usable_age_s: float = 0.5  # breakaway practice: a track lost for 0.5 s is lost
@@ -66,6 +73,7 @@ class Navigator:
             self._settings.few, self._settings.led_position_sigma_m,
         )  # fmt: skip
         self._guidance = Guidance(self._settings.guidance, sheets.control_rate_hz)
+        self._heading = None if self._settings.heading is None else OwnHeading(sheets, self._settings.heading)
         self._points_D = sheets.ring.positions_D
         self._time_s = 0.0
         self._used_time_s = self._posed_time_s = float("nan")
@@ -84,6 +92,11 @@ class Navigator:
             self._time_s = self._filter.imu_time_s
         else:  # the IMU has dropped out, or says nothing that can be used: the last rate is held
             self._time_s += 1.0 / self._sheets.control_rate_hz
+        if self._heading is not None:
+            asked = frame if isinstance(frame, CameraFrame) and self._heading.was_asked(frame) else None
+            centre_C = np.zeros(3) if asked is None else self._filter.predicted_pose(self._time_s)[1]
+            self._heading.step(imu, asked, centre_C)
+            frame = frame if asked is None else None
         if isinstance(frame, CameraFrame):
             seen = self._finder.find(frame, followed=self._followed(frame.time_stamp_s))
             self._candidates_px = self._finder.candidates_px
@@ -113,7 +126,7 @@ class Navigator:
         self._led_pixels_px[named] = seen.centroids_px
         if len(named) < _POSE_LEDS:
             return self._use_few(seen)
-        R_CD, p_CD, _ = self._filter.predicted_pose(time_s)
+        R_CD, p_CD, covariance = self._filter.predicted_pose(time_s)
         misplaced_px = self._sheets.camera.focal_length_px * self._settings.led_position_sigma_m / p_CD[0]
         pose = solve_pose(
             seen.centroids_px,
@@ -124,7 +137,9 @@ class Navigator:
         )
         if pose.status is not PoseStatus.CONVERGED:
             return f"pose {pose.status.value}"
-        checked = check_integrity(pose, settings=self._settings.integrity)
+        checked = check_integrity(
+            pose, self._attitude_known(len(named), time_s, R_CD, covariance), self._settings.integrity
+        )
         if checked.status is IntegrityStatus.INCONSISTENT:
             return f"pose {checked.status.value}"
         if checked.led is not None:
@@ -139,6 +154,12 @@ class Navigator:
         self._used_time_s, self._integrity = time_s, checked
         self._posed_time_s = time_s
         return "pose used"
+
+    def _attitude_known(self, leds: int, time_s: float, R_CD: Array, covariance: Array) -> AttitudePrior | None:
+        """The attitude that is believed, where the LEDs of one frame are too few to test one another without it."""
+        if leds >= self._settings.alone_leds or not self._followed(time_s):
+            return None
+        return AttitudePrior(R_CD=R_CD, information=np.linalg.inv(covariance[:3, :3]))
 
     def _use_few(self, seen: LedObservation) -> str:
         """LEDs too few for a pose correct a belief that follows the drogue, and begin none."""
@@ -181,6 +202,7 @@ class Navigator:
                 sigma_lateral_m=sigma_lateral_m,
             )
         )
+        exposure_s, heading_rad, sigma_rad = self._heading_now()
         return NavSolution(
             time_stamp_s=self._time_s,
             valid=valid,
@@ -191,13 +213,24 @@ class Navigator:
             R_BD=state.R_BD,
             covariance=state.covariance if valid else np.full((9, 9), np.nan),
             command=command,
-            window=self._finder.window(self._time_s),
+            window=None if np.isfinite(exposure_s) else self._finder.window(self._time_s),
             frame_time_stamp_s=self._used_time_s,
             candidates_px=self._candidates_px,
             led_pixels_px=self._led_pixels_px,
             contact_usable=contact_usable,
             phase_reason=self._guidance.phase_reason,
+            exposure_s=exposure_s,
+            heading_rad=heading_rad,
+            heading_sigma_rad=sigma_rad,
         )
+
+    def _heading_now(self) -> tuple[float, float, float]:
+        """Exposure to ask for, heading and its sigma; the LEDs' frames are not given away while the probe goes in."""
+        if self._heading is None or self._heading.solution is None:
+            return float("nan"), float("nan"), float("nan")
+        free = self._guidance.phase is not Phase.CONTACT
+        exposure_s = self._heading.ask(self._time_s) if free else float("nan")
+        return exposure_s, self._heading.solution.heading_rad, self._heading.sigma_rad
 
 
 def _check_ring(ring: LedRing) -> None:

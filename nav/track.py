@@ -40,7 +40,8 @@ from dockair.errors import DockairError
 from dockair.messages import Window
 from dockair.nav.identify.perspective import SLOTS
 from dockair.nav.identify.ring import Identification, IdentificationStatus
-from dockair.rotations import Array, exp
+from dockair.nav.track_kernels import predicted, process_noise, turned
+from dockair.rotations import Array
 
 if TYPE_CHECKING:
     from filterpy.kalman import KalmanFilter
@@ -50,7 +51,6 @@ _AXES = 4  # u, v, r, phi: their rates follow in the same order
 _PLACES, _RATES = np.arange(_AXES), np.arange(_AXES, 2 * _AXES)
 _CENTRE = np.array([0, 1, _AXES, _AXES + 1])
 _COMPLEX = np.array([1.0, 1.0j])
-_NEAREST_M = 0.1  # depth of a ring that a turn has brought to the lens
 _HALF_PLACE = np.pi / SLOTS  # a roll off by more is another numbering
 
 
@@ -209,19 +209,24 @@ class RingTracker:
         """
         if self._kalman is None or not self.tracking:
             return None
-        s, x, P = self._settings, self._kalman.x[:, 0], self._kalman.P
+        s, camera = self._settings, self._camera
         dt = self._dt if interval_s is None else interval_s
-        predicted = x[_PLACES] + dt * x[_RATES]
-        variance = P[_PLACES, _PLACES] + 2.0 * dt * P[_PLACES, _RATES] + dt**2 * P[_RATES, _RATES]
-        sigma = np.sqrt(variance + np.diag(self._process_noise(dt))[_PLACES])
-        centre = predicted[_U] if turn_C is None else self._turned(predicted, turn_C)[:2]
-        radius = predicted[_R] + s.window_sigmas * sigma[_R]
-        half = radius * (1.0 + s.window_margin_radii) + s.window_margin_px + s.window_sigmas * sigma[_U]
-        half = half * s.growth_per_miss**self._misses
-        sensor = np.array([self._camera.width_px, self._camera.height_px])
-        u, v = np.maximum(np.floor(centre - half), 0).astype(int).tolist()
-        u_stop, v_stop = np.minimum(np.ceil(centre + half) + 1, sensor).astype(int).tolist()
-        window = Window(v, v_stop, u, u_stop)
+        places, sigma = predicted(
+            np.ascontiguousarray(self._kalman.x[:, 0]), self._kalman.P, dt, self._process_noise(dt)
+        )
+        u, v, r, _ = places.tolist()
+        if turn_C is not None:
+            u, v, _, _ = self._turned(places, turn_C)
+        sigma_u, sigma_v, sigma_r, _ = sigma.tolist()
+        radius = (r + s.window_sigmas * sigma_r) * (1.0 + s.window_margin_radii) + s.window_margin_px
+        growth = s.growth_per_miss**self._misses
+        half_u, half_v = growth * (radius + s.window_sigmas * sigma_u), growth * (radius + s.window_sigmas * sigma_v)
+        window = Window(
+            max(math.floor(v - half_v), 0),
+            min(math.ceil(v + half_v) + 1, camera.height_px),
+            max(math.floor(u - half_u), 0),
+            min(math.ceil(u + half_u) + 1, camera.width_px),
+        )
         rows, columns = window.shape
         return window if rows > 0 and columns > 0 and window != self._camera.full_window else None
 
@@ -233,25 +238,19 @@ class RingTracker:
 
     def _turned(self, state: Array, turn_C: Array) -> tuple[float, float, float, float]:
         """u, v, r of a ring at rest when the camera has turned, and by what its roll has changed."""
-        f, (cu, cv) = self._camera.focal_length_px, self._camera.principal_point_px
-        u, v, r = float(state[0]), float(state[1]), max(float(state[_R]), 1.0)
-        a, b, ahead_m = (cu - u) / f, (cv - v) / f, f * self._ring_radius_m / r
-        p_C = np.array([ahead_m, a * ahead_m, b * ahead_m]) + self._lever_C
-        x, y, z = (p_C @ exp(turn_C) - self._lever_C).tolist()  # p <- exp(-turn) p about the end of the lever
-        nearer = ahead_m / max(x, _NEAREST_M)
-        roll = -float(turn_C[0] + 0.5 * (a * turn_C[1] + b * turn_C[2]))  # curl of the image's flow
-        return u + f * (a - y / ahead_m * nearer), v + f * (b - z / ahead_m * nearer), r * nearer, roll
+        camera = self._camera
+        return turned(
+            np.ascontiguousarray(state), np.ascontiguousarray(turn_C, dtype=float), camera.focal_length_px,
+            camera.principal_point_px, self._ring_radius_m, self._lever_C,
+        )  # fmt: skip
 
     def _process_noise(self, dt: float) -> Array:
         """(8, 8) Q, Eq. (1)."""
         assert self._kalman is not None
-        s, r = self._settings, max(float(self._kalman.x[_R, 0]), 1.0)
-        a2 = np.array([*3 * ((s.acceleration_radii_s2 * r) ** 2,), s.roll_acceleration_rad_s2**2])
-        q = s.process_variance * np.array([1.0, 1.0, 1.0, r**-2.0])
-        Q = np.zeros((2 * _AXES, 2 * _AXES))
-        Q[_PLACES, _PLACES], Q[_RATES, _RATES] = q + 0.25 * dt**4 * a2, q + dt**2 * a2
-        Q[_PLACES, _RATES] = Q[_RATES, _PLACES] = 0.5 * dt**3 * a2
-        return Q
+        s = self._settings
+        return process_noise(
+            float(self._kalman.x[_R, 0]), dt, s.process_variance, s.acceleration_radii_s2, s.roll_acceleration_rad_s2
+        )
 
     def _measurement_noise(self, radius_px: float) -> Array:
         variance = self._settings.measurement_variance

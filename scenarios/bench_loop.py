@@ -3,6 +3,9 @@
 Each line is a process of its own that flies a whole flight; its first second, in which kernels are loaded or compiled,
 is not counted. `x_real_time` is simulated over wall time. `x_of_own_time` is simulated over the processor's time of the
 flight or of the camera's process, whichever is longer: what it could be at most with nothing else on the machine.
+`load` is the mean number of processes that wanted a core in the minute before the end, this one's among them. Where it
+is above the number of cores, wall time says how busy the machine was; the processor's time is longer then, too, because
+caches and cores are shared.
 
     two at once over one = sum of the two speeds / speed of one alone, no flight with a second process
 
@@ -12,8 +15,8 @@ never tests: they belong to the machine that printed them.
 """
 
 import json
+import multiprocessing
 import os
-import resource
 import subprocess
 import sys
 import tempfile
@@ -65,7 +68,7 @@ def bench_loop() -> dict[str, Any]:
 
 
 def fly_timed(what: str, seconds: float = 1e9) -> dict[str, float]:
-    """Fly a case in this process and say how long it took.
+    """Fly a case in this process and say how long it took, by the clock and by the processor's time.
 
     Args:
         what: of `CASES`.
@@ -83,12 +86,9 @@ def fly_timed(what: str, seconds: float = 1e9) -> dict[str, float]:
             figures = _timed(flight, folder, seconds)
         finally:
             flight.close()
-    children = resource.getrusage(resource.RUSAGE_CHILDREN)
-    beside = children.ru_utime + children.ru_stime if overlap else 0.0
-    own_time = figures["simulated_s"] / max(figures["flight_process_s"], beside)
-    return (
-        {"x_real_time": figures.pop("x_real_time"), "x_of_own_time": own_time} | figures | {"camera_process_s": beside}
-    )
+    own_time = figures["simulated_s"] / max(figures["flight_process_s"], figures["camera_process_s"])
+    load = os.getloadavg()[0]
+    return {"x_real_time": figures.pop("x_real_time"), "x_of_own_time": own_time} | figures | {"load": load}
 
 
 def environment_speeds() -> dict[str, float]:
@@ -144,7 +144,8 @@ def _timed(flight: "Flight", folder: Path | None, seconds: float) -> dict[str, f
     with Recorder(flight, folder, "none" if folder is None else "window") as recorder:
         while flight.truth.time_s < _WARM_UP_S:
             recorder.append(flight.step())
-        wall_s, own_s, begun_s = time.perf_counter(), time.process_time(), flight.truth.time_s
+        wall_s, own_s, beside_s = time.perf_counter(), time.process_time(), _children_s()
+        begun_s = flight.truth.time_s
         outcome = None
         while outcome is None and flight.truth.time_s < begun_s + seconds:
             tick = flight.step()
@@ -152,14 +153,26 @@ def _timed(flight: "Flight", folder: Path | None, seconds: float) -> dict[str, f
             outcome, frames = tick.outcome, frames + (tick.frame is not None)
         simulated_s = flight.truth.time_s - begun_s
     # the recorder has written its last message by now
-    wall_s, own_s = time.perf_counter() - wall_s, time.process_time() - own_s
+    wall_s, own_s, beside_s = time.perf_counter() - wall_s, time.process_time() - own_s, _children_s() - beside_s
     return {
         "x_real_time": simulated_s / wall_s,
         "simulated_s": simulated_s,
         "wall_s": wall_s,
         "frames_per_s": frames / wall_s,
         "flight_process_s": own_s,
+        "camera_process_s": beside_s,
     }
+
+
+def _children_s() -> float:
+    """The processor's time of the processes beside this one [s]: that of the camera, or none."""
+    ticks = 0
+    for child in multiprocessing.active_children():
+        fields = (
+            Path(f"/proc/{child.pid}/stat").read_text(encoding="ascii", errors="replace").rpartition(")")[2].split()
+        )
+        ticks += int(fields[11]) + int(fields[12])  # user and system, after the name in brackets
+    return ticks / os.sysconf("SC_CLK_TCK")
 
 
 def _in_a_process(what: str) -> dict[str, float]:

@@ -88,7 +88,9 @@ class OverlappedExposures:
         self._process.start()
         theirs.close()
 
-    def begin(self, data: mujoco.MjData, time_s: float, number: int, window: Window | None) -> None:
+    def begin(
+        self, data: mujoco.MjData, time_s: float, number: int, window: Window | None, exposure_s: float = np.nan
+    ) -> None:
         """See `exposures.Exposures`."""
         if len(self._begun) == _SLOTS:
             self._collect()
@@ -97,7 +99,7 @@ class OverlappedExposures:
         jitter_s = self._camera.transfer_jitter_s()
         least_s = time_s + (self._camera.least_latency_s(window) + jitter_s)
         self._begun.append(_Begun(slot, time_s, jitter_s, least_s))
-        self._send((slot, time_s, number, window))
+        self._send((slot, time_s, number, window, exposure_s))
 
     def delivered(self, time_s: float) -> CameraFrame | None:
         """See `exposures.Exposures`."""
@@ -163,17 +165,19 @@ def _serve(camera: NearInfraredCamera, slots: list[_Slot], pipe: Connection, fli
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # a keyboard's interrupt goes to both; the flight says when to end
     with suppress(EOFError, OSError):
         while (order := pipe.recv()) is not None:
-            slot, time_s, number, window = order
+            slot, *asked = order
             try:
-                answer: Any = _exposed(camera, slots[slot], time_s, number, window)
+                answer: Any = _exposed(camera, slots[slot], *asked)
             except Exception as error:  # the flight's to handle, whatever it is
                 answer = _Failed(type(error), error.args, error.__dict__)
             pipe.send(answer)
 
 
-def _exposed(camera: NearInfraredCamera, slot: _Slot, time_s: float, number: int, window: Window | None) -> Any:
+def _exposed(
+    camera: NearInfraredCamera, slot: _Slot, time_s: float, number: int, window: Window | None, exposure_s: float
+) -> Any:
     """Make a frame; leave its pixels in the slot and return the rest, or None for a frame that dropped out."""
-    frame = camera.expose(slot.scene, time_s, number, window)
+    frame = camera.expose(slot.scene, time_s, number, window, exposure_s)
     if frame is None:
         return None
     slot.pixels[: frame.pixels.size] = frame.pixels.ravel()

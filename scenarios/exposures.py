@@ -11,6 +11,7 @@ from collections import deque
 from typing import Any, Protocol
 
 import mujoco
+import numpy as np
 
 from dockair.messages import CameraFrame, LedObservation, Window
 from dockair.scenarios.measured_leds import Senses
@@ -21,7 +22,9 @@ Frame = CameraFrame | LedObservation
 class Exposures(Protocol):
     """What a flight asks of it."""
 
-    def begin(self, data: mujoco.MjData, time_s: float, number: int, window: Window | None) -> None:
+    def begin(
+        self, data: mujoco.MjData, time_s: float, number: int, window: Window | None, exposure_s: float = np.nan
+    ) -> None:
         """Expose a frame of the world as it stands.
 
         Args:
@@ -29,6 +32,7 @@ class Exposures(Protocol):
             time_s: middle of the exposure.
             number: of the frame.
             window: what to read; None for the full frame.
+            exposure_s: how long; NaN: what the camera sets itself.
         """
         ...
 
@@ -52,9 +56,12 @@ class ExposuresInTurn:
         self._camera = camera
         self._in_transfer: deque[tuple[float, Frame]] = deque()
 
-    def begin(self, data: mujoco.MjData, time_s: float, number: int, window: Window | None) -> None:
+    def begin(
+        self, data: mujoco.MjData, time_s: float, number: int, window: Window | None, exposure_s: float = np.nan
+    ) -> None:
         """See `Exposures`."""
-        frame: Any = self._camera.expose(data, time_s, number, window)
+        asked = {"exposure_s": exposure_s} if np.isfinite(exposure_s) else {}
+        frame: Any = self._camera.expose(data, time_s, number, window, **asked)
         if frame is not None:
             self._in_transfer.append((time_s + self._camera.latency_s(frame), frame))
 

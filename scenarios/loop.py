@@ -57,7 +57,7 @@ class Flight:
         self._full_frames = full_frames
         self._periods = parts.periods
         self._command = self._next_command = ReceiverCommand()
-        self._window = parts.sheets.camera.full_window
+        self._window, self._exposure_s = parts.sheets.camera.full_window, float("nan")
         self._exposures: Exposures | None = None  # made at the first: whoever wants may change the camera until then
         if overlap and can_overlap(self.camera):
             self._exposures = OverlappedExposures(self.camera, self.world.model)
@@ -97,7 +97,7 @@ class Flight:
             announce_to(self.navigator, announcement)
         solution = self.navigator.step(tuple(imu), frame)  # type: ignore[arg-type]  # LEDs only where they are asked for
         self._next_command = solution.command
-        self._window = solution.window or self.sheets.camera.full_window
+        self._window, self._exposure_s = solution.window or self.sheets.camera.full_window, solution.exposure_s
         outcome = self.referee.judge(
             truth,
             solution.phase,
@@ -129,7 +129,7 @@ class Flight:
             assert self.camera is not None
             self._exposures = ExposuresInTurn(self.camera)
         window = None if self._full_frames else self._window
-        self._exposures.begin(self.world.data, time_s, self._frame_number, window)
+        self._exposures.begin(self.world.data, time_s, self._frame_number, window, self._exposure_s)
         self._frame_number += 1
 
 

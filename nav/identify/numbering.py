@@ -7,7 +7,7 @@ from dockair.calibration import Camera
 from dockair.nav.identify.chance import densities_px2
 from dockair.nav.identify.code import Code, displaced_leds, possible_slots
 from dockair.nav.identify.ellipse import MIN_POINTS, Ellipse, fit_ellipse, places_on_circle
-from dockair.nav.identify.perspective import SLOTS, RingFit
+from dockair.nav.identify.perspective import SLOTS, RingFit, distorted
 from dockair.nav.identify.prior import RingPrior, ring_from_leds
 from dockair.nav.identify.result import Identification, IdentificationStatus
 from dockair.rotations import Array
@@ -63,10 +63,10 @@ def numbered(
         status=IdentificationStatus.FOUND if certain else IdentificationStatus.AMBIGUOUS,
         members=index[members[order]],
         led_numbers=numbers[order] if certain else np.full(len(numbers), -1),
-        centre_px=_distorted(fit.centre_px[None], camera)[0],
+        centre_px=distorted(fit.centre_px[None], camera)[0],
         radius_px=fit.radius_px,
         roll_rad=roll if certain else np.nan,
-        led_pixels_px=_distorted(fit.image_px(angle), camera) if certain else np.full((SLOTS, 2), np.nan),
+        led_pixels_px=distorted(fit.image_px(angle), camera) if certain else np.full((SLOTS, 2), np.nan),
         ellipse=ellipse,
         rms_px=fit.rms_px,
         absolute=absolute and certain,
@@ -95,11 +95,3 @@ def _ellipse_agrees(points: Array, slots: NDArray[np.int64], ellipse: Ellipse | 
         return False
     places = places_on_circle(ellipse.to_circle(points), SLOTS).slot
     return bool(((places - slots) % SLOTS == (places[0] - slots[0]) % SLOTS).all())
-
-
-def _distorted(pixels: Array, camera: Camera) -> Array:
-    """Pixels of the camera at those of the same camera without distortion."""
-    if camera.distortion is None:
-        return pixels
-    ab = (pixels - np.array(camera.principal_point_px)) / camera.focal_length_px
-    return camera.pixels_from_points(np.column_stack([np.ones(len(ab)), -ab]))

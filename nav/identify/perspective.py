@@ -19,10 +19,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from dockair.calibration import Camera
 from dockair.nav.identify.ring_pose import SLOTS, facing, fit_members
 from dockair.rotations import Array
 
-__all__ = ["SLOTS", "RingFit", "fit_ring"]
+__all__ = ["SLOTS", "RingFit", "distorted", "fit_ring", "undistorted"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -91,3 +92,19 @@ def fit_ring(
         principal_point_px=principal_point_px,
         rms_px=math.sqrt(squares / freedom) * focal_length_px if freedom > 0 else 0.0,
     )
+
+
+def undistorted(pixels: Array, camera: Camera) -> Array:
+    """Pixels of the same camera without distortion."""
+    if camera.distortion is None:
+        return pixels
+    rays = camera.rays_from_pixels(pixels)
+    return np.asarray(-camera.focal_length_px * rays[:, 1:] / rays[:, :1] + np.array(camera.principal_point_px))
+
+
+def distorted(pixels: Array, camera: Camera) -> Array:
+    """Pixels of the camera at those of the same camera without distortion."""
+    if camera.distortion is None:
+        return pixels
+    ab = (pixels - np.array(camera.principal_point_px)) / camera.focal_length_px
+    return camera.pixels_from_points(np.column_stack([np.ones(len(ab)), -ab]))

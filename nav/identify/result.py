@@ -30,7 +30,7 @@ class Identification:
     radius_px: float  #: the radius a frontal ring would have at the centre's depth
     roll_rad: float  #: of LED 0 in the image; NaN when AMBIGUOUS
     led_pixels_px: Array  #: (8, 2) where each numbered LED is or, hidden, should be
-    ellipse: Ellipse | None
+    ellipse: Ellipse | None  #: through the LEDs; None where a prediction named them, and without a ring
     rms_px: float  #: of the fit's residuals
     absolute: bool = False  #: whether numbers are the sheet's (by prior or code), not only up to the ring's symmetry
 

@@ -3,6 +3,7 @@
     candidates ► prior gate ► triples (three-point circles | Hough peaks) ► octagon look-up ► exact fit ► decision
                                                                                    ellipse ► numbering ◄ roll
 
+Where each LED is expected, and what is seen leaves no doubt, `followed` names them at a tenth of the cost. Otherwise
 `hypotheses` proposes rings and fits them, `chance` says how likely each is an accident and how many impostors it may
 hold, `brightness` how much less likely if its blobs are about equally bright; both must be less than the settings
 allow. Two rings that both pass and are not the same are `AMBIGUOUS`, so is
@@ -20,6 +21,8 @@ circle, else the brightest, else the uppermost), all their triples, beyond `few_
 only, and `max_fits` exact fits; twice that when a prediction fails and the ring is looked for as without.
 """
 
+from typing import TypeGuard
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -27,6 +30,7 @@ from dockair.calibration import Camera, LedRing
 from dockair.errors import DockairError
 from dockair.nav.identify.brightness import brightness_model
 from dockair.nav.identify.code import code_of
+from dockair.nav.identify.followed import followed_ring
 from dockair.nav.identify.hypotheses import (
     METHODS,
     MIN_LEDS,
@@ -37,7 +41,7 @@ from dockair.nav.identify.hypotheses import (
     without_impostors,
 )
 from dockair.nav.identify.numbering import numbered, roll_of
-from dockair.nav.identify.perspective import SLOTS, RingFit
+from dockair.nav.identify.perspective import SLOTS, RingFit, undistorted
 from dockair.nav.identify.prior import ANYWHERE_PX, RingPrior, make_prior
 from dockair.nav.identify.result import Identification, IdentificationStatus, nothing
 from dockair.rotations import Array
@@ -84,6 +88,15 @@ def identify(
     settings = settings or IdentifySettings()
     camera, ring = camera or Camera(), ring or LedRing()
     points, flux = _checked(centroids_px, brightness, method, ring)
+    sigma_px, code = settings.sigma_px if sigma_px is None else sigma_px, code_of(ring, settings.code)
+    nowhere_else = expected_centre_px is None and expected_radius_px is None and not code.says_something
+    if nowhere_else and expected_sigma_px is not None and _is_prediction(expected_led_px):
+        known_flux = None if brightness is None else flux
+        followed = followed_ring(
+            points, known_flux, expected_led_px, expected_sigma_px, expected_roll_rad, camera, sigma_px, settings
+        )
+        if followed is not None:
+            return followed
     prior = make_prior(
         settings.radius_range_px, settings.centre_tolerance_radii, settings.radius_tolerance,
         expected_centre_px, expected_radius_px, expected_roll_rad, expected_led_px, expected_sigma_px, ring.angles_rad,
@@ -91,10 +104,9 @@ def identify(
     index = _candidates(points, prior, flux, settings.max_candidates)
     if len(index) < MIN_LEDS:
         return nothing(IdentificationStatus.NOT_FOUND)
-    code = code_of(ring, settings.code)
     spread = 0.0 if code.log_brightness is None else float(code.log_brightness.std())
     candidates = Candidates(
-        points=_undistorted(points[index], camera), sigma_px=settings.sigma_px if sigma_px is None else sigma_px,
+        points=undistorted(points[index], camera), sigma_px=sigma_px,
         brightness=None if brightness is None else brightness_model(flux[index], settings.brightness, spread),
     )  # fmt: skip
     status, fit = _found(candidates, method, prior, camera, settings)
@@ -119,6 +131,11 @@ def _checked(centroids_px: Array, brightness: Array | None, method: str, ring: L
     return points, flux
 
 
+def _is_prediction(led_px: Array | None) -> TypeGuard[Array]:
+    """Whether it says where every LED is."""
+    return led_px is not None and np.shape(led_px) == (SLOTS, 2) and bool(np.isfinite(led_px).all())
+
+
 def _found(
     candidates: Candidates, method: str, prior: RingPrior, camera: Camera, settings: IdentifySettings
 ) -> tuple[IdentificationStatus, RingFit | None]:
@@ -138,14 +155,6 @@ def _found(
         fits = ring_fits(candidates, method, prior, camera, settings, limit)
         status, fit = _decide(fits, prior, limit, settings)
     return status, fit
-
-
-def _undistorted(points: Array, camera: Camera) -> Array:
-    """Pixels of the same camera without distortion."""
-    if camera.distortion is None:
-        return points
-    rays = camera.rays_from_pixels(points)
-    return -camera.focal_length_px * rays[:, 1:] / rays[:, :1] + np.array(camera.principal_point_px)
 
 
 def _candidates(points: Array, prior: RingPrior, flux: Array, most: int) -> NDArray[np.int64]:

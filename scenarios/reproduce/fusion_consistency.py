@@ -60,6 +60,8 @@ def cases() -> list[Case]:
         case("swings 1.3 times as fast", replace(plain, swing_frequency_factor=1.3), exact),
         case("gusts on the drogue doubled", replace(plain, drive_factor=2.0), exact),
         case("drogue turns twice as much", replace(plain, turning_factor=2.0), exact),
+        case("attitude of rest 2 degrees off, as built", replace(built, rest_pitch_rad=np.deg2rad(2.0)), belief),
+        case("LEDs' places considered, not estimated, as built", built, replace(belief, led_place_share=0.0)),
         case("gusts on the receiver tripled", replace(plain, gust_m_s2=0.9), exact),
     ]
 

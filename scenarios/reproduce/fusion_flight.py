@@ -5,10 +5,11 @@ In axes N that do not turn, with the receiver's place r (of the accelerometers),
     r'' = k_p (s - s_wanted) + k_d (s' - s_wanted') + gust,   gust' = -gust/T + noise               (1)
     n'' = -W^2 n - 2 z W n' + noise,   s'' = n'' - r''                                              (2)
     theta'' = -W_a^2 theta - 2 z_a W_a theta' + stir,   stir' = -stir/T_a + noise,   w_B = theta'   (3)
+    u' = -u/T_u - noise,   R_ND = exp(-u) R_rest                                                    (4)
 
 The receiver closes from `first_m` to `last_m` between tip and ring and steers on the truth: what is asked of the filter
-does not depend on what it says. The drogue's attitude is a random walk. Hardware is nominal (gyro and accelerometers
-with the sheet's noise and a bias) or drawn as it was built (`sim.as_built`, `sim.imu`).
+does not depend on what it says. The drogue turns about an attitude of rest that walks a little. Hardware is nominal
+(gyro and accelerometers with the sheet's noise and a bias) or drawn as it was built (`sim.as_built`, `sim.imu`).
 
 Not modelled: whatever the camera does to a spot but Gaussian noise; the world has all of that.
 """
@@ -58,6 +59,7 @@ class Approach:
     swing_frequency_factor: float = 1.0  # truth over belief
     drive_factor: float = 1.0
     turning_factor: float = 1.0  # of the drogue's attitude
+    rest_pitch_rad: float = 0.0  # of its attitude of rest, beyond what is drawn
     as_built: tuple[str, ...] = ()  #: which of camera axes, camera place, lens, ring, imu are as built
     imu: str = NOTHING_OFF  #: or a sheet's name, whose every error is drawn
 
@@ -140,7 +142,7 @@ def fly(approach: Approach, seed: int) -> Flown:
 
 
 class _Motion:
-    """Eqs (1) to (3), a tick at a time."""
+    """Eqs (1) to (4), a tick at a time."""
 
     def __init__(self, approach: Approach, sheets: NavigationSheets, rng: np.random.Generator) -> None:
         self._approach, self._rng, self._dt = approach, rng, 1.0 / approach.imu_rate_hz
@@ -155,7 +157,10 @@ class _Motion:
         self._tip = mounting.p_BP - mounting.p_BI
         self._s = start.p_PD_B + self._tip + start.sigma_p_m * rng.standard_normal(3)
         self._v = self._m + belief.start_velocity_sigma_m_s * rng.standard_normal(3)
-        self._R_ND = exp(start.sigma_R_rad * rng.standard_normal(3)) @ start.R_BD
+        rest = np.minimum(belief.rest_sigma_rad, start.sigma_R_rad) * rng.standard_normal(3)
+        self._R_rest = exp(rest + [0.0, approach.rest_pitch_rad, 0.0]) @ start.R_BD
+        self._turning = belief.attitude_density * approach.turning_factor
+        self._u = self._turning * np.sqrt(0.5 * belief.attitude_time_s) * rng.standard_normal(3)
         self._R_NB, self._time_s = np.eye(3), 0.0
         self._gust = approach.gust_m_s2 * rng.standard_normal(3)
         self._theta = approach.attitude_rad * rng.standard_normal(3)
@@ -171,7 +176,7 @@ class _Motion:
         self._stir = self._stir * np.exp(-dt / a.stir_time_s) + stir * np.sqrt(dt) / a.stir_time_s * draw(3)
         alpha = self._stir - omega**2 * self._theta - 2.0 * a.attitude_damping * omega * self._w
         f_B = self._R_NB.T @ (own - self._c)
-        row = (self._R_NB, self._R_ND, self._s, self._v, self._w, alpha, f_B)
+        row = (self._R_NB, exp(-self._u) @ self._R_rest, self._s, self._v, self._w, alpha, f_B)
         kick, more = draw((2, 3)) * self._drive
         kick_s, kick_v = dt**1.5 * (kick / 2.0 + more / np.sqrt(12.0)), kick * np.sqrt(dt)
         swing = -self._stiffness * self._n - self._friction * self._m
@@ -188,8 +193,8 @@ class _Motion:
         w_next = self._w + alpha * dt
         self._R_NB = self._R_NB @ exp(0.5 * (self._w + w_next) * dt)
         self._theta, self._w = self._theta + self._w * dt, w_next
-        turning = a.belief.attitude_density * a.turning_factor
-        self._R_ND = exp(turning * np.sqrt(dt) * draw(3)) @ self._R_ND
+        self._u = self._u * np.exp(-dt / a.belief.attitude_time_s) + self._turning * np.sqrt(dt) * draw(3)
+        self._R_rest = exp(a.belief.rest_walk_rad_rts * np.sqrt(dt) * draw(3)) @ self._R_rest
         if a.imu == NOTHING_OFF:
             self._c = self._c + a.belief.formation_walk_m_s2_rts * np.sqrt(dt) * draw(3)
         self._time_s += dt

@@ -114,5 +114,10 @@ def true_error(flown: Flown, tick: int, state: FilterState) -> Array:
 def calibrated(settings: FusionSettings) -> FusionSettings:
     """Return settings for hardware that is as its sheets say."""
     return replace(
-        settings, camera_axes_sigma_rad=0.0, camera_place_sigma_m=0.0, camera_scale_sigma=0.0, led_place_sigma_m=0.0
+        settings,
+        camera_axes_sigma_rad=0.0,
+        camera_place_sigma_m=0.0,
+        camera_scale_sigma=0.0,
+        led_place_sigma_m=0.0,
+        led_place_walk_m_rts=0.0,
     )

@@ -101,6 +101,9 @@ class NavSolution:
     led_pixels_px: Array  #: (8, 2) where each LED was seen; NaN where it was not
     contact_usable: bool = True  #: whether contact may be flown on it, as far as the navigation's integrity can tell
     phase_reason: str = ""  #: why the present phase was entered
+    exposure_s: float = float("nan")  #: asked of the camera for its next frame; NaN: what it sets itself
+    heading_rad: float = float("nan")  #: of the receiver since the start, to the left, not wrapped; NaN if not kept
+    heading_sigma_rad: float = float("nan")  #: its standard deviation
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

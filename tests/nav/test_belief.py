@@ -8,7 +8,7 @@ from scipy.stats import chi2 as chi2_law
 
 from dockair.calibration import Camera, LedRing, Mounting
 from dockair.nav.belief import Taking, corrected, felt_first, mixture, rolled, widened
-from dockair.nav.belief_motion import CALIBRATION, ERRORS, HARDWARE, RING
+from dockair.nav.belief_motion import CALIBRATION, ERRORS, HARDWARE, REST, RING
 from dockair.nav.belief_sight import Belief, Sight, ring_sensitivity
 from dockair.nav.pose.difference import pose_difference
 from dockair.nav.pose.estimate import solve_pose
@@ -41,7 +41,7 @@ def covariance(blocks: dict[int, float]) -> Array:
 
 
 def belief(P: Array, R: Array | None = None, log_weight: float = 0.0) -> Belief:
-    x = np.zeros((6, 3))
+    x = np.zeros((7, 3))
     x[0], x[1] = [12.0, -0.5, 0.8], [0.4, -0.3, 0.2]
     return Belief(exp(np.array([0.1, -0.2, 0.3])) if R is None else R, x, P, log_weight)
 
@@ -94,7 +94,7 @@ def start(sigma_tilt_rad: float, tilt_deg: float, range_m: float) -> tuple[Belie
     R_CD, p_CD = matrix_from_yaw_pitch_roll(0.0, np.deg2rad(tilt_deg), 0.0), np.array([range_m, 0.0, 0.0])
     P = covariance({0: sigma_tilt_rad**2, 3: 0.04, 6: 0.1, 15: 1e-5})
     P[3:6, 6:9] = P[6:9, 3:6] = 0.03 * np.eye(3)
-    x = np.zeros((6, 3))
+    x = np.zeros((7, 3))
     x[0] = MOUNTING.p_BC - MOUNTING.p_BI + MOUNTING.R_BC @ p_CD
     return Belief(MOUNTING.R_BC, x, P), R_CD
 
@@ -234,6 +234,46 @@ def test_leds_out_of_place_are_no_news_the_second_time():
     assert low < later.sum() < high
 
 
+def test_places_of_the_leds_are_told_from_tilt_once_the_ring_turns():
+    """Tilts of 3 to 12 degrees known to 0.1 degrees show which LEDs are off; what is learnt is true, and its sigma."""
+    rng, off, says = np.random.default_rng(10), [], []
+    for _ in range(10):
+        d = 3e-4 * rng.normal(size=(8, 2))
+        P = covariance({0: np.deg2rad(0.1) ** 2, 3: 1e-4})
+        P[range(RING.start, RING.stop), range(RING.start, RING.stop)] = 9e-8
+        b = belief(P)
+        b.x[0] = MOUNTING.p_BC - MOUNTING.p_BI + MOUNTING.R_BC @ [4.0, 0.1, 0.1]
+        ring = LEDS.copy()
+        ring[:, 1:] += d
+        for tilt_deg in np.linspace(3.0, 12.0, 30):
+            fresh = b.P.copy()
+            fresh[:6], fresh[:, :6], fresh[:6, :6] = 0.0, 0.0, P[:6, :6]
+            R_CD = matrix_from_yaw_pitch_roll(0.0, np.deg2rad(tilt_deg), 0.0)
+            at = b.x.copy()
+            at[0] = MOUNTING.p_BC - MOUNTING.p_BI + MOUNTING.R_BC @ [4.0, 0.1, 0.1]
+            b = replace(b, R_BD=MOUNTING.R_BC @ exp(np.deg2rad(0.1) * rng.normal(size=3)) @ R_CD, x=at, P=fresh)
+            pixels = pixels_of(R_CD, np.array([4.0, 0.1, 0.1]), ring) + 0.05 * rng.normal(size=(8, 2))
+            pose = solve_pose(pixels, LEDS, CAMERA, sigma_px=0.05, initial=(R_CD, np.array([4.0, 0.1, 0.1])))
+            b = corrected([b], pose, SIGHT, OPEN, Taking(ring=0.3)).beliefs[0]
+        error = b.ring - d.ravel()
+        off.append(error)
+        says.append(error @ np.linalg.solve(b.P[RING, RING], error))
+    strain = np.column_stack([LEDS[:, 1], -LEDS[:, 2]]).ravel() / np.linalg.norm(LEDS[:, 1:])
+    assert np.std(np.array(off) @ strain) < 0.3 * 3e-4
+    low, high = chi2_band(16 * len(says), 1e-4)
+    assert 0.5 * low < np.sum(says) < high
+
+
+def test_leds_are_expected_where_they_are_believed_to_be_on_the_ring():
+    b = replace(belief(np.zeros((ERRORS, ERRORS)), MOUNTING.R_BC), ring=1e-3 * np.arange(16.0))
+    ring = LEDS.copy()
+    ring[:, 1:] += b.ring.reshape(-1, 2)
+    seen = SIGHT.apparent(b)
+    pixels, sigma_px = SIGHT.led_pixels(b, CAMERA)
+    np.testing.assert_allclose(pixels, pixels_of(seen.R_CD, seen.p_CD, ring), atol=1e-9)
+    np.testing.assert_allclose(sigma_px, 0.0, atol=1e-9)
+
+
 @pytest.mark.parametrize("count", [1, 2, 3])
 def test_a_few_leds_correct_what_they_see(count):
     """Their own places agree with the truth within 3 sigma of a pixel afterwards; chi2 has two degrees each."""
@@ -267,31 +307,40 @@ def test_mixture_has_the_mean_and_covariance_of_both():
     first = belief(0.01 * np.eye(ERRORS))
     x = first.x.copy()
     x[0, 1] += 2.0
-    both = mixture([first, Belief(first.R_BD, x, 0.04 * np.eye(ERRORS), log_weight=np.log(1.0 / 3.0))])
+    ring = np.full(16, 4e-4)
+    both = mixture([first, Belief(first.R_BD, x, 0.04 * np.eye(ERRORS), np.log(1.0 / 3.0), ring)])
     np.testing.assert_allclose(both.p_ID - first.p_ID, [0.0, 0.5, 0.0], atol=1e-12)
     expected = (0.75 * 0.01 + 0.25 * 0.04) * np.eye(ERRORS)
-    expected[4, 4] += 0.75 * 0.25 * 4.0
+    apart = np.zeros(ERRORS)
+    apart[4], apart[RING] = 2.0, ring
+    expected += 0.75 * 0.25 * np.outer(apart, apart)
+    np.testing.assert_allclose(both.ring, 1e-4)
     np.testing.assert_allclose(both.P, expected, atol=1e-12)
     assert both.log_weight == pytest.approx(np.log(4.0 / 3.0))
 
 
 def test_a_rolled_belief_forgets_how_its_attitude_and_its_leds_went_with_the_rest():
     root = np.random.default_rng(2).normal(size=(ERRORS, ERRORS))
-    before = belief(root @ root.T)
+    before = replace(belief(root @ root.T), ring=np.full(16, 1e-3))
     after = rolled(before, 0.5, 9e-8)
+    others = np.r_[3 : REST.start, CALIBRATION]
     np.testing.assert_allclose(before.R_BD.T @ after.R_BD, exp(np.array([0.5, 0.0, 0.0])), atol=1e-12)
-    np.testing.assert_array_equal(after.P[:3, 3:], 0.0)
-    np.testing.assert_array_equal(after.P[3 : RING.start, 3 : RING.start], before.P[3 : RING.start, 3 : RING.start])
+    np.testing.assert_array_equal(after.ring, 0.0)
+    np.testing.assert_array_equal(after.P[np.ix_(np.r_[:3, REST], others)], 0.0)
+    np.testing.assert_array_equal(after.P[np.ix_(others, others)], before.P[np.ix_(others, others)])
+    np.testing.assert_array_equal(after.P[:3, REST], before.P[:3, REST])
+    assert np.diag(after.P)[:3].min() >= np.diag(before.P)[:3].max()
     np.testing.assert_array_equal(after.P[RING, : RING.start], 0.0)
     np.testing.assert_array_equal(after.P[RING, RING], 9e-8 * np.eye(16))
     assert np.linalg.eigvalsh(after.P).min() > -1e-9
 
 
-def test_a_widened_belief_is_less_certain_of_nine_errors_alone():
+def test_a_widened_belief_is_less_certain_of_nine_errors_and_the_leds_alone():
     before = belief(np.eye(ERRORS))
-    added = widened(before, (0.1, 0.2, 0.3)).P - before.P
+    added = widened(before, (0.1, 0.2, 0.3), 0.4).P - before.P
     np.testing.assert_allclose(np.diag(added)[:9], np.repeat([0.01, 0.04, 0.09], 3))
-    assert np.count_nonzero(added) == 9
+    np.testing.assert_allclose(np.diag(added)[RING], 0.16)
+    assert np.count_nonzero(added) == 9 + 16
 
 
 def test_the_first_force_is_that_of_the_formation():

@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from dockair.nav.belief_motion import BIAS, CALIBRATION, ERRORS, Motion, propagated
+from dockair.nav.belief_motion import BIAS, CALIBRATION, ERRORS, REST, RING, Motion, propagated
 from dockair.rotations import Array, exp, log, skew
 
 OMEGA = 2.0 * np.pi * np.array([0.0, 0.33, 0.40])
@@ -13,6 +13,9 @@ SILENT = Motion(
     stiffness=OMEGA**2,
     friction=0.3 * OMEGA,
     attitude2=0.0,
+    return_1_s=0.7,
+    rest2=0.0,
+    ring2=0.0,
     drive2=0.0,
     receiver2=0.0,
     accelerometer2=0.0,
@@ -34,6 +37,7 @@ X0 = np.array(
         [0.0, -0.3, 0.25],
         [0.01, -0.02, 0.03],
         [0.3, -0.1, -9.7],
+        [0.02, -0.03, 0.01],
     ]
 )
 ZERO = np.zeros((ERRORS, ERRORS))
@@ -45,7 +49,7 @@ def samples(w: Array, f: Array, until_s: float, rate_hz: float = 250.0) -> tuple
 
 
 def off(x: Array, R: Array, e: Array) -> tuple[Array, Array]:
-    return exp(e[:3]) @ R, x + e[3 : CALIBRATION.start].reshape(6, 3)
+    return exp(e[:3]) @ R, x + e[3 : CALIBRATION.start].reshape(7, 3)
 
 
 def difference(a: tuple[Array, Array], b: tuple[Array, Array]) -> Array:
@@ -58,21 +62,22 @@ def test_state_follows_its_differential_equation(w):
     f = np.array([0.2, 0.4, 9.5])
 
     def rate(_: float, y: Array) -> Array:
-        s, v, n, m, b, c = y.reshape(6, 3)
+        s, v, n, m, b, c, u = y.reshape(7, 3)
         a, turn = -SILENT.stiffness * n - SILENT.friction * m, w - b
-        moved = np.array([v, a - f - c, m, a, np.zeros(3), np.zeros(3)])
-        moved[[0, 1, 2, 3, 5]] -= np.cross(turn, np.array([s, v, n, m, c]))
+        moved = np.array([v, a - f - c, m, a, np.zeros(3), np.zeros(3), -SILENT.return_1_s * u])
+        moved[[0, 1, 2, 3, 5, 6]] -= np.cross(turn, np.array([s, v, n, m, c, u]))
         return moved.ravel()
 
-    expected = solve_ivp(rate, (0.0, 0.8), X0.ravel(), rtol=1e-10, atol=1e-12).y[:, -1].reshape(6, 3)
+    expected = solve_ivp(rate, (0.0, 0.8), X0.ravel(), rtol=1e-10, atol=1e-12).y[:, -1].reshape(7, 3)
     R, x, _ = propagated(R0, X0, ZERO, 0.0, 0.8, *samples(w, f, 0.8), SILENT)
     np.testing.assert_allclose(x, expected, atol=2e-4)  # second order in 4 ms
-    np.testing.assert_allclose(R, expm(-skew(w - X0[4]) * 0.8) @ R0, atol=1e-12)
+    returned = exp(X0[6] * (1.0 - np.exp(-0.8 * SILENT.return_1_s)))  # towards the attitude of rest
+    np.testing.assert_allclose(R, expm(-skew(w - X0[4]) * 0.8) @ returned @ R0, atol=3e-5)
 
 
 def test_a_swing_without_damping_keeps_its_period():
     """After one period of 1/0.33 s it is where it was; side by side with a receiver that keeps its course."""
-    x = np.zeros((6, 3))
+    x = np.zeros((7, 3))
     x[0, 0], x[2, 1] = 10.0, 0.2
     calm = SILENT._replace(friction=np.zeros(3))
     period_s = 1.0 / 0.33
@@ -114,7 +119,7 @@ def test_noise_of_the_swing_is_that_of_the_lyapunov_equation():
     q2, other2, t = 0.05, 0.02, 1.0
     P = propagated(
         R0,
-        np.zeros((6, 3)),
+        np.zeros((7, 3)),
         ZERO,
         0.0,
         t,
@@ -135,12 +140,25 @@ def test_noise_of_the_swing_is_that_of_the_lyapunov_equation():
 
 def test_walks_grow_with_time():
     given = samples(np.zeros(3), np.zeros(3), 0.5)
-    moving = SILENT._replace(attitude2=1e-3, bias2=1e-8, formation2=0.04)
-    P = propagated(R0, np.zeros((6, 3)), ZERO, 0.0, 0.5, *given, moving)[2]
+    moving = SILENT._replace(attitude2=1e-3, return_1_s=0.0, bias2=1e-8, formation2=0.04, ring2=1e-8)
+    P = propagated(R0, np.zeros((7, 3)), ZERO, 0.0, 0.5, *given, moving)[2]
     np.testing.assert_allclose(np.diag(P)[:3], 0.5e-3 + 1e-8 * 0.5**3 / 3.0, rtol=1e-3)
     np.testing.assert_allclose(np.diag(P)[BIAS], 0.5e-8, rtol=1e-9)
     np.testing.assert_allclose(np.diag(P)[18:21], 0.02, rtol=1e-9)
+    np.testing.assert_allclose(np.diag(P)[RING], 0.5e-8, rtol=1e-9)
     np.testing.assert_allclose(np.diag(P)[6:9], 0.04 * 0.5**3 / 3.0, rtol=0.02)
+
+
+def test_a_drogue_that_turns_comes_back_to_an_attitude_of_rest_that_walks():
+    """The way to rest has an Ornstein-Uhlenbeck process's variance, the attitude of rest that of its walk alone."""
+    q2, walk2, k, t = 2e-4, 1e-5, SILENT.return_1_s, 2.0
+    turning = SILENT._replace(attitude2=q2, rest2=walk2)
+    P = propagated(R0, np.zeros((7, 3)), ZERO, 0.0, t, *samples(np.zeros(3), np.zeros(3), t), turning)[2]
+    decay = 1.0 - np.exp(-2.0 * k * t)
+    np.testing.assert_allclose(np.diag(P)[REST], (q2 + walk2) / (2.0 * k) * decay, rtol=0.01)
+    M = np.zeros((3, ERRORS))
+    M[:, :3] = M[:, REST] = np.eye(3)
+    np.testing.assert_allclose(M @ P @ M.T, walk2 * t * np.eye(3), atol=1e-3 * walk2)
 
 
 @pytest.mark.parametrize(("wait_s", "corner"), [(0.1, False), (1.0, True)])
@@ -149,7 +167,7 @@ def test_a_rate_that_is_held_is_as_uncertain_as_a_rate_that_is_missing(wait_s, c
     turn2, most2 = 0.04, 1.25e-3
     held = SILENT._replace(held_turn2=turn2, held_most2=most2)
     given = samples(np.zeros(3), np.full(3, np.nan), 0.1)
-    P = propagated(R0, np.zeros((6, 3)), ZERO, 0.1, 0.1 + wait_s, *given, held)[2]
+    P = propagated(R0, np.zeros((7, 3)), ZERO, 0.1, 0.1 + wait_s, *given, held)[2]
     knee = (most2 / turn2) ** (1.0 / 3.0)
     expected = turn2 * min(wait_s, knee) ** 4 / 4.0 + most2 * max(wait_s - knee, 0.0)
     assert (wait_s > knee) is corner
@@ -159,7 +177,7 @@ def test_a_rate_that_is_held_is_as_uncertain_as_a_rate_that_is_missing(wait_s, c
 def test_a_gap_between_samples_is_bridged_with_its_own_uncertainty():
     held = SILENT._replace(held_turn2=0.04, held_most2=1.25e-3)
     times = np.array([0.0, 0.2])
-    P = propagated(R0, np.zeros((6, 3)), ZERO, 0.0, 0.2, times, np.zeros((2, 3)), np.zeros((2, 3)), held)[2]
+    P = propagated(R0, np.zeros((7, 3)), ZERO, 0.0, 0.2, times, np.zeros((2, 3)), np.zeros((2, 3)), held)[2]
     np.testing.assert_allclose(np.diag(P)[:3], 0.04 * 0.2**4 / 64.0, rtol=1e-9)
 
 
@@ -167,7 +185,7 @@ def test_in_a_gap_the_receiver_s_acceleration_is_not_taken_for_known():
     """Samples 0.2 s apart with 5 m/s^2 between them: not used, and the velocity's variance is that of a guess."""
     times, forces = np.array([0.0, 0.2]), np.tile([5.0, 0.0, 0.0], (2, 1))
     guess = SILENT._replace(receiver2=0.2, accelerometer2=1e-6)
-    _, x, P = propagated(R0, np.zeros((6, 3)), ZERO, 0.0, 0.2, times, np.zeros((2, 3)), forces, guess)
+    _, x, P = propagated(R0, np.zeros((7, 3)), ZERO, 0.0, 0.2, times, np.zeros((2, 3)), forces, guess)
     np.testing.assert_array_equal(x[1], 0.0)
     np.testing.assert_allclose(np.diag(P)[6:9], 0.04, rtol=1e-9)
 

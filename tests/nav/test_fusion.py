@@ -32,7 +32,14 @@ GYRO = GyroSheet(
 TIP_FROM_IMU = MOUNTING.p_BP - MOUNTING.p_BI
 GRAVITY_N = np.array([0.0, 0.0, -9.80665])
 CALIBRATED = dict.fromkeys(
-    ("camera_axes_sigma_rad", "camera_place_sigma_m", "camera_scale_sigma", "led_place_sigma_m"), 0.0
+    (
+        "camera_axes_sigma_rad",
+        "camera_place_sigma_m",
+        "camera_scale_sigma",
+        "led_place_sigma_m",
+        "led_place_walk_m_rts",
+    ),
+    0.0,
 )
 SETTINGS = FusionSettings(start_velocity_sigma_m_s=0.3, **CALIBRATED)
 
@@ -68,7 +75,9 @@ class World:
     def __post_init__(self) -> None:
         start, s, rng = self.sheets.start, self.settings, self.rng
         self.k, self.dt, self.R_NB = 0, 1.0 / GYRO.rate_hz, np.eye(3)
-        self.R_ND = exp(start.sigma_R_rad * rng.normal(size=3)) @ start.R_BD
+        self.R_rest = exp(np.minimum(s.rest_sigma_rad, start.sigma_R_rad) * rng.normal(size=3)) @ start.R_BD
+        self.u_N = s.attitude_density * np.sqrt(0.5 * s.attitude_time_s) * rng.normal(size=3)
+        self.R_ND = exp(-self.u_N) @ self.R_rest
         self.s_N = start.p_PD_B + MOUNTING.p_BP - MOUNTING.p_BI + start.sigma_p_m * rng.normal(size=3)
         omega = 2.0 * np.pi * np.array(s.swing_frequency_hz)
         self.stiffness, self.friction = np.append(0.0, omega**2), np.append(0.0, 2.0 * s.swing_damping * omega)
@@ -104,7 +113,11 @@ class World:
         self.n_N = self.n_N + self.m_N * dt + 0.5 * dt**2 * swing + kick_s * across
         self.m_N = self.m_N + swing * dt + kick_v * across
         self.c_N = self.c_N + s.formation_walk_m_s2_rts * np.sqrt(dt) * self.rng.normal(size=3)
-        self.R_ND = exp(s.attitude_density * np.sqrt(dt) * self.rng.normal(size=3)) @ self.R_ND
+        self.u_N = self.u_N * np.exp(-dt / s.attitude_time_s) - s.attitude_density * np.sqrt(dt) * self.rng.normal(
+            size=3
+        )
+        self.R_rest = exp(s.rest_walk_rad_rts * np.sqrt(dt) * self.rng.normal(size=3)) @ self.R_rest
+        self.R_ND = exp(-self.u_N) @ self.R_rest
         self.R_NB = self.R_NB @ exp(self.rate(self.time_s + 0.5 * dt) * dt)
         self.k += 1
         return self.gyro()

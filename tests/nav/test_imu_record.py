@@ -1,5 +1,7 @@
 """Which samples are believed, and the rate between them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -29,6 +31,21 @@ def test_a_sample_that_says_nothing_is_not_taken(time_s, rate):
     assert kept.take(sample(1.0))
     assert not kept.take(sample(time_s, rate))
     assert kept.times_s.tolist() == [1.0]
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_a_rate_at_the_limit_of_any_axis_is_not_taken(axis):
+    rate_I = np.where(np.arange(3) == axis, 4.0, 0.1)
+    assert not record().take(ImuSample(time_stamp_s=1.0, angular_rate_rad_s=rate_I))
+
+
+def test_rates_and_forces_are_turned_into_body_axes():
+    R_BI = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    kept = ImuRecord(replace(MOUNTING, R_BI=R_BI), GYRO, 0.999)
+    rate_I, force_I = np.array([0.1, 0.2, 0.3]), np.array([4.0, 5.0, 6.0])
+    assert kept.take(ImuSample(time_stamp_s=1.0, angular_rate_rad_s=rate_I, specific_force_m_s2=force_I))
+    np.testing.assert_allclose(kept.rates_B, [[-0.2, 0.1, 0.3]])
+    np.testing.assert_allclose(kept.forces_B, [[-5.0, 4.0, 6.0]])
 
 
 def test_a_rate_just_inside_the_range_is_taken():

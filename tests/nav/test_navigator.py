@@ -394,6 +394,31 @@ def test_single_leds_of_a_frame_get_their_names_from_the_belief(render):
     assert sky.run(0.1).status == "pose used"
 
 
+def with_four_leds(render, alone_leds):
+    sky = Sky(render, still)
+    sky.navigator = Navigator(sky.sheets, NavigatorSettings(alone_leds=alone_leds))
+    sky.run(0.4)
+    sky.hidden = {0, 1, 3, 6}
+    assert sky.run(0.5).status == "pose used"
+    return sky
+
+
+def test_four_leds_are_enough_for_contact_with_the_attitude_that_frames_before_showed(render):
+    """By themselves they promise no range within the limit of 0.15 m."""
+    alone, with_attitude = (with_four_leds(render, leds).navigator.contact_claim() for leds in (0, 6))
+    assert alone.doubts == (Doubt.RANGE,) and alone.levels.range_m > 0.15
+    assert with_attitude.usable and with_attitude.levels.range_m < 0.5 * alone.levels.range_m
+
+
+def test_with_the_attitude_one_of_four_leds_that_is_bent_away_is_seen(render):
+    """LED 4 is 4 px off: nothing is corrected by it."""
+    sky = with_four_leds(render, 6)
+    sky.bent_px[4] = 4.0, 0.0
+    solution = sky.run(0.1)
+    used = np.flatnonzero(np.isfinite(solution.led_pixels_px).all(axis=1)).tolist()
+    assert solution.status != "pose used" or 4 not in used
+
+
 def test_clutter_gets_an_led_s_name_no_oftener_than_is_said(render):
     """1 to 20 blobs about a ring of which no LED shines, 2000 frames: at most 5e-3; false alarm below 1e-4."""
     sky = Sky(render, still)

@@ -42,3 +42,26 @@ def test_speed_is_simulated_over_wall_time_without_the_first_second():
     assert figures["x_real_time"] == pytest.approx(figures["simulated_s"] / figures["wall_s"])
     assert figures["frames_per_s"] * figures["wall_s"] == pytest.approx(25.0)
     assert 0.0 < figures["flight_process_s"] and 0.0 < figures["camera_process_s"]
+    longer = max(figures["flight_process_s"], figures["camera_process_s"])
+    assert figures["x_of_own_time"] == pytest.approx(0.5 / longer)
+    assert figures["load"] > 0.0
+
+
+def test_the_time_of_processes_beside_is_that_of_their_work():
+    """A child that has worked for a quarter of a second by its own clock says so, to the system's hundredths."""
+    ours, theirs = loop.multiprocessing.get_context("fork").Pipe()
+    child = loop.multiprocessing.get_context("fork").Process(target=_work, args=(theirs, 0.25))
+    assert loop._children_s() == 0.0
+    child.start()
+    worked_s = ours.recv()
+    assert loop._children_s() == pytest.approx(worked_s, abs=0.05)
+    ours.send(None)
+    child.join()
+    assert loop._children_s() == 0.0
+
+
+def _work(pipe, seconds):
+    while loop.time.process_time() < seconds:
+        pass
+    pipe.send(loop.time.process_time())
+    pipe.recv()

@@ -96,6 +96,9 @@ def test_every_number_of_a_solution_reaches_its_row(hand_made):
         "led_pixels_px": np.full((8, 2), np.nan),
         "contact_usable": False,
         "phase_reason": "steady",
+        "exposure_s": 5e-4,
+        "heading_rad": 0.1,
+        "heading_sigma_rad": 0.2,
     }
     assert set(changes) == {f.name for f in fields(NavSolution)}
     before = estimate_row(solution)

@@ -1,0 +1,146 @@
+"""The receiver's heading as a navigator keeps it: when to ask for a frame, what of it counts, how sure the result is.
+
+    IMU ► own_attitude ► heading_reference ► heading
+    every `every_s` a full frame of a long exposure ─┘
+
+LEDs want 20 us, cloud deck and ground 500 us: a frame of its own is asked for, of which one camera period takes one.
+What is above the level holds tanker and sky, the probe moves with the camera, the drogue swings: all are masked.
+The variance of the heading grows by a walk, and until the gyro's bias is known by (bias sigma times the time)^2.
+
+Not modelled: what else of the receiver than its probe is in view; correlation with the errors of the drogue's place.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from dockair.calibration import NavigationSheets
+from dockair.errors import DockairError
+from dockair.messages import CameraFrame, ImuSample
+from dockair.nav.heading.heading_reference import HeadingReference, HeadingSettings, HeadingSolution, HeadingStatus
+from dockair.nav.heading.own_attitude import OwnAttitude
+from dockair.rotations import Array
+
+_GRID_PX = 8  # between the rays of the mask
+_PROBE_POINTS = 60  # along the probe; closer than its own radius in the picture
+_NEAREST_M = 0.3  # of the probe to the lens that is drawn
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OwnHeadingSettings:
+    """When frames are asked for, and what is known of the flight.
+
+    Raises:
+        DockairError: a number that is not positive.
+    """
+
+    airspeed_m_s: float  #: of the formation, as it was briefed
+    every_s: float = 2.0  #: in a bank of 25 degrees 3 degrees of turn: most of the view is shared
+    exposure_s: float = 500e-6  #: deck and ground are 10 to 50 of 255 grey levels bright then
+    attitude_s: float = 20.0  #: over which roll and pitch are averaged: gusts of some seconds count little
+    drogue_radius_m: float = 0.6  #: about the ring's centre: basket and swing
+    probe_radius_m: float = 0.15  #: about its axis
+    probe_length_m: float = 3.0  #: behind its tip
+    walk_rad_rts: float = 1.2e-3  #: 0.7 degrees in 100 s, half of them in a turn (docs/heading.md)
+    reference: HeadingSettings = field(default_factory=HeadingSettings)
+
+    def __post_init__(self) -> None:
+        for name in (f.name for f in fields(self) if f.name != "reference"):
+            if not getattr(self, name) > 0.0:
+                raise DockairError(f"heading.{name}", expected="a number above 0", got=getattr(self, name))
+
+
+class OwnHeading:
+    """Stepped at every control tick.
+
+    Args:
+        sheets: camera, mounting, gyro, rates.
+        settings: constants.
+    """
+
+    def __init__(self, sheets: NavigationSheets, settings: OwnHeadingSettings) -> None:
+        self._sheets, self._settings = sheets, settings
+        gap_s = settings.reference.longest_gap_s
+        self._attitude = OwnAttitude(sheets.mounting, settings.airspeed_m_s, settings.attitude_s, gap_s)
+        self._reference = HeadingReference(sheets.camera, sheets.mounting, sheets.gyro.rate_hz, settings.reference)
+        self._next_s, self._until_s = -np.inf, -np.inf  # when to ask next; until when what was asked stands
+        self._variance, self._stamp_s, self._begun_s = 0.0, float("nan"), float("nan")
+        self._rays_C = self._grid()
+        self.solution: HeadingSolution | None = None
+
+    def ask(self, time_s: float) -> float:
+        """Return the exposure to ask of the next frame [s], a full one; NaN for none. One frame takes it."""
+        if time_s >= self._next_s:
+            self._next_s = time_s + self._settings.every_s
+            self._until_s = time_s + 1.0 / self._sheets.camera_rate_hz
+        half_tick_s = 0.5 / self._sheets.control_rate_hz
+        return self._settings.exposure_s if time_s < self._until_s - half_tick_s else float("nan")
+
+    def was_asked(self, frame: CameraFrame) -> bool:
+        """Whether a frame is the one that was asked for: in the dark the camera may expose others as long."""
+        half_tick_s = 0.5 / self._sheets.control_rate_hz
+        begun_s = self._until_s - 1.0 / self._sheets.camera_rate_hz
+        in_time = begun_s - half_tick_s < frame.time_stamp_s < self._until_s + half_tick_s
+        full = frame.window == self._sheets.camera.full_window
+        return in_time and full and bool(np.isclose(frame.exposure_s, self._settings.exposure_s))
+
+    def step(self, imu: Sequence[ImuSample], frame: CameraFrame | None, p_CD: Array) -> HeadingSolution:
+        """Take what arrived since the last step.
+
+        Args:
+            imu: samples.
+            frame: that was asked for.
+            p_CD: (3,) the ring's centre there [m].
+        """
+        last = self.solution  # while it aligns, attitude and correction would lead each other astray
+        aligned = last is not None and last.status in (HeadingStatus.GYRO, HeadingStatus.VISION)
+        self._attitude.propagate(imu, last.correction_rad_s if last is not None and aligned else 0.0)
+        R_LB = self._attitude.R_LB
+        if frame is not None and self._attitude.is_known:
+            mask = self._mask(R_LB, p_CD)
+            self.solution = self._reference.step(imu, R_LB, frame, mask=mask)
+        else:
+            self.solution = self._reference.step(imu, R_LB)
+        self._grow(self.solution.time_stamp_s)
+        return self.solution
+
+    @property
+    def sigma_rad(self) -> float:
+        """Standard deviation of the heading; NaN when it is lost or has not begun."""
+        if self.solution is None or not np.isfinite(self.solution.heading_rad) or not np.isfinite(self._stamp_s):
+            return float("nan")
+        passed_s = self._stamp_s - self._begun_s
+        drift = self._sheets.gyro.bias_sigma_rad_s * passed_s if self.solution.status is HeadingStatus.ALIGNING else 0.0
+        return float(np.sqrt(self._variance + drift**2))
+
+    def _grow(self, stamp_s: float) -> None:
+        if np.isfinite(self._stamp_s):
+            self._variance += self._settings.walk_rad_rts**2 * (stamp_s - self._stamp_s)
+        else:
+            self._begun_s = stamp_s
+        self._stamp_s = stamp_s
+
+    def _grid(self) -> Array:
+        """(rows, columns, 3) rays of the mask's coarse pixels."""
+        camera = self._sheets.camera
+        u, v = np.meshgrid(*(np.arange(_GRID_PX // 2, n, _GRID_PX) for n in (camera.width_px, camera.height_px)))
+        return camera.rays_from_pixels(np.column_stack([u.ravel(), v.ravel()])).reshape(*u.shape, 3)
+
+    def _mask(self, R_LB: Array, p_CD: Array) -> NDArray[np.bool_]:
+        """(h, w) where features may lie: below the level, off the drogue and the probe."""
+        camera, mounting, s = self._sheets.camera, self._sheets.mounting, self._settings
+        below = (self._rays_C @ (R_LB @ mounting.R_BC)[2] < 0.0).astype(np.uint8)
+        size = camera.width_px, camera.height_px
+        mask = cv2.resize(below, size, interpolation=cv2.INTER_NEAREST)
+        tip_C = mounting.R_BC.T @ (mounting.p_BP - mounting.p_BC)
+        aft_C = -mounting.R_BC[0]  # the probe lies along the body's x axis
+        places = tip_C + np.linspace(-s.probe_radius_m, s.probe_length_m, _PROBE_POINTS)[:, None] * aft_C
+        discs = [(place, s.probe_radius_m) for place in places] + [(np.asarray(p_CD), s.drogue_radius_m)]
+        for place, radius_m in discs:
+            if place[0] > _NEAREST_M:
+                (u, v), radius = camera.pixels_from_points(place)[0], camera.focal_length_px * radius_m / place[0]
+                cv2.circle(mask, (round(u), round(v)), round(radius), 0, thickness=-1)
+        return np.asarray(mask > 0)

@@ -1,0 +1,45 @@
+"""The ring after a turn of the camera, against the pinhole and against rotations written out."""
+
+import numpy as np
+import pytest
+
+from dockair.calibration import Camera
+from dockair.nav.track_kernels import predicted, process_noise, turned
+from dockair.rotations import exp
+
+CAMERA, RADIUS_M = Camera(), 0.25
+
+
+@pytest.mark.parametrize("angle_rad", [0.0, 1e-9, 1e-3, 0.1])
+@pytest.mark.parametrize("lever_C", [np.zeros(3), np.array([3.0, -0.5, 0.8])])
+def test_a_ring_at_rest_is_seen_where_the_pinhole_puts_it_after_a_turn(angle_rad, lever_C):
+    rng, f = np.random.default_rng(0), CAMERA.focal_length_px
+    for _ in range(20):
+        axis = rng.standard_normal(3)
+        turn = angle_rad * axis / np.sqrt(axis @ axis)
+        p_C = np.array([rng.uniform(3.0, 20.0), *rng.uniform(-0.5, 0.5, 2)])
+        u, v = CAMERA.pixels_from_points(p_C)[0]
+        after_C = exp(turn).T @ (p_C + lever_C) - lever_C
+        state = np.array([u, v, f * RADIUS_M / p_C[0], 0.3, 0.0, 0.0, 0.0, 0.0])
+        ours = turned(state, turn, f, CAMERA.principal_point_px, RADIUS_M, lever_C)
+        np.testing.assert_allclose(ours[:2], CAMERA.pixels_from_points(after_C)[0], atol=1e-8)
+        assert ours[2] == pytest.approx(f * RADIUS_M / after_C[0], rel=1e-12)
+
+
+def test_roll_about_the_boresight_turns_the_image_the_other_way():
+    state = np.array([*CAMERA.principal_point_px, 100.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    turn = np.array([0.02, 0.0, 0.0])
+    u, v, r, roll = turned(state, turn, CAMERA.focal_length_px, CAMERA.principal_point_px, RADIUS_M, np.zeros(3))
+    assert (u, v, r, roll) == pytest.approx((*CAMERA.principal_point_px, 100.0, -0.02))
+
+
+def test_prediction_is_the_constant_velocity_model_written_out():
+    rng, dt = np.random.default_rng(1), 0.02
+    shape = rng.standard_normal((8, 8))
+    x, P, Q = rng.standard_normal(8), shape @ shape.T, process_noise(80.0, dt, 0.01, 8.0, 4.0)
+    F = np.eye(8) + dt * np.eye(8, k=4)
+    places, sigma = predicted(x, P, dt, Q)
+    np.testing.assert_allclose(places, (F @ x)[:4], rtol=1e-12)
+    np.testing.assert_allclose(sigma**2, np.diag(F @ P @ F.T + Q)[:4], rtol=1e-12)
+    np.testing.assert_allclose(Q[0, [0, 4]], [0.01 + 0.25 * dt**4 * 640.0**2, 0.5 * dt**3 * 640.0**2], rtol=1e-12)
+    np.testing.assert_allclose(Q[3, [3, 7]], [0.01 / 6400.0 + 4.0 * dt**4, 8.0 * dt**3], rtol=1e-12)
