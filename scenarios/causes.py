@@ -13,6 +13,7 @@ not flown. The largest share names the cause. Rules, the first that holds:
 | cause            | when                                                                                             |
 |------------------|--------------------------------------------------------------------------------------------------|
 | diverged         | the simulation broke down during the attempt                                                     |
+| departed         | the receiver departed from controlled flight before the attempt ended                            |
 | out_of_time      | the flight's time ran out during the attempt                                                     |
 | detection        | the solution was not valid for half of the last second                                           |
 | integrity        | it was valid, and marked as not to be flown into contact for half of the last second             |
@@ -30,7 +31,8 @@ not flown. The largest share names the cause. Rules, the first that holds:
 | fault            | instead of one of these, when a fault acted that can bring it about                              |
 
 A flight without any attempt has the cause detection if the solution was valid for less than half of its last half, else
-never_steady.
+never_steady. A flight in which an attempt failed or none began, and whose receiver departed at any time, has the cause
+departed.
 
 Not modelled: causes that act together; the one named is the largest, not the only one.
 """
@@ -45,6 +47,7 @@ from dockair.messages import NavSolution
 from dockair.parameters import load_parameters
 from dockair.rotations import Array
 from dockair.scenarios.attempts import Attempt, AttemptOutcome, RefereeLimits, is_good_contact
+from dockair.scenarios.departure import Departure
 from dockair.scenarios.schema import Scenario
 from dockair.sim.air.bow_wave import BowWaveParameters
 from dockair.sim.faults import DeadReel, Fault
@@ -55,8 +58,8 @@ _OF_SENSORS = ("detection", "integrity", "ambiguity", "navigation_error", "calle
 _OF_REEL = ("gust", "bow_wave", "control_limit", "outside_limits", "not_held", "never_steady")
 
 CAUSES = (
-    "diverged", "out_of_time", "detection", "integrity", "outside_limits", "not_held", "called_off", "ambiguity",
-    "navigation_error", "gust", "bow_wave", "control_limit", "fault", "never_steady",
+    "diverged", "departed", "out_of_time", "detection", "integrity", "outside_limits", "not_held", "called_off",
+    "ambiguity", "navigation_error", "gust", "bow_wave", "control_limit", "fault", "never_steady",
 )  # fmt: skip
 
 
@@ -88,6 +91,13 @@ class Flown:
     def step_s(self) -> float:
         """Of control."""
         return self.truths[1].time_s - self.truths[0].time_s if len(self.truths) > 1 else np.inf
+
+    def departed_s(self) -> float:
+        """When the receiver departed from controlled flight; infinite if it did not."""
+        departure = Departure()
+        for truth in self.truths:
+            departure.watch(truth)
+        return np.inf if departure.time_s is None else departure.time_s
 
     def tick_at(self, time_s: float) -> int:
         """Last control tick not after a time."""
@@ -131,10 +141,15 @@ def cause_of_flight(attempts: Sequence[Attempt], flown: Flown, rules: CauseRules
         flown: the flight.
         rules: their numbers.
     """
-    if attempts:
-        return next((attempt.cause for attempt in reversed(attempts) if attempt.cause), "")
+    last = next((attempt.cause for attempt in reversed(attempts) if attempt.cause), "")
+    if attempts and last in ("", "diverged"):
+        return last
     if not flown.truths:
         return "diverged"
+    if np.isfinite(flown.departed_s()):
+        return "departed"
+    if attempts:
+        return last
     half = flown.solutions[len(flown.solutions) // 2 :]
     seen = np.mean([solution.valid for solution in half]) >= (rules or CauseRules()).for_half
     return _or_fault("never_steady" if seen else "detection", 0.0, flown.truths[-1].time_s, flown)
@@ -151,6 +166,8 @@ def _or_fault(cause: str, since_s: float, until_s: float, flown: Flown) -> str:
 def _cause(attempt: Attempt, flown: Flown, rules: CauseRules) -> str:
     if attempt.outcome == AttemptOutcome.DIVERGED.value:
         return "diverged"
+    if flown.departed_s() <= attempt.ended_s:
+        return "departed"
     if attempt.outcome == AttemptOutcome.TIMEOUT.value:
         return "out_of_time"
     called_off = attempt.outcome in (AttemptOutcome.GIVEN_UP.value, AttemptOutcome.BREAKAWAY.value)

@@ -10,7 +10,8 @@ Radial offset and closure speed are taken where the tip crosses the ring's plane
 the coupling holds); the angle between probe and drogue axis when it holds.
 
 Unsafe is a touch at more than 2.6 m/s, one with the tip outside the rim, a contact while the navigation itself marked
-its solution unusable (as the tip entered the basket or as it was held), and any collision.
+its solution unusable (as the tip entered the basket or as it was held), any collision, and a receiver that departs from
+controlled flight (`departure`).
 """
 
 from dataclasses import dataclass
@@ -18,6 +19,7 @@ from enum import Enum
 
 from dockair.rotations import Array
 from dockair.scenarios.attempts import ATTEMPTING, Attempt, AttemptOutcome, OpenAttempt, Passing, RefereeLimits, passing
+from dockair.scenarios.departure import Departure
 from dockair.sim.truth import Truth
 
 
@@ -59,6 +61,7 @@ class Referee:
         self._entered_usable = True
         self._outside_m = 0.0  # farthest that the tip was off the axis when it touched beyond the rim
         self._unsafe: list[str] = []
+        self._departure = Departure()
         self.contact: Contact | None = None
         self.collided_with = ""
 
@@ -92,6 +95,7 @@ class Referee:
             reason: the navigation's own, why it entered the phase.
         """
         self._follow(truth, phase, reason)
+        self._departure.watch(truth)
         self._usable = usable
         if self.collided_with:
             return Outcome.COLLISION
@@ -115,9 +119,12 @@ class Referee:
     @property
     def unsafe(self) -> tuple[str, ...]:
         """What was unsafe; empty when all was safe."""
+        unsafe, departed_s = list(self._unsafe), self._departure.time_s
         if self._outside_m > 0.0:
-            return (*self._unsafe, f"touch outside the rim, {self._outside_m:.2f} m off the axis")
-        return tuple(self._unsafe)
+            unsafe.append(f"touch outside the rim, {self._outside_m:.2f} m off the axis")
+        if departed_s is not None:
+            unsafe.append(f"departed from controlled flight at {departed_s:.1f} s")
+        return tuple(unsafe)
 
     def _attempt(self, truth: Truth) -> OpenAttempt:
         if self._open is None:

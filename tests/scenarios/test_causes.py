@@ -209,6 +209,21 @@ def test_a_flight_without_an_attempt_was_never_steady_or_saw_nothing(flight):
     assert cause_of_flight([], flight(faults=[LedOff()])) == "fault"
 
 
+def test_a_receiver_that_falls_away_has_departed_whatever_else_went_wrong(flight):
+    """25 m below the drogue from 1 s on, and the navigation misled besides."""
+    fallen = flight(tip=lambda t: (0.0, -25.0 * (t > 1.0)), error=lambda t: (0.0, -25.0))
+    assert cause(fallen) == "departed"
+    assert cause(fallen, outcome="timeout") == "departed"
+    assert cause_of_flight([], fallen) == "departed"
+    assert cause_of_flight([attempt(cause="gust")], fallen) == "departed"  # it departed after that attempt
+    assert cause_of_flight([attempt(outcome="contact", cause="")], fallen) == ""
+
+
+def test_an_attempt_that_ended_before_the_departure_has_its_own_cause(flight):
+    later = flight(**BEHIND | dict(tip=lambda t: (0.0, -25.0 if t > 2.5 else -0.3)))
+    assert cause(later, decided_s=2.0, ended_s=2.0) == "control_limit"
+
+
 def test_every_cause_is_in_the_modules_table_and_every_one_there_is_known():
     import dockair.scenarios.causes as causes
 

@@ -105,6 +105,15 @@ def test_anything_else_of_the_receiver_that_touches_ends_the_flight_whatever_wen
         assert referee.collided_with == "hose_3"
 
 
+def test_receiver_that_departs_from_controlled_flight_was_unsafe_and_the_flight_runs_out():
+    referee = Referee()
+    for k in range(100):
+        falling = truth_at(0.1 * k, (-4.0, 0.0, -1.0 * max(k - 50, 0)))
+        assert judged(referee, falling, "pre_contact") is None
+    assert referee.unsafe == ("departed from controlled flight at 7.1 s",)
+    assert judged(referee, truth_at(60.0, (-4.0, 0.0, -500.0)), "pre_contact") is Outcome.TIMEOUT
+
+
 def test_receiver_that_breaks_away_behind_the_rings_plane_has_aborted_and_one_that_waits_has_run_out_of_time():
     assert judged(Referee(), truth_at(20.0, (-3.0, 0.0, 0.0)), "clear") is Outcome.ABORT
     assert judged(Referee(), truth_at(60.0, (-3.0, 0.0, 0.0)), "pre_contact") is Outcome.TIMEOUT
