@@ -23,7 +23,7 @@ import numpy as np
 
 from dockair.messages import ReceiverCommand, TankerAnnouncement
 from dockair.nav.guidance.announced_path import AnnouncedPath
-from dockair.nav.guidance.closing import PredictedMiss, room_to_stop_m
+from dockair.nav.guidance.closing import PredictedMiss, room_to_stop_m, time_to_contact_s
 from dockair.nav.guidance.controller import Controller, Sight, Wanted
 from dockair.nav.guidance.guidance_settings import GuidanceSettings, RelativeState
 from dockair.nav.guidance.phases import Phase, PhaseLimits, Situation, next_phase
@@ -35,6 +35,7 @@ from dockair.rotations import Array
 __all__ = ["Guidance", "GuidanceSettings", "PhaseLimits", "RelativeState"]
 
 _FOLLOWING = (Phase.JOIN_UP, Phase.PRE_CONTACT, Phase.APPROACH, Phase.CLEAR)
+_TOUCHING = (Phase.CONTACT, Phase.HOLD, Phase.DISCONNECT)
 _RETREATING = (Phase.DISCONNECT, Phase.BACK_OFF, Phase.BREAKAWAY)
 
 
@@ -52,9 +53,10 @@ class Guidance:
         self._path, self._turn_rad_s, self._turn_error_m_s = AnnouncedPath(), 0.0, 0.0
         self._aim: Array = np.zeros(2)
         self._passed: Array | None = None  # where the ring was when the tip last came to its plane, left and up
-        self._closure, self._good, self._attempts, self._docked = 0.0, False, 0, False
+        self._closure, self._good, self._committed = 0.0, False, False
+        self._attempts, self._docked = 0, False
         self._time_s = self._in_phase_s = self._steady_s = self._waiting_s = 0.0
-        self._unusable_s = self._doubtful_s = self._pushed_in_m = 0.0
+        self._unusable_s = self._doubtful_s = self._inside_s = self._pushed_in_m = 0.0
 
     def announce(self, announcement: TankerAnnouncement) -> None:
         """Take note of what the tanker is about to do."""
@@ -69,37 +71,37 @@ class Guidance:
         self._axes.step(state.w_WB_B, self._turn_rad_s)
         ring, rate = self._axes.moved(state.p_PD_B, state.rate_PD_B)
         coupling = self._axes.R_NB @ state.p_PK_B
-        self._observe(state, ring, rate, coupling)
+        self._observe(state, ring, rate)
         self._count(state, ring, coupling)
         self._change_phase(self._situation(ring, rate, coupling))
-        u_dot = self._follow() if self._follows(state, ring) else self._hold_course()
+        u_dot = self._follow(ring) if self._follows(state, ring) else self._hold_course()
         limit = np.array(self._settings.acceleration_limit_m_s2)
         change = self._dt * np.array(self._settings.jerk_limit_m_s3)
         u_dot = np.clip(np.clip(u_dot, -limit, limit), self._u_dot - change, self._u_dot + change)
         self._u_dot = u_dot
         self._u = _limited(self._u + u_dot * self._dt, self._settings.velocity_limit_m_s)
-        self._controller.given(self._u)
+        self._controller.given(self._u, u_dot)
         return self._command(state, u_dot)
 
-    def _observe(self, state: RelativeState, ring: Array, rate: Array, coupling: Array) -> None:
+    def _observe(self, state: RelativeState, ring: Array, rate: Array) -> None:
         """Show the drogue to the controller, and its distance from the probe's line to the prediction of the miss."""
-        held = self.phase in (Phase.CONTACT, Phase.HOLD) or self.phase is Phase.DISCONNECT
-        if not state.usable or held:
+        touches = self.phase in _TOUCHING or (self.phase is Phase.APPROACH and ring[0] <= 0.0)
+        if not state.usable or touches:  # a drogue that is pushed about by the probe would lead it astray
             self._controller.observe(None)
             return
-        later = ring.copy()
-        later[0] = max(ring[0] + min(rate[0], 0.0) * self._settings.response_s[1], 0.0)
-        bow_wave = self._settings.bow_wave
+        times = self._controller.looks_ahead_s
+        later = np.tile(ring, (len(times), 1))
+        later[1:, 0] = np.maximum(ring[0] + min(rate[0], 0.0) * times[1:], 0.0)
         self._controller.observe(
             Sight(
-                place_m=ring if ring[0] > 0.0 else np.append(ring[:1], coupling[1:]),
+                place_m=ring,
                 rate_m_s=rate,
-                push_m_s2=bow_wave.at(ring),
-                push_then_m_s2=bow_wave.at(later),
+                push_m_s2=self._settings.bow_wave.at(later),
             )
         )
-        self._miss.step(float(np.hypot(*(ring[1:] + self._aim_now()))))
-        if self.phase is Phase.APPROACH and ring[0] > 0.0:
+        if not self._committed:  # from then on only the miss at contact is kept small
+            self._miss.step(float(np.hypot(*(ring[1:] + self._aim_now()))))
+        if self.phase is Phase.APPROACH:
             self._passed = ring[1:].copy() if ring[0] < self._settings.limits.come_along_m else None
 
     def _count(self, state: RelativeState, ring: Array, coupling: Array) -> None:
@@ -117,6 +119,7 @@ class Guidance:
         self._steady_s = self._steady_s + self._dt if steady else 0.0
         if self.phase is Phase.APPROACH:
             self._close(state, float(ring[0]))
+            self._inside_s = self._inside_s + self._dt if ring[0] <= 0.0 else 0.0
         if self.phase is Phase.CONTACT:
             self._pushed_in_m += (self._u[0] - self._controller.drift_m_s[0]) * self._dt
 
@@ -127,11 +130,14 @@ class Guidance:
         miss = self._miss.at_contact_m(error, distance_m, s.closure_speed_m_s)
         radius = s.limits.capture_radius_m * (s.closing.hysteresis if self._good else 1.0)
         self._good = state.usable and state.contact_usable and miss <= radius
-        committed = distance_m <= room_to_stop_m(s.closing, self._closure) and self._closure > 0.0
-        sign = 1.0 if self._good or committed else -1.0
+        self._committed = self._closure > 0.0 and (
+            self._committed or distance_m <= room_to_stop_m(s.closing, self._closure)
+        )
+        sign = 1.0 if self._good or self._committed else -1.0
         closure = self._closure + sign * s.closure_acceleration_m_s2 * self._dt
-        self._closure = min(max(closure, 0.0), s.closure_speed_m_s)
-        self._waiting_s = self._waiting_s + self._dt if self._closure == 0.0 else 0.0
+        least = -s.closing.retreat_m_s if distance_m < s.closing.wait_at_m else 0.0
+        self._closure = min(max(closure, least), s.closure_speed_m_s)
+        self._waiting_s = self._waiting_s + self._dt if self._closure <= 0.0 else 0.0
 
     def _situation(self, ring: Array, rate: Array, coupling: Array) -> Situation:
         return Situation(
@@ -140,6 +146,7 @@ class Guidance:
             steady_s=self._steady_s,
             spread_m=self._miss.spread_m,
             waiting_s=self._waiting_s,
+            inside_s=self._inside_s,
             unusable_s=self._unusable_s,
             doubtful_s=self._doubtful_s,
             station_m=float(np.linalg.norm(ring - [self._settings.stand_off_m, 0.0, 0.0])),
@@ -161,11 +168,12 @@ class Guidance:
         self._docked = self._docked or self.phase is Phase.HOLD
         if self.phase is Phase.APPROACH:
             self._attempts, self._passed, self._good = self._attempts + 1, None, True
-            self._closure = self._waiting_s = 0.0
+            self._closure = self._waiting_s = self._inside_s = 0.0
+            self._committed = False
         elif self.phase is Phase.CONTACT:  # what is commanded already will still be flown
             self._pushed_in_m = self._closure * self._settings.response_s[0]
         elif self.phase in (Phase.BACK_OFF, Phase.BREAKAWAY):
-            self._closure = 0.0
+            self._closure, self._committed = 0.0, False
             self._miss.forget()
             if self._passed is not None:
                 self._aim = self._settings.bow_wave.learnt(self._aim, self._passed)
@@ -179,16 +187,27 @@ class Guidance:
         """(2,) off the drogue's predicted place, left and up: what is learnt applies to contact."""
         return self._aim if self.phase is Phase.APPROACH else np.zeros(2)
 
-    def _follow(self) -> Array:
+    def _follow(self, ring: Array) -> Array:
         """(3,) du/dt of the controller."""
         s = self._settings
         if self.phase is Phase.APPROACH:
-            wanted = Wanted(distance_m=None, speed_m_s=self._closure, aim_m=self._aim_now(), must_follow=True)
+            distance_m = float(ring[0])
+            wanted = Wanted(
+                distance_m=None,
+                speed_m_s=self._closure,
+                aim_m=self._aim_now(),
+                must_follow=True,
+                to_contact_s=self._to_contact_s(distance_m) if self._committed else None,
+            )
         elif self.phase in _RETREATING:
             wanted = Wanted(distance_m=None, speed_m_s=-s.back_off_speed_m_s, aim_m=self._aim_now())
         else:
             wanted = Wanted(distance_m=s.stand_off_m, speed_m_s=s.join_up_speed_m_s, aim_m=self._aim_now())
         return self._controller.rate(self._u, wanted)
+
+    def _to_contact_s(self, distance_m: float) -> float:
+        s = self._settings
+        return time_to_contact_s(s.closing, distance_m, self._closure, s.closure_speed_m_s, s.closure_acceleration_m_s2)
 
     def _hold_course(self) -> Array:
         """(3,) du/dt toward the drogue's drift, plus the speed along that the phase asks for."""
@@ -221,8 +240,8 @@ class Guidance:
 def _controller(settings: GuidanceSettings, step_s: float) -> Controller:
     if settings.controller == "pid":
         return Pid(settings.pid, step_s)
-    limit = np.array(settings.acceleration_limit_m_s2)
-    return Predictive(settings.predictive, np.array(settings.response_s), limit, step_s)
+    limits = np.array(settings.acceleration_limit_m_s2), np.array(settings.jerk_limit_m_s3)
+    return Predictive(settings.predictive, np.array(settings.response_s), *limits, step_s)
 
 
 def _limited(v: Array, limit: float) -> Array:

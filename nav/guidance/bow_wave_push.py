@@ -30,13 +30,11 @@ class BowWavePush:
     learnt_max_m: float = 0.15  # a miss beyond this was not the bow wave's
 
     def at(self, p_PD_m: Array) -> Array:
-        """(3,) b with the ring's centre at p_PD (3,) from the probe's tip, forward left up [m/s^2]."""
+        """(..., 3) b with the ring's centre at p_PD (..., 3) from the probe's tip, forward left up [m/s^2]."""
         r = p_PD_m - np.array(self.source_from_tip_m)
-        distance = max(float(np.linalg.norm(r)), 0.5 * self.radius_m)
-        if distance == 0.0:
-            return np.zeros(3)
+        distance = np.maximum(np.linalg.norm(r, axis=-1, keepdims=True), max(0.5 * self.radius_m, 1e-9))
         b = self.side_acceleration_m_s2 * 0.25 * self.radius_m**2 * r / distance**3
-        b[0] = 0.0
+        b[..., 0] = 0.0
         return np.asarray(b)
 
     def learnt(self, aim_m: Array, miss_m: Array) -> Array:

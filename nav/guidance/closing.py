@@ -27,6 +27,8 @@ class ClosingSettings:
     deceleration_m_s2: float = 0.6  # a: with idle thrust a fighter slows by 0.8
     response_s: float = 0.45  # tau along, engine and all
     hysteresis: float = 1.3  # of the capture radius once closing: a good moment must not flicker
+    wait_at_m: float = 2.2  # from the ring: room to gain the closure speed, and not to be called back from 1.9 m on
+    retreat_m_s: float = 0.3  # to that place, when it came to a stand nearer
     margin_m: float = 0.2  # short of the ring, at rest: drogue and receiver move by 0.06 m rms in moderate gusts
 
 
@@ -62,6 +64,28 @@ class PredictedMiss:
         to_go_s = max(distance_m, 0.0) / closure_m_s
         share = float(np.exp(-to_go_s / self._settings.error_time_s))
         return float(np.hypot(share * error_to_come_m, self.spread_m))
+
+
+def time_to_contact_s(
+    settings: ClosingSettings, distance_m: float, closure_m_s: float, full: float, ramp: float
+) -> float:
+    """Time until a distance has been closed by a receiver whose command has come to `closure_m_s` and goes on to full.
+
+    Args:
+        settings: constants.
+        distance_m: tip to ring.
+        closure_m_s: c now, as commanded.
+        full: c at last [m/s].
+        ramp: its rate [m/s^2].
+    """
+    to_go = max(distance_m - settings.response_s * closure_m_s, 0.0)
+    ramping_s = max(full - closure_m_s, 0.0) / ramp
+    ramped_m = (closure_m_s + 0.5 * ramp * ramping_s) * ramping_s
+    if to_go <= ramped_m:
+        time_s = (np.sqrt(closure_m_s**2 + 2.0 * ramp * to_go) - closure_m_s) / ramp
+    else:
+        time_s = ramping_s + (to_go - ramped_m) / full
+    return settings.response_s + float(time_s)
 
 
 def room_to_stop_m(settings: ClosingSettings, closure_m_s: float) -> float:

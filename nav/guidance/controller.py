@@ -14,8 +14,7 @@ class Sight:
 
     place_m: Array  #: (3,) ring centre from the probe's tip; across the coupling's, once past the ring
     rate_m_s: Array  #: (3,) its rate
-    push_m_s2: Array  #: (3,) what the bow wave does to it now
-    push_then_m_s2: Array  #: (3,) and after the response time
+    push_m_s2: Array  #: (n, 3) what the bow wave does to it now and at the controller's `looks_ahead_s`
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -26,6 +25,7 @@ class Wanted:
     speed_m_s: float  #: closing, or the most to go to the distance with
     aim_m: Array  #: (2,) off the place, left and up
     must_follow: bool = False  #: a swing, too, that is more than the receiver can bear
+    to_contact_s: float | None = None  #: until the tip is at the place, where it can no longer be called back
 
 
 class Controller(Protocol):
@@ -35,8 +35,13 @@ class Controller(Protocol):
         """Take note of the drogue, once a control tick; None when it is not seen."""
         ...
 
-    def given(self, velocity_m_s: Array) -> None:
-        """Take note of the velocity (3,) commanded for the next period, in stabilised axes."""
+    def given(self, velocity_m_s: Array, acceleration_m_s2: Array) -> None:
+        """Take note of velocity and acceleration (3,) commanded for the next period, in stabilised axes."""
+        ...
+
+    @property
+    def looks_ahead_s(self) -> Array:
+        """(n,) times from now, the first 0, at which it wants to know the push of the bow wave."""
         ...
 
     @property

@@ -54,9 +54,10 @@ class DrogueMotion:
         settings: the model.
         step_s: control period [s].
         lead_s: (3,) how far ahead `ahead` predicts: the receiver's response times [s].
+        node_s: from one place of `path` to the next [s].
     """
 
-    def __init__(self, settings: SwingSettings, step_s: float, lead_s: Array) -> None:
+    def __init__(self, settings: SwingSettings, step_s: float, lead_s: Array, node_s: float) -> None:
         self._lead_s = np.asarray(lead_s)
         self._A = np.stack([_dynamics(settings, axis) for axis in range(3)])
         self._F = np.stack([expm(A * step_s) for A in self._A])
@@ -64,6 +65,9 @@ class DrogueMotion:
         self._K = np.stack([_gains(settings, axis, step_s) for axis in range(3)], axis=1)
         self._ticks = 0
         self._pushed = np.stack([_held(A, step_s) for A in self._A])
+        self._F_node = np.stack([expm(A * node_s) for A in self._A])
+        self._pushed_node = np.stack([_held(A, node_s) for A in self._A])
+        self._node_s = node_s
         self._x: Array = np.zeros((3, _STATES))
 
     def start(self, place_m: Array, velocity_m_s: Array) -> None:
@@ -101,6 +105,22 @@ class DrogueMotion:
         out = np.empty((3, 3))
         _predict(self._x, self._lead, self._A, self._lead_s, push_m_s2, push_then_m_s2, out)
         return out[0], out[1], out[2]
+
+    def path(self, push_m_s2: Array) -> Array:
+        """(n, 3) places [m] at the nodes after the lead time.
+
+        Args:
+            push_m_s2: (n + 2, 3) b now, after the lead time and at the nodes; in between it changes steadily.
+        """
+        out = np.empty((len(push_m_s2) - 2, 3))
+        _go_on(self._x, self._lead, self._lead_s, self._F_node, self._pushed_node, push_m_s2, out)
+        return out
+
+    def mean_path(self, nodes: int) -> Array:
+        """(nodes, 3) the same without the swing: drift alone."""
+        m, d = self._x[:, 0], self._x[:, 1]
+        times = self._lead_s + self._node_s * np.arange(1, nodes + 1)[:, np.newaxis]
+        return np.asarray(m + times * d)
 
     def mean_ahead(self) -> tuple[Array, Array, Array]:
         """(3,) the same three without the swing: drift alone."""
@@ -141,6 +161,29 @@ def _predict(x, lead, A, lead_s, push, push_then, out):  # type: ignore[no-untyp
         out[2, axis] = then
         for j in range(n):
             out[2, axis] += (A[axis, 1, j] + A[axis, 3, j]) * later[j]
+
+
+@njit(cache=True)
+def _go_on(x, lead, lead_s, F, pushed, push, out):  # type: ignore[no-untyped-def]
+    """Write the places at the nodes (n, 3)."""
+    n = x.shape[1]
+    state, later = np.empty(n), np.empty(n)
+    for axis in range(3):
+        for i in range(n):
+            state[i] = 0.0
+            for j in range(n):
+                state[i] += lead[axis, i, j] * x[axis, j]
+        tau, now, then = lead_s[axis], push[0, axis], push[1, axis]
+        state[2] += tau * tau * (now / 3.0 + then / 6.0)
+        state[3] += 0.5 * tau * (now + then)
+        for k in range(len(out)):
+            b = 0.5 * (push[k + 1, axis] + push[k + 2, axis])
+            for i in range(n):
+                later[i] = pushed[axis, i] * b
+                for j in range(n):
+                    later[i] += F[axis, i, j] * state[j]
+            state[:] = later
+            out[k, axis] = state[0] + state[2]
 
 
 def _dynamics(settings: SwingSettings, axis: int) -> Array:

@@ -6,6 +6,7 @@ from typing import Literal
 from dockair.nav.guidance.bow_wave_push import BowWavePush
 from dockair.nav.guidance.closing import ClosingSettings
 from dockair.nav.guidance.drogue_motion import SwingSettings
+from dockair.nav.guidance.path_plan import PlanSettings
 from dockair.nav.guidance.phases import PhaseLimits
 from dockair.rotations import Array
 
@@ -16,14 +17,12 @@ ControllerName = Literal["predictive", "pid"]
 class PredictiveSettings:
     """Gains of `predictive`."""
 
-    across_gain_1_s: float = 1.2  # k: an eighth of 1 / tau, for the receiver is pushed about by gusts itself
-    along_gain_1_s: float = 0.5  # likewise along, where the engine answers later
-    integral_1_s2: float = 0.3  # k_i: a steady error goes within some 5 s, slow beside the swing
-    integral_error_max_m: float = 0.2  # beyond this the receiver is on its way, not off by a wrong idea
+    along_gain_1_s: float = 0.5  # k: an eighth of 1 / tau, for the receiver is pushed about by gusts itself
     smoothing_1_s: float = 4.0  # how fast u goes to the u of Eq. (1) where it is not there
     bearable_share: float = 0.7  # of the limit of acceleration, rms: above it a swing's peaks are cut off every time
     calm_share: float = 0.3  # of the gains, when a swing is only waited for: its middle moves in some 10 s
     bearing_s: float = 4.0  # over which that mean is taken: a swing and a half
+    plan: PlanSettings = field(default_factory=PlanSettings)
     swing: SwingSettings = field(default_factory=SwingSettings)
 
 

@@ -33,8 +33,13 @@ class Pid:
         if sight is not None:
             self._place, self._rate = sight.place_m, sight.rate_m_s
 
-    def given(self, velocity_m_s: Array) -> None:
+    def given(self, velocity_m_s: Array, acceleration_m_s2: Array) -> None:
         """Nothing: it does not look at what it has commanded."""
+
+    @property
+    def looks_ahead_s(self) -> Array:
+        """(1,) now: it does not look ahead."""
+        return np.zeros(1)
 
     @property
     def drift_m_s(self) -> Array:

@@ -1,21 +1,21 @@
 """Follows the drogue by prediction: flies now what the drogue will do when the receiver has answered.
 
 With y_D place of the drogue and y_r that of the receiver on its own scale, both a response time ahead
-(`drogue_motion`, `own_path`), the commanded velocity u goes to
+(`drogue_motion`, `own_path`), the tip goes across as planned for the next second and a half (`path_plan`), from where
+its commands will have brought it to where the drogue is predicted. Along, the commanded velocity u goes to
 
-    e = y_D - y_r - wanted,     u* = y_D' + k e + k_i integral of e across,
-    du/dt = y_D'' + k (y_D' - u) + s (u* - u)                                                             (1)
+    e = y_D - y_r - wanted,     u* = y_D' + k e,     du/dt = y_D'' + k (y_D' - u) + s (u* - u)            (1)
 
-axis by axis; while closing at c, u* = y_D' + c along. The integral takes out what a wrong idea of y_D'' leaves. Both u
-and du/dt go out, so that the flight control has nothing to guess. A bias of the receiver's inertial velocity is part of
-y_D'. What the tip does otherwise than commanded is part of y_D too: it is predicted and flown against like the drogue's
-own motion, with the same filter.
+while closing at c, u* = y_D' + c. Both u and du/dt go out, so that the flight control has nothing to guess. A bias of
+the receiver's inertial velocity is part of y_D'. What the tip does otherwise than commanded is part of y_D too: it is
+predicted and flown against like the drogue's own motion, with the same filter.
 
 A swing that asks for more than a share of the acceleration that the receiver may fly (rms over some swings) is not
-followed but waited for astern: then y_D is the middle of the swing, and k and s are smaller. In gusts that move the
-drogue so much the surfaces have no rate to spare for haste.
+followed but waited for astern: then y_D is the middle of the swing, and haste has a higher price. In gusts that move
+the drogue so much the surfaces have no rate to spare for haste.
 
-Not modelled: limits of the airframe in advance; what they cut off is missing from y_r's scale until it is seen.
+Not modelled: limits of the airframe beyond those of acceleration and jerk; what they cut off is missing from y_r's
+scale until it is seen.
 """
 
 import numpy as np
@@ -24,44 +24,73 @@ from dockair.nav.guidance.controller import Sight, Wanted, clipped
 from dockair.nav.guidance.drogue_motion import DrogueMotion
 from dockair.nav.guidance.guidance_settings import PredictiveSettings
 from dockair.nav.guidance.own_path import OwnPath
+from dockair.nav.guidance.path_plan import PathPlan
 from dockair.rotations import Array
 
 _AT_FIRST = 1.5  # of what is bearable: a swing that nobody has seen yet is not followed
+_ACROSS = (1, 2)
 
 
 class Predictive:
-    """Eq. (1); see `controller.Controller`."""
+    """Eq. (1); see `controller.Controller`.
 
-    def __init__(self, settings: PredictiveSettings, response_s: Array, limit_m_s2: Array, step_s: float) -> None:
-        self._settings = settings
+    Args:
+        settings: gains and prices.
+        response_s: (3,) response times.
+        acceleration_limit_m_s2: (3,) that the receiver may fly.
+        jerk_limit_m_s3: (3,) likewise.
+        step_s: control period.
+    """
+
+    def __init__(
+        self,
+        settings: PredictiveSettings,
+        response_s: Array,
+        acceleration_limit_m_s2: Array,
+        jerk_limit_m_s3: Array,
+        step_s: float,
+    ) -> None:
+        self._settings, self._step_s, self._seen = settings, step_s, False
+        plan = settings.plan
         self._own = OwnPath(response_s, step_s)
-        self._motion = DrogueMotion(settings.swing, step_s, response_s)
-        self._gains = np.array([settings.along_gain_1_s, settings.across_gain_1_s, settings.across_gain_1_s])
+        self._motion = DrogueMotion(settings.swing, step_s, response_s, plan.node_s)
+        self._plans = [PathPlan(plan, acceleration_limit_m_s2[i], jerk_limit_m_s3[i]) for i in _ACROSS]
+        self._response_s = float(response_s[_ACROSS[0]])
+        nodes = self._response_s + plan.node_s * np.arange(plan.nodes + 1)
+        self._times: Array = np.append(0.0, nodes)
         self._ahead: tuple[Array, Array, Array] = (np.zeros(3), np.zeros(3), np.zeros(3))
-        self._integral: Array = np.zeros(2)  # k_i times it, left and up [m/s]
-        self._bearable = (settings.bearable_share * limit_m_s2[1:]) ** 2
+        self._path: Array = np.zeros((plan.nodes, 3))
+        self._u_dot: Array = np.zeros(3)
+        self._bearable = (settings.bearable_share * acceleration_limit_m_s2[1:]) ** 2
         self._asked = _AT_FIRST * self._bearable  # mean square of the drogue's acceleration, left and up
-        self._step_s, self._seen = step_s, False
+
+    @property
+    def looks_ahead_s(self) -> Array:
+        """(n,) now, after the response time and at the nodes of the plan."""
+        return self._times
 
     def observe(self, sight: Sight | None) -> None:
         """Take note of the drogue, once a control tick; None when it is not seen."""
-        none = np.zeros(3)
         if sight is None:
-            self._motion.step(None, None, none)
-            self._ahead = self._motion.ahead(none, none)
-            return
-        place, velocity = sight.place_m + self._own.place_m, sight.rate_m_s + self._own.velocity_m_s
-        if not self._seen:
-            self._motion.start(place, velocity)
-            self._seen = True
-        self._motion.step(place, velocity, sight.push_m_s2)
-        self._ahead = self._motion.ahead(sight.push_m_s2, sight.push_then_m_s2)
-        share = self._step_s / self._settings.bearing_s
-        self._asked = self._asked + share * (self._ahead[2][1:] ** 2 - self._asked)
+            push: Array = np.zeros((len(self._times), 3))
+            self._motion.step(None, None, push[0])
+        else:
+            push = sight.push_m_s2
+            place, velocity = sight.place_m + self._own.place_m, sight.rate_m_s + self._own.velocity_m_s
+            if not self._seen:
+                self._motion.start(place, velocity)
+                self._seen = True
+            self._motion.step(place, velocity, push[0])
+        self._ahead = self._motion.ahead(push[0], push[1])
+        self._path = self._motion.path(push)
+        if sight is not None:
+            share = self._step_s / self._settings.bearing_s
+            self._asked = self._asked + share * (self._ahead[2][1:] ** 2 - self._asked)
 
-    def given(self, velocity_m_s: Array) -> None:
-        """Take note of the velocity (3,) commanded for the next period."""
+    def given(self, velocity_m_s: Array, acceleration_m_s2: Array) -> None:
+        """Take note of velocity and acceleration (3,) commanded for the next period."""
         self._own.step(velocity_m_s)
+        self._u_dot = acceleration_m_s2
 
     @property
     def drift_m_s(self) -> Array:
@@ -73,26 +102,33 @@ class Predictive:
         return np.asarray((self._ahead[0] - self._own.place_ahead_m)[1:] + aim_m)
 
     def rate(self, u: Array, wanted: Wanted) -> Array:
-        """(3,) du/dt of Eq. (1)."""
+        """(3,) du/dt of Eq. (1) along, of the plan across."""
         bearable = wanted.must_follow or bool((self._asked <= self._bearable).all())
-        place, velocity, acceleration = self._ahead if bearable else self._motion.mean_ahead()
-        calm = 1.0 if bearable else self._settings.calm_share
-        gains = calm * self._gains
-        to_go = place - self._own.place_ahead_m
-        to_go[1:] += wanted.aim_m
-        speed = gains * to_go
-        if bearable:
-            self._integrate(to_go[1:])
-        speed[1:] += self._integral
-        change = gains * (velocity - u)
-        if wanted.distance_m is None:
-            speed[0], change[0] = wanted.speed_m_s, 0.0
-        else:
-            speed[0] = clipped(gains[0] * (to_go[0] - wanted.distance_m), wanted.speed_m_s)
-        return np.asarray(acceleration + change + calm * self._settings.smoothing_1_s * (velocity + speed - u))
+        return np.append(self._along(u, wanted, bearable), self._across(u, wanted, bearable))
 
-    def _integrate(self, error_m: Array) -> None:
-        """Go on with the integral; errors too large for it count no more than their limit."""
+    def _along(self, u: Array, wanted: Wanted, bearable: bool) -> float:
+        """Eq. (1)."""
         s = self._settings
-        error = np.clip(error_m, -s.integral_error_max_m, s.integral_error_max_m)
-        self._integral = self._integral + s.integral_1_s2 * error * self._step_s
+        calm = 1.0 if bearable else s.calm_share
+        gain = calm * s.along_gain_1_s
+        place, velocity, acceleration = (v[0] for v in (self._ahead if bearable else self._motion.mean_ahead()))
+        if wanted.distance_m is None:
+            speed, change = wanted.speed_m_s, 0.0
+        else:
+            to_go = place - self._own.place_ahead_m[0] - wanted.distance_m
+            speed, change = clipped(gain * to_go, wanted.speed_m_s), gain * (velocity - u[0])
+        return float(acceleration + change + calm * s.smoothing_1_s * (velocity + speed - u[0]))
+
+    def _across(self, u: Array, wanted: Wanted, bearable: bool) -> Array:
+        """(2,) next acceleration of the plans, left and up."""
+        s = self._settings
+        path = self._path if bearable else self._motion.mean_path(s.plan.nodes)
+        off = self._own.place_ahead_m
+        to_contact_s = None if wanted.to_contact_s is None else wanted.to_contact_s - self._response_s
+        out = np.empty(2)
+        for row, (axis, plan) in enumerate(zip(_ACROSS, self._plans, strict=True)):
+            places = path[:, axis] + wanted.aim_m[row] - off[axis]
+            places -= places[0] - clipped(places[0], s.plan.error_max_m)
+            x = np.array([0.0, u[axis], self._u_dot[axis]])
+            out[row] = self._u_dot[axis] + plan.jerk_m_s3(x, places, to_contact_s, calm=not bearable) * self._step_s
+        return out

@@ -201,3 +201,35 @@ def test_commands_respect_their_limits(settings):
         command = guidance.step(state([30.0, 20.0, 9.0]))
         assert np.linalg.norm(command.velocity_m_s) <= settings.velocity_limit_m_s * (1 + 1e-12)
         assert (np.abs(command.acceleration_m_s2) <= np.array(settings.acceleration_limit_m_s2) * (1 + 1e-12)).all()
+
+
+def test_a_drogue_that_is_pushed_along_by_the_probe_is_not_chased():
+    """The tip has stuck in the basket short of the coupling; the drogue goes where the probe pushes it."""
+    plant, guidance, stuck = Plant(), Guidance(SETTINGS, RATE_HZ), False
+    now, pushing = plant.step(ReceiverCommand()), []
+    for _ in range(60 * RATE_HZ):
+        command = guidance.step(state([-0.15, 0.1, 0.0]) if stuck else now)
+        if stuck and guidance.phase is Phase.APPROACH:
+            pushing.append(command.velocity_m_s.copy())
+        if stuck and guidance.phase is Phase.BACK_OFF:
+            break
+        now = plant.step(command)
+        stuck = stuck or now.p_PD_B[0] < -0.1
+    assert guidance.phase_reason == "coupling not reached"
+    assert len(pushing) == pytest.approx(SETTINGS.limits.inside_s * RATE_HZ, abs=0.15 * RATE_HZ)
+    assert np.abs(np.array(pushing) - [SETTINGS.closure_speed_m_s, 0.0, 0.0]).max() < 0.15
+
+
+def test_a_receiver_that_came_to_a_stand_close_in_falls_back_for_room_to_close():
+    """The integrity monitor's claim is lost 2.6 m from the ring and comes back later."""
+    plant, distances = Plant(), []
+
+    def doubted(s):
+        distances.append(s.p_PD_B[0])
+        return dataclasses.replace(s, contact_usable=bool(s.p_PD_B[0] > 2.6 or plant.t > 25.0))
+
+    limits = dataclasses.replace(SETTINGS.limits, lost_range_m=0.5)
+    fly(plant, seen=doubted, settings=dataclasses.replace(SETTINGS, limits=limits))
+    waited = np.array(distances)[20 * RATE_HZ : 24 * RATE_HZ]
+    assert waited.min() > SETTINGS.closing.wait_at_m - 0.15
+    assert plant.crossings[0][1] > 1.0

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from dockair.nav.guidance.closing import ClosingSettings, PredictedMiss, room_to_stop_m
+from dockair.nav.guidance.closing import ClosingSettings, PredictedMiss, room_to_stop_m, time_to_contact_s
 
 SETTINGS = ClosingSettings()
 
@@ -46,3 +46,15 @@ def test_a_receiver_that_brakes_after_its_response_time_stops_the_margin_short()
         x, t = x - max(c, 0.0) * dt, t + dt
     assert x == pytest.approx(SETTINGS.margin_m, abs=1e-3)
     assert room_to_stop_m(SETTINGS, 0.0) == room_to_stop_m(SETTINGS, -0.5) == SETTINGS.margin_m
+
+
+@pytest.mark.parametrize("closure", [0.0, 0.5, 1.2])
+@pytest.mark.parametrize("distance", [0.1, 1.0, 2.5])
+def test_time_to_contact_is_that_of_the_ramp_flown_a_response_time_later(closure, distance):
+    """Against the motion integrated in small steps; what was commanded before was the closure of now."""
+    full, ramp, dt, t, x = 1.2, 0.6, 1e-4, 0.0, distance
+    while x > 0.0:
+        c = min(closure + ramp * max(t - SETTINGS.response_s, 0.0), full)
+        x, t = x - c * dt, t + dt
+    expected = max(t, SETTINGS.response_s)  # what is nearer than what has been commanded is there then
+    assert time_to_contact_s(SETTINGS, distance, closure, full, ramp) == pytest.approx(expected, abs=1e-3)

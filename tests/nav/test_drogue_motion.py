@@ -1,6 +1,7 @@
 """Prediction of the drogue's swing."""
 
 import numpy as np
+from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 from dockair.nav.guidance.drogue_motion import DrogueMotion, SwingSettings, _dynamics
@@ -11,7 +12,7 @@ CALM = np.zeros(3)
 
 def follow(path, rate, seconds):
     """Feed exact places and rates; return time and filter at the end."""
-    motion = DrogueMotion(SwingSettings(), STEP_S, LEAD_S)
+    motion = DrogueMotion(SwingSettings(), STEP_S, LEAD_S, 0.1)
     motion.start(path(0.0), rate(0.0))
     for k in range(1, round(seconds / STEP_S) + 1):
         motion.step(path(k * STEP_S), rate(k * STEP_S), CALM)
@@ -23,7 +24,7 @@ def test_a_known_swing_is_continued_by_its_closed_form():
     settings, t = SwingSettings(), 0.7
     omega, zeta = 2.0 * np.pi * np.array(settings.frequency_hz), np.array(settings.damping)
     pole = -zeta * omega + 1j * omega * np.sqrt(1.0 - zeta**2)
-    motion = DrogueMotion(settings, STEP_S, LEAD_S)
+    motion = DrogueMotion(settings, STEP_S, LEAD_S, 0.1)
     motion._x[:, 2], motion._x[:, 3] = ((0.1 * pole**n * np.exp(pole * t)).real for n in (0, 1))
     for n, predicted in enumerate(motion.ahead(CALM, CALM)):
         np.testing.assert_allclose(predicted, (0.1 * pole**n * np.exp(pole * (t + LEAD_S))).real, atol=1e-12)
@@ -49,7 +50,7 @@ def test_the_middle_of_a_swing_is_where_it_swings_about():
 
 def test_a_push_that_is_known_is_part_of_the_prediction():
     """From rest, b growing from 1 to 3 m/s^2 over the lead: tau^2 (1/3 + 3/6) of way, tau 2 of velocity."""
-    motion = DrogueMotion(SwingSettings(), STEP_S, LEAD_S)
+    motion = DrogueMotion(SwingSettings(), STEP_S, LEAD_S, 0.1)
     place, velocity, acceleration = motion.ahead(np.full(3, 1.0), np.full(3, 3.0))
     np.testing.assert_allclose(place, LEAD_S**2 * (1.0 / 3.0 + 0.5), rtol=1e-12)
     np.testing.assert_allclose(velocity, 2.0 * LEAD_S, rtol=1e-12)
@@ -57,7 +58,7 @@ def test_a_push_that_is_known_is_part_of_the_prediction():
 
 
 def test_a_steady_push_bends_the_swing_by_its_own_stiffness():
-    motion = DrogueMotion(SwingSettings(), STEP_S, LEAD_S)
+    motion = DrogueMotion(SwingSettings(), STEP_S, LEAD_S, 0.1)
     push = np.array([0.0, 0.5, -0.3])
     for _ in range(12_000):
         motion.step(None, None, push)
@@ -85,7 +86,7 @@ def test_prediction_is_as_good_as_its_own_covariance_says():
         for _ in range(lead[axis]):
             P = F[-1] @ P @ F[-1].T + Q
         expected.append(H[0] @ P @ H[0])
-    x, true, motion, predicted = np.zeros((3, 5)), [], DrogueMotion(settings, STEP_S, LEAD_S), []
+    x, true, motion, predicted = np.zeros((3, 5)), [], DrogueMotion(settings, STEP_S, LEAD_S, 0.1), []
     for _ in range(ticks):
         kick = np.sqrt(STEP_S) * densities * rng.standard_normal((3, 5))
         x = np.stack([F[i] @ x[i] for i in range(3)]) + kick
@@ -113,8 +114,40 @@ def test_it_learns_a_large_drift_within_two_swings():
 
 
 def test_unseen_it_goes_on_by_the_model():
-    motion = DrogueMotion(SwingSettings(), STEP_S, LEAD_S)
+    motion = DrogueMotion(SwingSettings(), STEP_S, LEAD_S, 0.1)
     motion._x[:, 0], motion._x[:, 1] = 1.0, 0.1
     for _ in range(100):
         motion.step(None, None, CALM)
     np.testing.assert_allclose(motion.ahead(CALM, CALM)[0], 1.0 + 0.1 * (1.0 + LEAD_S), atol=1e-9)
+
+
+def test_the_path_goes_on_from_the_prediction_by_the_swing_s_own_equation():
+    """Against scipy's integration of Eq. (1) with a push that changes steadily between the nodes."""
+    settings, node_s, axis = SwingSettings(), 0.1, 1
+    motion = DrogueMotion(settings, STEP_S, LEAD_S, node_s)
+    motion.start(np.array([4.0, 0.1, -0.2]), np.array([0.0, 0.4, 0.3]))
+    for k in range(300):
+        t = k * STEP_S
+        motion.step(
+            np.array([4.0, 0.2 * np.sin(2.0 * t), 0.0]), np.array([0.0, 0.4 * np.cos(2.0 * t), 0.0]), np.zeros(3)
+        )
+    push = np.zeros((12, 3))
+    push[1:, axis] = np.linspace(0.0, 3.0, 11)
+    omega, zeta, T = 2 * np.pi * settings.frequency_hz[axis], settings.damping[axis], settings.gust_time_s[axis]
+
+    def rate(t, x):
+        b = np.interp(t, LEAD_S[axis] + node_s * np.arange(11), push[1:, axis])
+        return [x[1], 0.0, x[3], -(omega**2) * x[2] - 2 * zeta * omega * x[3] + x[4] + b, -x[4] / T]
+
+    times = LEAD_S[axis] + node_s * np.arange(1, 11)
+    exact = solve_ivp(rate, (0.0, times[-1]), motion._x[axis], t_eval=times, rtol=1e-10, atol=1e-12, max_step=0.02).y
+    assert np.allclose(motion.path(push)[:, axis], exact[0] + exact[2], atol=2e-3)  # the mean of a node is held
+
+
+def test_the_mean_path_is_the_drift_alone():
+    motion = DrogueMotion(SwingSettings(), STEP_S, LEAD_S, 0.1)
+    motion.start(np.array([4.0, 0.0, 0.0]), np.zeros(3))
+    for k in range(3000):
+        motion.step(np.array([4.0, 0.2 * k * STEP_S, 0.0]), np.array([0.0, 0.2, 0.0]), np.zeros(3))
+    expected = 0.2 * (2999 * STEP_S + LEAD_S[1] + 0.1 * np.arange(1, 6))
+    assert np.allclose(motion.mean_path(5)[:, 1], expected, atol=5e-3)

@@ -1,0 +1,131 @@
+"""The plan across: against the quadratic programme solved by another program, and flown."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.optimize import minimize
+
+from dockair.nav.guidance.path_plan import PathPlan, PlanSettings
+
+SETTINGS = PlanSettings()
+ACCELERATION, JERK, STEP_S = 3.0, 12.0, 0.01
+TIMES = SETTINGS.node_s * np.arange(1, SETTINGS.nodes + 1)
+
+
+def _places(x, jerks):
+    """Places and accelerations at the nodes, integrated jerk by jerk."""
+    (y, v, a), h, places, accelerations = x, SETTINGS.node_s, [], []
+    for jerk in jerks:
+        y, v, a = y + v * h + a * h**2 / 2 + jerk * h**3 / 6, v + a * h + jerk * h**2 / 2, a + jerk * h
+        places.append(y)
+        accelerations.append(a)
+    return np.array(places), np.array(accelerations)
+
+
+def _exact(x, target, weights, price):
+    """First jerk of the programme by sequential quadratic programming on the integrated path."""
+
+    def cost(z):
+        return weights @ (_places(x, JERK * z)[0] - target) ** 2 + price * z @ z
+
+    room = {"type": "ineq", "fun": lambda z: 1.0 - np.abs(_places(x, JERK * z)[1]) / ACCELERATION}
+    start = np.zeros(SETTINGS.nodes)
+    found = minimize(cost, start, bounds=[(-1, 1)] * SETTINGS.nodes, constraints=[room], options={"maxiter": 400})
+    return JERK * found.x[0]
+
+
+def _settled(plan, x, target, to_contact_s=None, calm=False):
+    for _ in range(60):
+        jerk = plan.jerk_m_s3(np.asarray(x), target, to_contact_s, calm=calm)
+    return jerk
+
+
+@pytest.mark.parametrize(
+    ("x", "size", "phase"),
+    [
+        ((0.0, 0.0, 0.0), 0.05, 0.3),
+        ((0.1, -0.2, 1.0), 0.3, 2.0),
+        ((0.0, 0.5, -2.5), 0.6, 4.0),
+        ((0.2, 0.0, 2.9), 1.0, 1.0),
+    ],
+)
+def test_the_first_jerk_is_that_of_the_quadratic_programme(x, size, phase):
+    target = size * np.sin(2.5 * TIMES + phase)
+    expected = _exact(x, target, np.ones(SETTINGS.nodes), SETTINGS.jerk_price_m2)
+    assert _settled(PathPlan(SETTINGS, ACCELERATION, JERK), x, target) == pytest.approx(expected, abs=0.02 * JERK)
+
+
+def test_with_room_to_spare_it_is_the_least_squares_solution():
+    x, target = np.array([0.0, 0.02, 0.05]), 0.02 * np.sin(2.0 * TIMES)
+    basis = np.column_stack([_places((0, 0, 0), JERK * unit)[0] for unit in np.eye(SETTINGS.nodes)])
+    free = _places(x, np.zeros(SETTINGS.nodes))[0]
+    rows = np.vstack([basis, np.sqrt(SETTINGS.jerk_price_m2) * np.eye(SETTINGS.nodes)])
+    z = np.linalg.lstsq(rows, np.append(target - free, np.zeros(SETTINGS.nodes)), rcond=None)[0]
+    assert np.abs(z).max() < 0.5
+    assert _settled(PathPlan(SETTINGS, ACCELERATION, JERK), x, target) == pytest.approx(JERK * z[0], rel=1e-6)
+
+
+def _flown(drogue, seconds, contact_s=None, plan_settings=SETTINGS):
+    """Fly a plan against a drogue that is known ahead; the errors, accelerations and jerks, tick by tick."""
+    plan, (y, v, a), out = PathPlan(plan_settings, ACCELERATION, JERK), (drogue(0.0), 0.0, 0.0), []
+    for i in range(round(seconds / STEP_S)):
+        t = i * STEP_S
+        to_contact_s = None if contact_s is None else contact_s - t
+        jerk = plan.jerk_m_s3(np.array([0.0, v, a]), drogue(t + TIMES) - y, to_contact_s)
+        y, v, a = y + v * STEP_S + a * STEP_S**2 / 2, v + a * STEP_S + jerk * STEP_S**2 / 2, a + jerk * STEP_S
+        out.append((drogue(t + STEP_S) - y, a, jerk))
+    return np.array(out)
+
+
+def test_a_swing_within_the_limits_is_followed_to_a_centimetre():
+    errors = _flown(lambda t: 0.3 * np.sin(2.0 * t), 12.0)[300:, 0]  # 1.2 m/s^2, 2.4 m/s^3
+    assert np.abs(errors).max() < 0.01
+
+
+def test_a_swing_beyond_the_limits_is_met_at_the_moment_of_contact():
+    def swing(t):
+        return 0.6 * np.sin(2.7 * t)  # 4.4 m/s^2 of 3 that can be flown
+
+    followed = np.abs(_flown(swing, 12.0)[:, 0])
+    misses, meant = [], []
+    for contact_s in np.arange(6.0, 8.3, 0.29):
+        misses.append(abs(_flown(swing, contact_s, contact_s)[-1, 0]))
+        meant.append(followed[round(contact_s / STEP_S) - 1])
+    assert np.sqrt(np.mean(np.square(misses))) < 0.4 * np.sqrt(np.mean(np.square(meant)))
+
+
+def test_what_the_drogue_does_after_contact_does_not_matter():
+    x, target, plans = np.array([0.0, 0.1, 0.5]), 0.2 * np.sin(2.5 * TIMES), []
+    for later in (0.0, 0.3):
+        moved = np.where(TIMES > 0.5 + 3.0 * SETTINGS.contact_s, target + later, target)
+        plan = PathPlan(replace(SETTINGS, on_the_way=0.0), ACCELERATION, JERK)
+        plans.append(_settled(plan, x, moved, to_contact_s=0.5))
+    assert plans[0] == plans[1]
+
+
+def test_a_contact_that_is_overdue_is_met_at_the_first_node():
+    x, target = np.array([0.0, 0.1, 0.5]), 0.2 * np.sin(2.5 * TIMES)
+    now, overdue = (_settled(PathPlan(SETTINGS, ACCELERATION, JERK), x, target, t) for t in (SETTINGS.node_s, -1.0))
+    assert now == overdue
+
+
+def test_waiting_calmly_is_less_hasty():
+    x, target = np.zeros(3), np.full(SETTINGS.nodes, 0.2)
+    hasty, calm = (_settled(PathPlan(SETTINGS, ACCELERATION, JERK), x, target, calm=calm) for calm in (False, True))
+    assert 0.0 < calm < 0.5 * hasty
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    x=st.tuples(st.floats(-2, 2), st.floats(-3, 3), st.floats(-ACCELERATION, ACCELERATION)),
+    size=st.floats(0, 3),
+    rate=st.floats(0.5, 6),
+    to_contact_s=st.one_of(st.none(), st.floats(-1, 3)),
+)
+def test_no_jerk_is_beyond_the_limit_and_none_is_lost_to_nan(x, size, rate, to_contact_s):
+    plan = PathPlan(SETTINGS, ACCELERATION, JERK)
+    for _ in range(3):
+        assert abs(plan.jerk_m_s3(np.array(x), size * np.sin(rate * TIMES), to_contact_s)) <= JERK
