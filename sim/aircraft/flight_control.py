@@ -93,7 +93,7 @@ class FlightControl:
             ]
         )
         rates_rad_s = np.asarray(airframe.surface_rate_limits_rad_s)
-        self._relief = RateRelief(parameters.relief, airframe.actuator_bandwidth_rad_s, rates_rad_s, step_s)
+        self._relief = RateRelief(parameters.relief, airframe.actuator_bandwidth_rad_s, rates_rad_s, limits_rad, step_s)
         self.model = ModelFlight(airframe, trim.aerodynamics, step_s)
         self._x_m: Array = np.zeros(FOLLOWED)
         self._z: Array = np.zeros(3)
@@ -162,7 +162,7 @@ class FlightControl:
             self.reference.start(x[:3], R_FB, command)
         modelled = (model.R_WB, model.velocity_W, model.w_WB_B, model.actuators[:3], model.actuators[3])
         _state(path.axes(), *modelled, *about, R_FM, v_M, trim, x_m[:STATES])
-        share = self._relief.step(surfaces_command, surfaces_rad) if self._engaged else 1.0
+        share = self._relief.step(surfaces_command, surfaces_rad, model.actuators) if self._engaged else 1.0
         chain = self.reference.step(R_FB, command, x_m[ATTITUDE.start], share)
         measured = (x, v_B, force_B, specific_force_B, airspeed_m_s, trim, chain)
         gains = (row.C, row.K, row.K_followed, row.K_command, row.gust_from_residual)

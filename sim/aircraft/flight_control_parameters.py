@@ -40,6 +40,7 @@ class FlightControlParameters:
     relief_time_s: float
     relief_busy_share: float
     relief_least: float
+    relief_stop_share: float
     path_bandwidth_rad_s: float
     path_damping: float
     path_catching_up: float
@@ -103,7 +104,10 @@ class FlightControlParameters:
     def relief(self) -> RateReliefParameters:
         """Constants of what takes the reference back."""
         return RateReliefParameters(
-            time_s=self.relief_time_s, busy_share=self.relief_busy_share, least=self.relief_least
+            time_s=self.relief_time_s,
+            busy_share=self.relief_busy_share,
+            least=self.relief_least,
+            stop_share=self.relief_stop_share,
         )
 
     @property

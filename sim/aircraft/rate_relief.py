@@ -1,13 +1,15 @@
-"""Takes the reference back when a surface meets its rate limit, before haste and lag feed each other.
+"""Takes the reference back when a surface meets its rate limit or comes near its stop, before lag feeds on haste.
 
 A surface at its rate limit answers late; a loop that then asks for more drives it to the next stop, and an airframe
 that is not stable by itself departs. b is the part of the time, over T, for which some surface has been asked for more
 than its rate:
 
-    b' = (busy - b) / T,     busy = 1 where a |command - surface| > rate limit, else 0                    (1)
+    b' = (busy - b) / T,     busy = 1 where a |command - surface| > rate limit or |command| > c stop      (1)
     share = 1 - (1 - least) min(b / b_0, 1)                                                               (2)
 
-a is the actuators' bandwidth. The reference's limits of acceleration are multiplied by the share.
+a is the actuators' bandwidth; both the aircraft's surfaces and those of the model flight that it follows count, for the
+model says early what the aircraft will be asked for. The reference's limits of acceleration are multiplied by the
+share.
 Not modelled: a cause other than haste; surfaces that are busy with gusts alone take the reference back, too.
 Source: the idea of relieving a rate-limited loop is common practice against pilot-induced oscillations [Duda 1998,
 Flight control system design considering rate saturation, Aerospace Science and Technology 2(4)]; this form is our own.
@@ -26,6 +28,7 @@ class RateReliefParameters:
     time_s: float  #: T
     busy_share: float  #: b_0
     least: float
+    stop_share: float  #: c
 
 
 class RateRelief:
@@ -35,20 +38,31 @@ class RateRelief:
         parameters: constants.
         bandwidth_rad_s: a.
         rate_limits_rad_s: (3,) of elevator, aileron and rudder.
+        stops_rad: (3,) beyond which they do not go.
         step_s: length of a tick.
     """
 
     def __init__(
-        self, parameters: RateReliefParameters, bandwidth_rad_s: float, rate_limits_rad_s: Array, step_s: float
+        self,
+        parameters: RateReliefParameters,
+        bandwidth_rad_s: float,
+        rate_limits_rad_s: Array,
+        stops_rad: Array,
+        step_s: float,
     ) -> None:
         self._parameters = parameters
         self._largest = [float(rate) / bandwidth_rad_s for rate in rate_limits_rad_s]
+        self._stops = [parameters.stop_share * float(stop) for stop in stops_rad]
         self._keep = math.exp(-step_s / parameters.time_s)
         self._busy = 0.0
 
-    def step(self, commands_rad: Array, surfaces_rad: Array) -> float:
-        """Return the share after a tick in which the surfaces (3,) were sent to the commands (3,)."""
-        busy = any(abs(commands_rad[i] - surfaces_rad[i]) > self._largest[i] for i in range(3))
+    def step(self, commands_rad: Array, surfaces_rad: Array, modelled_rad: Array) -> float:
+        """Return the share after a tick: commands to the surfaces (3,), where these and the model's (3,) were."""
+        busy = any(
+            abs(commands_rad[i] - surfaces_rad[i]) > self._largest[i]
+            or max(abs(commands_rad[i]), abs(modelled_rad[i])) > self._stops[i]
+            for i in range(3)
+        )
         self._busy = self._keep * self._busy + (1.0 - self._keep if busy else 0.0)
         p = self._parameters
         return 1.0 - (1.0 - p.least) * min(self._busy / p.busy_share, 1.0)

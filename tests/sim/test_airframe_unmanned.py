@@ -1,4 +1,6 @@
-"""The second airframe: its derivatives, its modes."""
+"""The second airframe: its derivatives, its modes, its flight control."""
+
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -16,6 +18,7 @@ from dockair.sim.aircraft.trim import level_trim
 
 AIRFRAME = load_parameters("airframe_unmanned", DerivativeAirframe)
 RHO, V = 0.909, 120.0
+Command = Callable[[float, np.ndarray], ReceiverCommand]  # at a time, in an attitude
 MODEL = AIRFRAME.aerodynamics(RHO)
 QBAR_S = 0.5 * RHO * V * V * AIRFRAME.wing_area_m2
 
@@ -135,24 +138,24 @@ def test_its_modes_are_those_of_the_textbooks_approximations(airspeed_m_s: float
     assert np.all(model.lateral_roots.real < 1e-9) and np.all(model.longitudinal_roots.real < 0.0)
 
 
-@pytest.mark.parametrize("airspeed_m_s", [120.0, 180.0])
-def test_the_flight_control_of_the_fighter_flies_it_too(airspeed_m_s: float) -> None:
-    """Its gains are designed on the airframe that flies: steps of the probe's tip by 1 m/s to the left and up."""
+STEP_S = 2e-3
+
+
+def flown(sheet: str, airspeed_m_s: float, altitude_m: float, command: Command, seconds: float) -> np.ndarray:
+    """(n, 3) velocity of the probe's tip, flown as a free rigid body in still air."""
     probe_B = np.array(read_sheet("mounting_unmanned")["probe_tip_m"].value)
-    step_s, altitude_m = 2e-3, 3000.0 if airspeed_m_s < 150.0 else 6000.0
     receiver = Receiver(
         airframe=AIRFRAME,
-        flight_control=load_parameters("flight_control", FlightControlParameters, {"inertial_velocity_sigma_m_s": 0.0}),
+        flight_control=load_parameters(sheet, FlightControlParameters, {"inertial_velocity_sigma_m_s": 0.0}),
         probe_B=probe_B,
         airspeed_m_s=airspeed_m_s,
         air=standard_atmosphere(altitude_m),
-        step_s=step_s,
+        step_s=STEP_S,
         rng=np.random.default_rng(3),
     )
-    command = ReceiverCommand(velocity_m_s=np.array([0.0, 1.0, 1.0]))
     R, v, w = receiver.trim_R_WB.copy(), np.zeros(3), np.zeros(3)
     felt = R.T @ [0.0, 0.0, STANDARD_GRAVITY_M_S2]
-    log = np.empty((round(8.0 / step_s), 3))
+    log = np.empty((round(seconds / STEP_S), 3))
     for k in range(len(log)):
         force, torque = receiver.step(
             R_WB=R,
@@ -160,12 +163,47 @@ def test_the_flight_control_of_the_fighter_flies_it_too(airspeed_m_s: float) -> 
             w_WB_B=w,
             air_velocity_W=np.array([-airspeed_m_s, 0.0, 0.0]),
             specific_force_B=felt,
-            command=command,
+            command=command(k * STEP_S, R),
         )
         felt = R.T @ force / receiver.mass_kg
-        v = v + step_s * (force / receiver.mass_kg - [0.0, 0.0, STANDARD_GRAVITY_M_S2])
-        w = w + step_s * np.linalg.solve(receiver.inertia_B, R.T @ torque - np.cross(w, receiver.inertia_B @ w))
-        R = np.ascontiguousarray(R @ exp(w * step_s))
+        v = v + STEP_S * (force / receiver.mass_kg - [0.0, 0.0, STANDARD_GRAVITY_M_S2])
+        w = w + STEP_S * np.linalg.solve(receiver.inertia_B, R.T @ torque - np.cross(w, receiver.inertia_B @ w))
+        R = np.ascontiguousarray(R @ exp(w * STEP_S))
         log[k] = v + R @ np.cross(w, probe_B)
+    return log
+
+
+@pytest.mark.parametrize(("airspeed_m_s", "altitude_m"), [(120.0, 3000.0), (180.0, 6000.0)])
+def test_the_flight_control_of_the_fighter_flies_it_too(airspeed_m_s: float, altitude_m: float) -> None:
+    """Its gains are designed on the airframe that flies: steps of the probe's tip by 1 m/s to the left and up."""
+    step = ReceiverCommand(velocity_m_s=np.array([0.0, 1.0, 1.0]))
+    log = flown("flight_control", airspeed_m_s, altitude_m, lambda t, R: step, 8.0)
     assert np.all(log[:, 1:].max(axis=0) < 1.1)
     np.testing.assert_allclose(log[-1], [0.0, 1.0, 1.0], atol=0.05)
+
+
+@pytest.mark.parametrize(("hertz", "size_m_s", "least"), [(0.35, 0.6, 0.9), (0.5, 0.4, 0.85)])
+def test_its_own_flight_control_swings_the_tip_with_a_drogue_and_no_wider(
+    hertz: float, size_m_s: float, least: float
+) -> None:
+    """To the left in level axes, a third of a second late and nearly a pure swing.
+
+    A response wider than its command, as of weights that ask for more haste than the ailerons have, makes it and a
+    guidance that reckons with a delay alone sway about the drogue.
+    """
+    w = 2.0 * np.pi * hertz
+
+    def command(t: float, R_WB: np.ndarray) -> ReceiverCommand:
+        velocity = R_WB.T @ [0.0, size_m_s * np.sin(w * t), 0.0]
+        rate = R_WB.T @ [0.0, size_m_s * w * np.cos(w * t), 0.0]
+        return ReceiverCommand(velocity_m_s=velocity, acceleration_m_s2=rate)
+
+    settled_s = 2.0 / hertz
+    left = flown("flight_control_unmanned", 120.0, 3000.0, command, settled_s + 1.0 / hertz)[:, 1]
+    phase = w * STEP_S * np.arange(1, len(left) + 1)
+    last = phase > w * settled_s
+    waves = np.column_stack([np.sin(phase), np.cos(phase), np.ones_like(phase)])[last]
+    sine, cosine, _ = found = np.linalg.lstsq(waves, left[last], rcond=None)[0]
+    assert least < np.hypot(sine, cosine) / size_m_s < 1.02
+    assert -np.arctan2(cosine, sine) / w == pytest.approx(0.32, abs=0.04)
+    assert np.std(left[last] - waves @ found) < 0.05 * size_m_s

@@ -6,32 +6,45 @@ import pytest
 from dockair.sim.aircraft.rate_relief import RateRelief, RateReliefParameters
 
 STEP_S, BANDWIDTH = 1e-3, 20.0
+STOPS = np.array([0.4, 0.35, 0.5])
 RATES = np.array([1.0, 1.4, 2.0])  # asked for by 0.05, 0.07 and 0.1 rad
 CALM = np.zeros(3)
 
 
 @pytest.fixture
 def relief():
-    parameters = RateReliefParameters(time_s=0.5, busy_share=0.4, least=0.2)
-    return RateRelief(parameters, BANDWIDTH, RATES, STEP_S)
+    parameters = RateReliefParameters(time_s=0.5, busy_share=0.4, least=0.2, stop_share=0.9)
+    return RateRelief(parameters, BANDWIDTH, RATES, STOPS, STEP_S)
 
 
 def test_surfaces_that_keep_up_leave_the_reference_alone(relief):
     just_inside = 0.999 * RATES / BANDWIDTH
-    assert all(relief.step(just_inside, CALM) == 1.0 for _ in range(2000))
+    assert all(relief.step(just_inside, CALM, CALM) == 1.0 for _ in range(2000))
 
 
 @pytest.mark.parametrize("surface", range(3))
 def test_any_surface_at_its_rate_takes_the_reference_back(relief, surface):
     asked = CALM.copy()
     asked[surface] = -1.001 * RATES[surface] / BANDWIDTH
-    assert relief.step(asked, CALM) < 1.0
+    assert relief.step(asked, CALM, CALM) < 1.0
+
+
+@pytest.mark.parametrize("surface", range(3))
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_a_surface_near_its_stop_takes_the_reference_back_the_model_s_too(relief, surface, sign):
+    at = CALM.copy()
+    at[surface] = sign * 0.899 * STOPS[surface]
+    assert relief.step(at, at, at) == 1.0
+    at[surface] = sign * 0.901 * STOPS[surface]
+    assert relief.step(CALM, CALM, at) < 1.0
+    again = relief.step(at, at, CALM)
+    assert again < relief.step(CALM, CALM, CALM) < 1.0
 
 
 def test_the_share_falls_as_the_equations_say(relief):
     """b = 1 - exp(-t/T) while busy; the share is 1 - 0.8 b / 0.4, and no less than 0.2."""
     asked = np.array([0.2, 0.0, 0.0])
-    shares = [relief.step(asked, CALM) for _ in range(600)]
+    shares = [relief.step(asked, CALM, CALM) for _ in range(600)]
     t = STEP_S * np.arange(1, 601)
     expected = 1.0 - 0.8 * np.minimum((1.0 - np.exp(-t / 0.5)) / 0.4, 1.0)
     np.testing.assert_allclose(shares, expected, atol=1e-9)
@@ -40,6 +53,6 @@ def test_the_share_falls_as_the_equations_say(relief):
 
 def test_it_comes_back_when_the_surfaces_keep_up_again(relief):
     for _ in range(600):
-        relief.step(np.array([0.2, 0.0, 0.0]), CALM)
-    later = [relief.step(CALM, CALM) for _ in range(3000)]
+        relief.step(np.array([0.2, 0.0, 0.0]), CALM, CALM)
+    later = [relief.step(CALM, CALM, CALM) for _ in range(3000)]
     assert np.all(np.diff(later) >= 0.0) and later[-1] > 0.99
