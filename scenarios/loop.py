@@ -1,6 +1,6 @@
 """The closed loop, one control tick at a time: world, sensors, navigation, command.
 
-A command decided at one control tick reaches the flight control at the next: that is the time it takes to compute.
+A command decided at the end of a control tick is flown from the next one on. Not modelled: the time it takes to compute.
 A frame reaches the navigation when it has been exposed, read out and transferred; its stamp is the exposure's middle.
 """
 
