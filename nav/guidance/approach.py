@@ -133,9 +133,10 @@ class Guidance:
         self._committed = self._closure > 0.0 and (
             self._committed or distance_m <= room_to_stop_m(s.closing, self._closure)
         )
-        sign = 1.0 if self._good or self._committed else -1.0
+        falls_back = self._closure <= 0.0 and distance_m < s.closing.wait_at_m
+        sign = 1.0 if self._committed or (self._good and not falls_back) else -1.0
         closure = self._closure + sign * s.closure_acceleration_m_s2 * self._dt
-        least = -s.closing.retreat_m_s if distance_m < s.closing.wait_at_m else 0.0
+        least = -s.closing.retreat_m_s if falls_back else 0.0
         self._closure = min(max(closure, least), s.closure_speed_m_s)
         self._waiting_s = self._waiting_s + self._dt if self._closure <= 0.0 else 0.0
 
