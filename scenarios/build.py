@@ -51,7 +51,7 @@ SETTLE_S = 12.0  # hose and gusts run this long before the flight: several perio
 ATTEMPT_S = 15.0  # before a flight's time is over: an approach begun then still ends, with the probe clear again
 RESPONSE_S = {  # delay of the probe's tip forward, left, up, behind a command at 0.1-0.4 Hz, a control tick included
     "fighter": (0.28, 0.10, 0.10),
-    "unmanned": (0.40, 0.16, 0.10),
+    "unmanned": (0.40, 0.25, 0.10),
 }
 COMMANDED = 0.95  # of the accelerations that the flight control flies: what it cut off would be missing in guidance
 STAND_OFF_M = 4.0  # pre-contact: procedures say 3-5 m behind the drogue
