@@ -42,7 +42,7 @@ class PlanSettings:
     at_contact: float = 8.0  # W
     contact_s: float = 0.12  # s: the way from the ring to the coupling takes 0.2 s
     on_the_way: float = 0.03  # w_0: 1 m on the way counts like 0.06 m at contact
-    iterations: int = 40  # of Eq. (3): the jerk is then within 2 % of the limit of the exact one
+    iterations: int = 40  # of Eq. (3): the jerk is then 2 % of its limit off the exact one, on average
     error_max_m: float = 0.75  # a drogue farther off is gone to, not rushed at
 
 
