@@ -38,7 +38,7 @@ class PlanSettings:
     nodes: int = 16  # N
     node_s: float = 0.1  # h: with N, half a period of the drogue; longer is not predicted to any use
     jerk_price_m2: float = 0.01  # r
-    calm_price_m2: float = 1.0  # r where a swing is only waited for, and its middle followed
+    calm_price_m2: float = 30.0  # r where a swing is only waited for: half a metre is gone in 4 s, with 0.6 m/s^2
     at_contact: float = 8.0  # W
     contact_s: float = 0.12  # s: the way from the ring to the coupling takes 0.2 s
     on_the_way: float = 0.03  # w_0: 1 m on the way counts like 0.06 m at contact

@@ -129,3 +129,15 @@ def test_no_jerk_is_beyond_the_limit_and_none_is_lost_to_nan(x, size, rate, to_c
     plan = PathPlan(SETTINGS, ACCELERATION, JERK)
     for _ in range(3):
         assert abs(plan.jerk_m_s3(np.array(x), size * np.sin(rate * TIMES), to_contact_s)) <= JERK
+
+
+def test_waiting_calmly_goes_to_a_drogue_at_rest_without_haste():
+    plan, (y, v, a), places, accelerations = PathPlan(SETTINGS, ACCELERATION, JERK), (0.0, 0.0, 0.0), [], []
+    for _ in range(1500):
+        off = np.full(SETTINGS.nodes, min(1.0 - y, SETTINGS.error_max_m))
+        jerk = plan.jerk_m_s3(np.array([0.0, v, a]), off, None, calm=True)
+        y, v, a = y + v * STEP_S, v + a * STEP_S, a + jerk * STEP_S
+        places.append(y)
+        accelerations.append(abs(a))
+    assert max(accelerations) < 0.25 * ACCELERATION
+    assert max(places) < 1.2 and np.abs(np.array(places[800:]) - 1.0).max() < 0.05
