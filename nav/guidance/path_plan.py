@@ -38,7 +38,8 @@ class PlanSettings:
     nodes: int = 16  # N
     node_s: float = 0.1  # h: with N, half a period of the drogue; longer is not predicted to any use
     jerk_price_m2: float = 0.01  # r
-    calm_price_m2: float = 30.0  # r where a swing is only waited for: half a metre is gone in 4 s, with 0.6 m/s^2
+    #: r / j_max^2 where a swing is only waited for, whatever j_max: a metre is gone in 4 s, with 0.6 m/s^2.
+    calm_price_s6: float = 0.07
     at_contact: float = 8.0  # W
     contact_s: float = 0.12  # s: the way from the ring to the coupling takes 0.2 s
     on_the_way: float = 0.03  # w_0: 1 m on the way counts like 0.06 m at contact
@@ -80,7 +81,7 @@ class PathPlan:
         """
         s = self._settings
         weights = np.ones(s.nodes) if to_contact_s is None else self._weights(to_contact_s)
-        price = s.calm_price_m2 if calm else s.jerk_price_m2
+        price = s.calm_price_s6 * self._jerk**2 if calm else s.jerk_price_m2
         off = self._free @ x - places_m
         share = float(
             _first(self._place, self._C, weights, off, x[2] / self._a_max, price, self._v, self._p, s.iterations)
