@@ -86,18 +86,18 @@ class Flown:
     solutions: Sequence[NavSolution]  #: likewise
     p_PN_B: Array  #: (3,) tip of the nose from the probe's tip, body axes [m]
     faults: Collection[Fault] = ()
+    departed_s: float = field(init=False)  #: when the receiver departed from controlled flight; infinite if it did not
+
+    def __post_init__(self) -> None:
+        departure = Departure()
+        for truth in self.truths:
+            departure.watch(truth)
+        object.__setattr__(self, "departed_s", np.inf if departure.time_s is None else departure.time_s)
 
     @property
     def step_s(self) -> float:
         """Of control."""
         return self.truths[1].time_s - self.truths[0].time_s if len(self.truths) > 1 else np.inf
-
-    def departed_s(self) -> float:
-        """When the receiver departed from controlled flight; infinite if it did not."""
-        departure = Departure()
-        for truth in self.truths:
-            departure.watch(truth)
-        return np.inf if departure.time_s is None else departure.time_s
 
     def tick_at(self, time_s: float) -> int:
         """Last control tick not after a time."""
@@ -146,7 +146,7 @@ def cause_of_flight(attempts: Sequence[Attempt], flown: Flown, rules: CauseRules
         return last
     if not flown.truths:
         return "diverged"
-    if np.isfinite(flown.departed_s()):
+    if np.isfinite(flown.departed_s):
         return "departed"
     if attempts:
         return last
@@ -166,7 +166,7 @@ def _or_fault(cause: str, since_s: float, until_s: float, flown: Flown) -> str:
 def _cause(attempt: Attempt, flown: Flown, rules: CauseRules) -> str:
     if attempt.outcome == AttemptOutcome.DIVERGED.value:
         return "diverged"
-    if flown.departed_s() <= attempt.ended_s:
+    if flown.departed_s <= attempt.ended_s:
         return "departed"
     if attempt.outcome == AttemptOutcome.TIMEOUT.value:
         return "out_of_time"

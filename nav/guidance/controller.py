@@ -12,7 +12,7 @@ from dockair.rotations import Array
 class Sight:
     """The drogue in stabilised axes, forward, left, up."""
 
-    place_m: Array  #: (3,) ring centre from the probe's tip; across the coupling's, once past the ring
+    place_m: Array  #: (3,) ring centre from the probe's tip
     rate_m_s: Array  #: (3,) its rate
     push_m_s2: Array  #: (n, 3) what the bow wave does to it now and at the controller's `looks_ahead_s`
 
