@@ -70,7 +70,7 @@ def test_guidance_commands_the_announced_path_and_leans_on_the_drift_it_sees():
     told.announce(_said(starts_s=0.0, entry_s=0.1, climb=-0.05))
     path, turn = AnnouncedPath(), 0.0
     path.announce(_said(starts_s=0.0, entry_s=0.1, climb=-0.05))
-    for k in range(100):
+    for k in range(150):
         a, b = silent.step(drifting(0.01 * k)), told.step(drifting(0.01 * k, turn))  # the body turns as announced
         turn, _ = path.step(0.01)
     assert (a.turn_rate_rad_s, a.climb_rad) == (0.0, 0.0)
