@@ -35,6 +35,7 @@ from dockair.rotations import Array
 __all__ = ["Guidance", "GuidanceSettings", "PhaseLimits", "RelativeState"]
 
 _FOLLOWING = (Phase.JOIN_UP, Phase.PRE_CONTACT, Phase.APPROACH, Phase.CLEAR)
+_WAITING = (Phase.JOIN_UP, Phase.PRE_CONTACT)
 _TOUCHING = (Phase.CONTACT, Phase.HOLD, Phase.DISCONNECT)
 _RETREATING = (Phase.DISCONNECT, Phase.BACK_OFF, Phase.BREAKAWAY)
 
@@ -77,6 +78,8 @@ class Guidance:
         u_dot = self._follow(ring) if self._follows(state, ring) else self._hold_course()
         limit = np.array(self._settings.acceleration_limit_m_s2)
         change = self._dt * np.array(self._settings.jerk_limit_m_s3)
+        if self.phase in _WAITING:
+            limit[1:], change[1:] = self._settings.patient_share * limit[1:], self._settings.patient_share * change[1:]
         u_dot = np.clip(np.clip(u_dot, -limit, limit), self._u_dot - change, self._u_dot + change)
         self._u_dot = u_dot
         self._u = _limited(self._u + u_dot * self._dt, self._settings.velocity_limit_m_s)
@@ -182,7 +185,8 @@ class Guidance:
     def _follows(self, state: RelativeState, ring: Array) -> bool:
         """Whether the drogue is followed; not while it is on the probe or about it, or out of view."""
         clear = self.phase in (Phase.BACK_OFF, Phase.BREAKAWAY) and ring[0] > self._settings.limits.off_axis_range_m
-        return state.usable and (self.phase in _FOLLOWING or clear)
+        past = self.phase is Phase.APPROACH and self._inside_s > self._settings.funnel_s
+        return state.usable and not past and (self.phase in _FOLLOWING or clear)
 
     def _aim_now(self) -> Array:
         """(2,) off the drogue's predicted place, left and up: what is learnt applies to contact."""
@@ -219,7 +223,7 @@ class Guidance:
             target[0] += min(s.closure_speed_m_s, s.take_in_gain_1_s * to_go)
         elif self.phase in _RETREATING:
             target[0] -= s.back_off_speed_m_s
-        elif self.phase is Phase.APPROACH:  # out of view: on as before
+        elif self.phase is Phase.APPROACH:  # out of view, or in the basket: on as before
             target[0] = self._u[0]
         return np.asarray(s.course_gain_1_s * (target - self._u))
 

@@ -78,7 +78,9 @@ def time_to_contact_s(
         full: c at last [m/s].
         ramp: its rate [m/s^2].
     """
-    to_go = max(distance_m - settings.response_s * closure_m_s, 0.0)
+    to_go = distance_m - settings.response_s * closure_m_s
+    if to_go <= 0.0:  # there before what is commanded now is flown
+        return max(distance_m, 0.0) / closure_m_s if closure_m_s > 0.0 else 0.0
     ramping_s = max(full - closure_m_s, 0.0) / ramp
     ramped_m = (closure_m_s + 0.5 * ramp * ramping_s) * ramping_s
     if to_go <= ramped_m:

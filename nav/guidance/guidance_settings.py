@@ -20,7 +20,8 @@ class PredictiveSettings:
     along_gain_1_s: float = 0.5  # k: an eighth of 1 / tau, for the receiver is pushed about by gusts itself
     smoothing_1_s: float = 4.0  # how fast u goes to the u of Eq. (1) where it is not there
     bearable_share: float = 0.7  # of the limit of acceleration, rms: above it a swing's peaks are cut off every time
-    calm_share: float = 0.3  # of the gains, when a swing is only waited for: its middle moves in some 10 s
+    keep_away_m: float = 4.0  # farther astern of a swing that asks for twice what is bearable: another stand-off
+    excess_max: float = 1.5  # of that: three times what is bearable is severe turbulence
     bearing_s: float = 4.0  # over which that mean is taken: a swing and a half
     plan: PlanSettings = field(default_factory=PlanSettings)
     swing: SwingSettings = field(default_factory=SwingSettings)
@@ -48,10 +49,12 @@ class GuidanceSettings:
     response_s: tuple[float, float, float] = (0.28, 0.10, 0.10)  # tau: delay of the tip, computing included
     acceleration_limit_m_s2: tuple[float, float, float] = (0.75, 1.9, 1.9)  # less than the flight control's
     jerk_limit_m_s3: tuple[float, float, float] = (3.8, 6.6, 7.6)  # likewise
+    patient_share: float = 0.6  # of both limits across before an approach: what needs more is no calm moment
     velocity_limit_m_s: float = 3.5
     closure_acceleration_m_s2: float = 0.6  # how fast the closure speed is asked for
     take_in_gain_1_s: float = 0.35  # speed into the refuelling range per metre to go; a third of the next: no overshoot
     course_gain_1_s: float = 1.2  # how fast a course without a view of the drogue is taken up
+    funnel_s: float = 0.25  # from the ring to the coupling; what the drogue does after that is the probe's own doing
     levelling_s: float = 10.0  # of the stabilised axes: long beside the swing, short beside a turn
     turn_gain_rad_m: float = 1e-3  # k_r: at 180 m/s a drift across goes within 6 s, slow beside the swing
     turn_learning_s: float = 10.0  # T_r: the turn's error is known when the probe is in the basket and sees no drift

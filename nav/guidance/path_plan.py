@@ -7,9 +7,10 @@ limits, and z = j / j_max,
     minimise  sum_k w_k (y_k - y_D,k)^2 + r sum_k z_k^2     with |z_k| <= 1, |y''_k| <= a_max             (1)
 
 is a convex quadratic programme; the first jerk is flown, and the next tick plans anew. Following the drogue, w = 1;
-on the way to a contact that is t_c away only the miss at that moment counts, but for a little on the way:
+on the way to a contact that is t_r away only the miss about that moment counts, but for a little on the way, and the
+moment is when the tip is half-way from the ring to the coupling, lest it sweeps across the basket:
 
-    w_k = w_0 + W exp(-(t_k - t_c)^2 / 2 s^2),    w_k = w_0 from t_c + 2 s on                              (2)
+    w_k = w_0 + W exp(-(t_k - t_c)^2 / 2 s^2),    w_k = w_0 from t_c + 2 s on,    t_c = t_r + half_way     (2)
 
 (1) is solved by a set number of steps of the alternating direction method of multipliers, beginning at the last tick's
 solution: with C z in [lo, hi] for both limits, and f the gradient at z = 0,
@@ -41,6 +42,7 @@ class PlanSettings:
     #: r / j_max^2 where a swing is only waited for, whatever j_max: a metre is gone in 4 s, with 0.6 m/s^2.
     calm_price_s6: float = 0.07
     at_contact: float = 8.0  # W
+    half_way_s: float = 0.1  # from the ring to the coupling
     contact_s: float = 0.12  # s: the way from the ring to the coupling takes 0.2 s
     on_the_way: float = 0.03  # w_0: 1 m on the way counts like 0.06 m at contact
     iterations: int = 40  # of Eq. (3): the jerk is then 2 % of its limit off the exact one, on average
@@ -76,7 +78,7 @@ class PathPlan:
         Args:
             x: (3,) place [m], rate [m/s] and acceleration [m/s^2] as commanded.
             places_m: (N,) y_D, the first h from now.
-            to_contact_s: t_c, None to follow.
+            to_contact_s: t_r, None to follow.
             calm: at the price of a swing that is only waited for.
         """
         s = self._settings
@@ -90,7 +92,7 @@ class PathPlan:
 
     def _weights(self, to_contact_s: float) -> Array:
         """(N,) Eq. (2); a contact that is there already is met at the first node."""
-        s, t_c = self._settings, max(to_contact_s, self._settings.node_s)
+        s, t_c = self._settings, max(to_contact_s + self._settings.half_way_s, self._settings.node_s)
         near = np.exp(-0.5 * ((self._times - t_c) / s.contact_s) ** 2)
         near[self._times > t_c + _UNTIL * s.contact_s] = 0.0
         return np.asarray(s.on_the_way + s.at_contact * near)

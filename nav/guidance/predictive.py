@@ -12,11 +12,14 @@ predicted and flown against like the drogue's own motion, with the same filter.
 
 A swing that asks for more than a share of the acceleration that the receiver may fly (rms over some swings) is not
 followed but waited for astern: then y_D is the middle of the swing, and haste has a higher price. In gusts that move
-the drogue so much the surfaces have no rate to spare for haste.
+the drogue so much the surfaces have no rate to spare for haste, and drogue and receiver come together by metres
+unasked: the more the swing asks for, the farther astern it is waited for.
 
 Not modelled: limits of the airframe beyond those of acceleration and jerk; what they cut off is missing from y_r's
 scale until it is seen.
 """
+
+from dataclasses import replace
 
 import numpy as np
 
@@ -103,21 +106,24 @@ class Predictive:
 
     def rate(self, u: Array, wanted: Wanted) -> Array:
         """(3,) du/dt of Eq. (1) along, of the plan across."""
-        bearable = wanted.must_follow or bool((self._asked <= self._bearable).all())
+        excess = float(np.sqrt((self._asked / self._bearable).max())) - 1.0
+        bearable = wanted.must_follow or excess <= 0.0
+        if wanted.distance_m is not None and not bearable:
+            away_m = self._settings.keep_away_m * min(excess, self._settings.excess_max)
+            wanted = replace(wanted, distance_m=wanted.distance_m + away_m)
         return np.append(self._along(u, wanted, bearable), self._across(u, wanted, bearable))
 
     def _along(self, u: Array, wanted: Wanted, bearable: bool) -> float:
         """Eq. (1)."""
         s = self._settings
-        calm = 1.0 if bearable else s.calm_share
-        gain = calm * s.along_gain_1_s
+        gain = s.along_gain_1_s
         place, velocity, acceleration = (v[0] for v in (self._ahead if bearable else self._motion.mean_ahead()))
         if wanted.distance_m is None:
             speed, change = wanted.speed_m_s, 0.0
         else:
             to_go = place - self._own.place_ahead_m[0] - wanted.distance_m
             speed, change = clipped(gain * to_go, wanted.speed_m_s), gain * (velocity - u[0])
-        return float(acceleration + change + calm * s.smoothing_1_s * (velocity + speed - u[0]))
+        return float(acceleration + change + s.smoothing_1_s * (velocity + speed - u[0]))
 
     def _across(self, u: Array, wanted: Wanted, bearable: bool) -> Array:
         """(2,) next acceleration of the plans, left and up."""

@@ -8,7 +8,7 @@ The command becomes a smooth reference (c, a, j) (`reference`). A model of the a
 gains of `regulator` (`model_flight`); surfaces and thrust are the model's and what brings the aircraft to it:
 
     u_m = -K_m (x_m, z_m) - K_c (c, a, j),     z_m' = C x_m - c                                           (1)
-    command = trim + u_m - K (x - x_m) - K_z z - K_g g,     z' = C (x - x_m)                              (2)
+    command = trim + u_m - K_h (x - x_m, z, g),     z' = C (x - x_m),     K_h = (1 - h) K + h K_busy      (2)
 
 x and x_m are the states of aircraft and model beyond the path's trim, which may move, with velocities such that C x is
 the tip's at every bank; the attitude is carried on over the sensors' lag, the model's rates are as late as the measured
@@ -18,7 +18,8 @@ airspeed beyond that of the inertial velocity, through a first-order low pass. A
 is countered like one. At its first step the control engages without a bump: the model starts from trim with the
 aircraft's velocity, g from its measurement, and z, in a trim of air that sinks, from what holds it.
 What keeps the model inside the actuators' limits are those of the reference, which are taken back where a surface meets
-its rate limit or comes near its stop (`rate_relief`); beyond them the aircraft falls behind its model, and comes back.
+its rate limit or comes near its stop (`rate_relief`); beyond them the aircraft falls behind its model, and comes back. As long as surfaces are
+busy (h of `rate_relief`) the feedback asks for less, so that gusts too large to be met do not drive the airframe apart.
 
 Valid while the aircraft stays near the path's trim (attitude within some 30 degrees, airspeed within some 10 m/s).
 Not modelled: structural modes, quantisation, delay of computing beyond a tick; its model of the airframe is exact.
@@ -73,6 +74,7 @@ class FlightControl:
         wanted = Design(
             point_B=probe_B,
             feedback=parameters.tolerances,
+            busy=parameters.busy_tolerances,
             following=parameters.following_tolerances,
             gust_1_s=trim.airspeed_m_s / parameters.gust_length_m,
             swing=parameters.swing,
@@ -165,7 +167,9 @@ class FlightControl:
         share = self._relief.step(surfaces_command, surfaces_rad, model.actuators) if self._engaged else 1.0
         chain = self.reference.step(R_FB, command, x_m[ATTITUDE.start], share)
         measured = (x, v_B, force_B, specific_force_B, airspeed_m_s, trim, chain)
-        gains = (row.C, row.K, row.K_followed, row.K_command, row.gust_from_residual)
+        haste = self._relief.haste
+        K = row.K if haste == 0.0 else (1.0 - haste) * row.K + haste * row.K_busy
+        gains = (row.C, K, row.K_followed, row.K_command, row.gust_from_residual)
         memory = (x_m, self._w_m, self._z, self._gust, self._force_B)
         limits = (self._engaged, self._limits, self._constants)
         thrust_command_n = _command(*measured, *gains, *memory, *limits, surfaces_command, commands_m)

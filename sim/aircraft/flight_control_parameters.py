@@ -41,6 +41,7 @@ class FlightControlParameters:
     relief_busy_share: float
     relief_least: float
     relief_stop_share: float
+    busy_tolerance_factors: Array  #: (4,) velocity, integral, attitude, rate
     path_bandwidth_rad_s: float
     path_damping: float
     path_catching_up: float
@@ -69,6 +70,11 @@ class FlightControlParameters:
             surfaces_rad=self.surface_tolerance_rad,
             thrust_m_s2=self.thrust_tolerance_m_s2,
         )
+
+    @property
+    def busy_tolerances(self) -> Tolerances:
+        """Weights of the feedback where surfaces are at their limits."""
+        return self.tolerances.relaxed(self.busy_tolerance_factors)
 
     @property
     def following_tolerances(self) -> Tolerances:

@@ -18,7 +18,16 @@ from dockair.sim.aircraft.trim import Trim, steady_trim
 
 NODE_RAD = float(np.radians(5.0))
 
-_SHAPES = ((10,), (STATES, STATES), (3, STATES), (INPUTS, STATES + 6), (INPUTS, FOLLOWED), (INPUTS, 9), (3, 3))
+_SHAPES = (
+    (10,),
+    (STATES, STATES),
+    (3, STATES),
+    (INPUTS, STATES + 6),
+    (INPUTS, STATES + 6),
+    (INPUTS, FOLLOWED),
+    (INPUTS, 9),
+    (3, 3),
+)
 _ENDS = np.cumsum([int(np.prod(shape)) for shape in _SHAPES])
 #: In `Row.trim`.
 ATTITUDE_0, RATE_0, SURFACES_0, THRUST_0 = slice(0, 3), slice(3, 6), slice(6, 9), 9
@@ -32,6 +41,7 @@ class Row:
     A: Array  #: (13, 13)
     C: Array  #: (3, 13)
     K: Array  #: (4, 19)
+    K_busy: Array  #: (4, 19)
     K_followed: Array  #: (4, 16)
     K_command: Array  #: (4, 9)
     gust_from_residual: Array  #: (3, 3)
@@ -49,6 +59,7 @@ class Design:
 
     point_B: Array  #: (3,) the probe's tip from the centre of gravity [m]
     feedback: Tolerances
+    busy: Tolerances
     following: Tolerances
     gust_1_s: float
     swing: Swing
@@ -98,6 +109,7 @@ class GainSchedule:
             model,
             tip_velocity(trim.R_WB, wanted.point_B),
             wanted.feedback,
+            wanted.busy,
             wanted.following,
             wanted.gust_1_s,
             wanted.swing,
@@ -105,7 +117,7 @@ class GainSchedule:
         # airspeed beyond the inertial one gives the gust along the path, the accelerometers the two across
         gust = np.linalg.inv(np.vstack([[1.0, 0.0, 0.0], model.F_gust[1:]]))
         at_trim = [roll_pitch_yaw(trim.R_WB), trim.w_WB_B, trim.surfaces_rad, [trim.thrust_n / self._airframe.mass_kg]]
-        matrices = (model.A, gains.C, gains.K, gains.K_followed, gains.K_command, gust)
+        matrices = (model.A, gains.C, gains.K, gains.K_busy, gains.K_followed, gains.K_command, gust)
         return model, gains, np.concatenate([*at_trim, *(matrix.ravel() for matrix in matrices)])
 
 

@@ -5,11 +5,12 @@ that is not stable by itself departs. b is the part of the time, over T, for whi
 than its rate:
 
     b' = (busy - b) / T,     busy = 1 where a |command - surface| > rate limit or |command| > c stop      (1)
-    share = 1 - (1 - least) min(b / b_0, 1)                                                               (2)
+    share = 1 - (1 - least) h                                                                             (2)
+    h = min(b / b_0, 1)                                                                                   (3)
 
 a is the actuators' bandwidth; both the aircraft's surfaces and those of the model flight that it follows count, for the
 model says early what the aircraft will be asked for. The reference's limits of acceleration are multiplied by the
-share.
+share, and the feedback goes over to gains that ask for less by h (`flight_control`).
 Not modelled: a cause other than haste; surfaces that are busy with gusts alone take the reference back, too.
 Source: the idea of relieving a rate-limited loop is common practice against pilot-induced oscillations [Duda 1998,
 Flight control system design considering rate saturation, Aerospace Science and Technology 2(4)]; this form is our own.
@@ -23,7 +24,7 @@ from dockair.rotations import Array
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RateReliefParameters:
-    """Constants of Eqs. (1) and (2)."""
+    """Constants of Eqs. (1) to (3)."""
 
     time_s: float  #: T
     busy_share: float  #: b_0
@@ -32,7 +33,7 @@ class RateReliefParameters:
 
 
 class RateRelief:
-    """Eqs. (1) and (2), one tick at a time.
+    """Eqs. (1) to (3), one tick at a time.
 
     Args:
         parameters: constants.
@@ -64,5 +65,9 @@ class RateRelief:
             for i in range(3)
         )
         self._busy = self._keep * self._busy + (1.0 - self._keep if busy else 0.0)
-        p = self._parameters
-        return 1.0 - (1.0 - p.least) * min(self._busy / p.busy_share, 1.0)
+        return 1.0 - (1.0 - self._parameters.least) * self.haste
+
+    @property
+    def haste(self) -> float:
+        """Eq. (3)."""
+        return min(self._busy / self._parameters.busy_share, 1.0)

@@ -6,6 +6,9 @@ Tip at p from the centre of gravity, w the angular velocity beyond trim, R_trim 
 
     y = C x = v + R_trim (w x p)                                                                            (1)
 
+Surfaces at their limits answer late, and a feedback that asks for more drives an airframe that is not stable by itself
+apart: K_busy tolerates more of everything but the surfaces, and asks for a third.
+
 Feedback knows the gust as the flight control thinks of it, dg/dt = -(V/L) g + noise:
 
     u = -K x - K_z z - K_g g,     K = R^-1 B' P,     P of the algebraic Riccati equation                   (2)
@@ -20,7 +23,7 @@ Eq. (3): slowly the aircraft translates by bank and angle of attack, fast it poi
 Source: Anderson & Moore, Optimal Control: Linear Quadratic Methods, chapter 4 (tracking a reference with a model).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import solve_continuous_are, solve_sylvester
@@ -43,6 +46,16 @@ class Tolerances:
     surfaces_rad: Array  #: (3,) elevator, aileron, rudder
     thrust_m_s2: float
 
+    def relaxed(self, factors: Array) -> "Tolerances":
+        """The same for the actuators; (4,) times as much of velocity, integral, attitude and rate."""
+        return replace(
+            self,
+            velocity_m_s=factors[0] * self.velocity_m_s,
+            integral_m=factors[1] * self.integral_m,
+            attitude_rad=factors[2] * self.attitude_rad,
+            rate_rad_s=factors[3] * self.rate_rad_s,
+        )
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Swing:
@@ -58,6 +71,7 @@ class Gains:
 
     C: Array  #: (3, 13)
     K: Array  #: (4, 19) on x, z, g
+    K_busy: Array  #: (4, 19) likewise, for surfaces at their limits
     K_followed: Array  #: (4, 16) on x, z of the model that is followed
     K_command: Array  #: (4, 9) on c, a, j
 
@@ -70,7 +84,13 @@ def tip_velocity(R_trim: Array, point_B: Array) -> Array:
 
 
 def design(
-    model: LinearModel, C: Array, feedback: Tolerances, following: Tolerances, gust_1_s: float, swing: Swing
+    model: LinearModel,
+    C: Array,
+    feedback: Tolerances,
+    busy: Tolerances,
+    following: Tolerances,
+    gust_1_s: float,
+    swing: Swing,
 ) -> Gains:
     """Gains for a linear model.
 
@@ -78,6 +98,7 @@ def design(
         model: the aircraft about trim.
         C: (3, 13) the velocity that is held.
         feedback: weights against gusts and errors of the model.
+        busy: likewise, where surfaces are at their limits.
         following: weights of the flight to be flown.
         gust_1_s: V/L of the gusts expected [1/s].
         swing: how commands are expected to go on.
@@ -86,10 +107,10 @@ def design(
     A_gust = np.zeros((STATES + 6, STATES + 6))
     A_gust[:FOLLOWED, :FOLLOWED], A_gust[:STATES, _G], A_gust[_G, _G] = A, model.B_gust, -gust_1_s * np.eye(3)
     B_gust = np.vstack([B, np.zeros((3, INPUTS))])
-    K, _ = _riccati(A_gust, B_gust, C, feedback)
+    K, K_busy = (_riccati(A_gust, B_gust, C, tolerances)[0] for tolerances in (feedback, busy))
     K_followed, P = _riccati(A, B, C, following)
     K_command = _feed_forward(A - B @ K_followed, B, C, P, following, swing)
-    return Gains(C=C, K=K, K_followed=K_followed, K_command=K_command)
+    return Gains(C=C, K=K, K_busy=K_busy, K_followed=K_followed, K_command=K_command)
 
 
 def _with_integral(model: LinearModel, C: Array) -> tuple[Array, Array]:

@@ -125,7 +125,7 @@ def test_prediction_meets_a_swing_that_the_pid_is_too_late_for():
     loose = dataclasses.replace(PID, limits=PhaseLimits(capture_radius_m=1.0), **strong)
     fly(ours, settings=dataclasses.replace(SETTINGS, **strong))
     fly(theirs, settings=loose)
-    assert ours.radial_at_contact < 0.04  # of 0.3 m
+    assert ours.radial_at_contact < 0.05  # of 0.3 m, at the ring; the swing is met half-way to the coupling
     assert theirs.radial_at_contact > 0.1
 
 

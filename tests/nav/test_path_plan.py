@@ -108,7 +108,7 @@ def test_what_the_drogue_does_after_contact_does_not_matter():
 
 def test_a_contact_that_is_overdue_is_met_at_the_first_node():
     x, target = np.array([0.0, 0.1, 0.5]), 0.2 * np.sin(2.5 * TIMES)
-    now, overdue = (_settled(PathPlan(SETTINGS, ACCELERATION, JERK), x, target, t) for t in (SETTINGS.node_s, -1.0))
+    now, overdue = (_settled(PathPlan(SETTINGS, ACCELERATION, JERK), x, target, t) for t in (0.0, -1.0))
     assert now == overdue
 
 

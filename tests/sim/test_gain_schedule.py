@@ -22,6 +22,7 @@ def schedule() -> GainSchedule:
     wanted = Design(
         point_B=np.array([6.0, -0.9, 0.6]),
         feedback=PARAMETERS.tolerances,
+        busy=PARAMETERS.busy_tolerances,
         following=PARAMETERS.following_tolerances,
         gust_1_s=0.34,
         swing=PARAMETERS.swing,

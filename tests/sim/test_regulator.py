@@ -31,7 +31,7 @@ def designed(sheet: str, airspeed_m_s: float, altitude_m: float) -> tuple[Linear
     trim = level_trim(airframe, airspeed_m_s, standard_atmosphere(altitude_m))
     model, C = linear_model(airframe, trim), tip_velocity(trim.R_WB, PROBES[sheet])
     gust_1_s = airspeed_m_s / p.gust_length_m
-    return model, design(model, C, p.tolerances, p.following_tolerances, gust_1_s, p.swing)
+    return model, design(model, C, p.tolerances, p.busy_tolerances, p.following_tolerances, gust_1_s, p.swing)
 
 
 def loop(model: LinearModel, C: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -203,7 +203,7 @@ def test_gains_of_a_left_turn_mirror_those_of_a_right_one() -> None:
         trim = steady_trim(airframe, 180.0, air, turn_rate_rad_s=0.025 * sign)
         model, point = linear_model(airframe, trim), np.array([6.0, -0.9 * sign, 0.6])
         C = tip_velocity(trim.R_WB, point)
-        found.append(design(model, C, p.tolerances, p.following_tolerances, 0.34, p.swing).K)
+        found.append(design(model, C, p.tolerances, p.busy_tolerances, p.following_tolerances, 0.34, p.swing).K)
     state = np.array([1, -1, 1, -1, 1, -1, -1, 1, -1, 1, -1, -1, 1, 1, -1, 1, 1, -1, 1], dtype=float)
     surfaces = np.array([1.0, -1.0, -1.0, 1.0])
     np.testing.assert_allclose(found[0], surfaces[:, None] * found[1] * state, atol=3e-3 * np.abs(found[0]).max())
