@@ -130,10 +130,11 @@ def test_prediction_meets_a_swing_that_the_pid_is_too_late_for():
 
 
 def test_a_swing_beyond_the_airframe_s_acceleration_is_waited_for_astern():
-    plant, late = Plant(drogue=lambda t: 3.0 * _swing(t)), []  # 6 m/s^2 where 1.9 may be flown
+    plant, late, away = Plant(drogue=lambda t: 3.0 * _swing(t)), [], []  # 6 m/s^2 where 1.9 may be flown
 
     def watched(s):
         late.extend([np.abs(plant.v[1:]).max()] if plant.t > 20.0 else [])
+        away.extend([s.p_PD_B[0]] if plant.t > 30.0 else [])
         return s
 
     phases, _ = fly(
@@ -141,6 +142,38 @@ def test_a_swing_beyond_the_airframe_s_acceleration_is_waited_for_astern():
     )
     assert Phase.APPROACH not in phases and phases[-1] is Phase.CLEAR
     assert max(late) < 0.7  # of the drogue's 2.3 m/s
+    swing = SETTINGS.predictive
+    assert np.mean(away[: 10 * RATE_HZ]) == pytest.approx(
+        SETTINGS.stand_off_m + swing.keep_away_m * swing.excess_max, abs=0.3
+    )
+
+
+def test_what_comes_before_an_approach_is_flown_with_a_share_of_the_limits():
+    guidance, plant, used = Guidance(SETTINGS, RATE_HZ), Plant(drogue=_swing), {}
+    now = plant.step(ReceiverCommand())
+    for _ in range(40 * RATE_HZ):
+        command = guidance.step(now)
+        used.setdefault(guidance.phase, []).append(np.abs(command.acceleration_m_s2[1:]).max())
+        now = plant.step(command)
+    limit = max(SETTINGS.acceleration_limit_m_s2[1:])
+    assert 0.9 < max(used[Phase.PRE_CONTACT]) / (SETTINGS.patient_share * limit) < 1.0 + 1e-9
+
+
+def test_past_the_ring_the_drogue_is_followed_no_longer_than_the_way_to_the_coupling_takes():
+    """It swings away as the tip stands in the basket: what was foreseen of it must not drag the probe along."""
+    plant, guidance, inside = Plant(drogue=lambda t: 0.7 * _swing(t)), Guidance(SETTINGS, RATE_HZ), []
+    now = plant.step(ReceiverCommand())
+    for _ in range(90 * RATE_HZ):
+        stuck = guidance.phase is Phase.APPROACH and (inside or now.p_PD_B[0] < 0.0)
+        command = guidance.step(state([-0.1, 0.0, 0.0]) if stuck else now)
+        if inside and guidance.phase is not Phase.APPROACH:
+            break
+        if stuck:
+            inside.append(np.abs(command.acceleration_m_s2[1:]).max())
+        now = plant.step(command)
+    ends = round(SETTINGS.funnel_s * RATE_HZ)
+    assert len(inside) > 2 * ends
+    assert max(inside[2 * ends :]) < 0.5 * max(inside[:ends])
 
 
 def test_a_drogue_that_cannot_be_followed_is_not_closed_upon():

@@ -5,6 +5,8 @@ import pytest
 
 from dockair.rotations import exp
 from dockair.scenarios.departure import Departure, DepartureLimits
+from dockair.scenarios.loop import Flight
+from dockair.scenarios.schema import load_scenario
 
 STEP_S = 0.01
 
@@ -61,3 +63,15 @@ def test_far_behind_is_not_off_the_line_whichever_way_the_tanker_flies(departed_
 def test_limits_are_settings(departed_s):
     strict = DepartureLimits(angle_rad=0.01, angle_s=0.1)
     assert departed_s(pulse(0.2, 0.02), limits=strict) == pytest.approx(2.0, abs=STEP_S)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("factors", "departs"), [([1.0, 1.0, 1.0, 1.0], True), (None, False)])
+def test_severe_gusts_drive_an_airframe_apart_whose_feedback_does_not_give_way(factors, departs):
+    """On perfect navigation, waiting: with the gains for busy surfaces it flies on, without them it departs."""
+    changed = {} if factors is None else {"parameters.flight_control.busy_tolerance_factors": factors}
+    flight = Flight(load_scenario("severe_gusts", {"navigation.navigator": "truth", **changed}), 314, overlap=False)
+    while flight.truth.time_s < 37.0:
+        flight.step()
+    unsafe = [what for what in flight.referee.unsafe if what.startswith("departed")]
+    assert bool(unsafe) == departs

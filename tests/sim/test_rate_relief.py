@@ -20,6 +20,7 @@ def relief():
 def test_surfaces_that_keep_up_leave_the_reference_alone(relief):
     just_inside = 0.999 * RATES / BANDWIDTH
     assert all(relief.step(just_inside, CALM, CALM) == 1.0 for _ in range(2000))
+    assert relief.haste == 0.0
 
 
 @pytest.mark.parametrize("surface", range(3))
@@ -49,6 +50,7 @@ def test_the_share_falls_as_the_equations_say(relief):
     expected = 1.0 - 0.8 * np.minimum((1.0 - np.exp(-t / 0.5)) / 0.4, 1.0)
     np.testing.assert_allclose(shares, expected, atol=1e-9)
     assert shares[-1] == pytest.approx(0.2)
+    assert relief.haste == 1.0
 
 
 def test_it_comes_back_when_the_surfaces_keep_up_again(relief):

@@ -67,6 +67,28 @@ def test_closed_loops_are_stable_and_damped(sheet: str, airspeed_m_s: float, alt
     assert np.linalg.eigvals(A - B @ gains.K_followed).real.max() < -0.02
 
 
+@pytest.mark.parametrize("haste", [0.25, 0.5, 0.75, 1.0])
+@every_flight
+def test_every_mixture_with_the_gains_for_busy_surfaces_is_stable_and_damped(
+    sheet: str, airspeed_m_s: float, altitude_m: float, haste: float
+) -> None:
+    model, gains = designed(sheet, airspeed_m_s, altitude_m)
+    A, B = loop(model, gains.C)
+    poles = np.linalg.eigvals(A - B @ ((1.0 - haste) * gains.K + haste * gains.K_busy)[:, :FOLLOWED])
+    assert poles.real.max() < -0.02
+    assert np.min(-poles.real / np.abs(poles)) > 0.3
+
+
+@every_flight
+def test_errors_of_attitude_and_rate_ask_busy_surfaces_for_less_than_half(
+    sheet: str, airspeed_m_s: float, altitude_m: float
+) -> None:
+    _, gains = designed(sheet, airspeed_m_s, altitude_m)
+    for errors in (slice(3, 6), RATE):
+        busy, calm = (np.linalg.norm(K[:3, errors]) for K in (gains.K_busy, gains.K))
+        assert busy < 0.5 * calm
+
+
 @pytest.mark.parametrize("broken", range(INPUTS), ids=["elevator", "aileron", "rudder", "thrust"])
 @every_flight
 def test_each_loop_has_margin_at_its_actuator(sheet: str, airspeed_m_s: float, altitude_m: float, broken: int) -> None:
