@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from dockair.errors import DockairError
 from dockair.messages import ReceiverCommand
+from dockair.scenarios.attempts import succeeded
 from dockair.scenarios.envs_judge import AttemptJudge
 from dockair.scenarios.envs_tables import ACTION, OUTCOME_REWARD, RETRY_REWARD, action_cost, box, truth_info
 from dockair.scenarios.envs_viewer import LiveViewer
@@ -211,12 +212,16 @@ class Episodes(gymnasium.Env[Obs, NDArray[np.float32]], Generic[Obs]):
         assert self._flight is not None and self._tick is not None
         tick, outcome = self._tick, self._outcome
         return {
-            "is_success": outcome is Outcome.CONTACT,
+            "is_success": outcome is Outcome.CONTACT and self._docked_well(),
             "outcome": outcome.value if outcome is not None else "",
             "attempt": self._judge.number,
             "phase": tick.solution.phase,
             "truth": truth_info(tick.truth, self._distance_m(tick.truth), self._flight.referee.contact),
         }
+
+    def _docked_well(self) -> bool:
+        assert self._flight is not None and self._tick is not None
+        return succeeded(self._flight.referee.attempt_log(self._tick.truth.time_s, self._outcome))
 
 
 def check_choice(name: str, value: str | None, exists: tuple[str | None, ...]) -> None:

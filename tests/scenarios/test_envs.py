@@ -15,6 +15,7 @@ from gymnasium.utils.env_checker import check_env
 import dockair
 from dockair.errors import DockairError
 from dockair.messages import LedObservation
+from dockair.scenarios.attempts import Attempt
 from dockair.scenarios.envs import DockEnv, DockFastEnv, DockPixelsEnv
 from dockair.scenarios.envs_tables import (
     ACTION,
@@ -26,7 +27,7 @@ from dockair.scenarios.envs_tables import (
     observation_from,
 )
 from dockair.scenarios.loop import Flight, Tick
-from dockair.scenarios.referee import Outcome
+from dockair.scenarios.referee import Outcome, Referee
 from dockair.scenarios.schema import load_scenario
 
 #: The world without camera: what is tested here does not depend on who navigates.
@@ -167,6 +168,17 @@ def test_the_end_of_time_truncates_and_what_comes_after_is_refused(env):
     assert not info["is_success"]
     with pytest.raises(gymnasium.error.ResetNeeded):
         env.step(np.zeros(6, np.float32))
+
+
+@pytest.mark.parametrize(("offset_m", "good"), [(0.14, True), (0.16, False)])
+def test_success_is_a_contact_inside_the_limits(env, monkeypatch, offset_m, good):
+    env.reset(seed=0)
+    measured = {"radial_offset_m": offset_m, "closure_speed_m_s": 1.2, "angle_deg": 3.0, "left_m": 0.0, "up_m": 0.0}
+    contact = Attempt(number=1, begun_s=0.0, ended_s=9.0, decided_s=9.0, outcome="contact", **measured)
+    monkeypatch.setattr(Referee, "attempt_log", lambda self, now_s, outcome: (contact,))
+    env.step(np.zeros(6, np.float32))
+    env._outcome = Outcome.CONTACT
+    assert env._info()["is_success"] is good
 
 
 @pytest.mark.slow
