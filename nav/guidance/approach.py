@@ -207,7 +207,12 @@ class Guidance:
         elif self.phase in _RETREATING:
             wanted = Wanted(distance_m=None, speed_m_s=-s.back_off_speed_m_s, aim_m=self._aim_now())
         else:
-            wanted = Wanted(distance_m=s.stand_off_m, speed_m_s=s.join_up_speed_m_s, aim_m=self._aim_now())
+            wanted = Wanted(
+                distance_m=s.stand_off_m,
+                speed_m_s=s.join_up_speed_m_s,
+                aim_m=self._aim_now(),
+                patient=self.phase in _WAITING,
+            )
         return self._controller.rate(self._u, wanted)
 
     def _to_contact_s(self, distance_m: float) -> float:
@@ -246,7 +251,7 @@ def _controller(settings: GuidanceSettings, step_s: float) -> Controller:
     if settings.controller == "pid":
         return Pid(settings.pid, step_s)
     limits = np.array(settings.acceleration_limit_m_s2), np.array(settings.jerk_limit_m_s3)
-    return Predictive(settings.predictive, np.array(settings.response_s), *limits, step_s)
+    return Predictive(settings.predictive, np.array(settings.response_s), *limits, step_s, settings.patient_share)
 
 
 def _limited(v: Array, limit: float) -> Array:

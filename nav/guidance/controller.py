@@ -24,6 +24,7 @@ class Wanted:
     distance_m: float | None  #: behind `Sight.place_m`; None: close
     speed_m_s: float  #: closing, or the most to go to the distance with
     aim_m: Array  #: (2,) off the place, left and up
+    patient: bool = False  #: across, with a share of the limits
     must_follow: bool = False  #: a swing, too, that is more than the receiver can bear
     to_contact_s: float | None = None  #: until the tip is at the place, where it can no longer be called back
 

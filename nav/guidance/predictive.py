@@ -42,6 +42,7 @@ class Predictive:
         response_s: (3,) response times.
         acceleration_limit_m_s2: (3,) that the receiver may fly.
         jerk_limit_m_s3: (3,) likewise.
+        patient_share: of both, what is used across where patience is wanted.
         step_s: control period.
     """
 
@@ -52,12 +53,16 @@ class Predictive:
         acceleration_limit_m_s2: Array,
         jerk_limit_m_s3: Array,
         step_s: float,
+        patient_share: float,
     ) -> None:
         self._settings, self._step_s, self._seen = settings, step_s, False
         plan = settings.plan
         self._own = OwnPath(response_s, step_s)
         self._motion = DrogueMotion(settings.swing, step_s, response_s, plan.node_s)
-        self._plans = [PathPlan(plan, acceleration_limit_m_s2[i], jerk_limit_m_s3[i]) for i in _ACROSS]
+        self._plans, self._patient_plans = (
+            [PathPlan(plan, share * acceleration_limit_m_s2[i], share * jerk_limit_m_s3[i]) for i in _ACROSS]
+            for share in (1.0, patient_share)
+        )
         self._response_s = float(response_s[_ACROSS[0]])
         nodes = self._response_s + plan.node_s * np.arange(plan.nodes + 1)
         self._times: Array = np.append(0.0, nodes)
@@ -132,7 +137,8 @@ class Predictive:
         off = self._own.place_ahead_m
         to_contact_s = None if wanted.to_contact_s is None else wanted.to_contact_s - self._response_s
         out = np.empty(2)
-        for row, (axis, plan) in enumerate(zip(_ACROSS, self._plans, strict=True)):
+        plans = self._patient_plans if wanted.patient else self._plans
+        for row, (axis, plan) in enumerate(zip(_ACROSS, plans, strict=True)):
             places = path[:, axis] + wanted.aim_m[row] - off[axis]
             places -= places[0] - clipped(places[0], s.plan.error_max_m)
             x = np.array([0.0, u[axis], self._u_dot[axis]])
