@@ -226,11 +226,11 @@ class Navigator:
 
     def _heading_now(self) -> tuple[float, float, float]:
         """Exposure to ask for, heading and its sigma; the LEDs' frames are not given away while the probe goes in."""
-        if self._heading is None or self._heading.solution is None:
+        if self._heading is None:
             return float("nan"), float("nan"), float("nan")
         free = self._guidance.phase is not Phase.CONTACT
         exposure_s = self._heading.ask(self._time_s) if free else float("nan")
-        return exposure_s, self._heading.solution.heading_rad, self._heading.sigma_rad
+        return exposure_s, self._heading.heading_rad, self._heading.sigma_rad
 
 
 def _check_ring(ring: LedRing) -> None:

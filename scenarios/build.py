@@ -13,6 +13,7 @@ from dockair.messages import Navigates
 from dockair.nav.guidance.approach import GuidanceSettings
 from dockair.nav.guidance.bow_wave_push import BowWavePush
 from dockair.nav.guidance.phases import PhaseLimits
+from dockair.nav.heading.own_heading import OwnHeadingSettings
 from dockair.nav.navigator import Navigator, NavigatorSettings
 from dockair.parameters import load_parameters
 from dockair.rotations import Array, matrix_from_yaw_pitch_roll
@@ -320,5 +321,12 @@ def _recipe(scenario: Scenario, sheets: NavigationSheets) -> NavigatorRecipe:
     """Our own navigator takes settings; anybody else's is made of its sheets alone."""
     name = scenario.navigation.navigator
     ours = name == name_of(Navigator)
-    settings = NavigatorSettings(guidance=guidance_settings(scenario)) if ours else None
+    settings = NavigatorSettings(guidance=guidance_settings(scenario), heading=_heading(scenario)) if ours else None
     return NavigatorRecipe(class_name=name, sheets=sheets, settings=settings)
+
+
+def _heading(scenario: Scenario) -> OwnHeadingSettings | None:
+    table = scenario.navigation
+    if not table.heading:
+        return None
+    return OwnHeadingSettings(airspeed_m_s=scenario.flight.airspeed_m_s, every_s=table.heading_every_s)

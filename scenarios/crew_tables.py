@@ -1,11 +1,14 @@
 """The tables of a scenario that say who navigates and how the receiver docks."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
+from dockair.errors import DockairError
 from dockair.scenarios.refusal import Expected
 from dockair.scenarios.table import Table
+
+OUR_NAVIGATOR = "dockair.nav.navigator:Navigator"
 
 
 class Navigation(Table):
@@ -15,7 +18,16 @@ class Navigation(Table):
         str,
         Field(pattern=r"^(truth|[A-Za-z_][\w.]*:[A-Za-z_]\w*)$"),
         Expected('"truth" or "module:Class"'),
-    ] = "dockair.nav.navigator:Navigator"
+    ] = OUR_NAVIGATOR
+    heading: bool = False  #: it keeps the receiver's heading, too, by frames that it asks for (docs/heading.md)
+    heading_every_s: float = Field(default=2.0, ge=0.5, le=5.0)  #: between two such frames
+
+    @model_validator(mode="after")
+    def _ours_keeps_the_heading(self) -> Self:
+        if self.heading and self.navigator != OUR_NAVIGATOR:
+            expected = f"false but with {OUR_NAVIGATOR}, which alone keeps a heading"
+            raise DockairError("navigation.heading", expected=expected, got=self.heading)
+        return self
 
     @property
     def is_truth(self) -> bool:

@@ -117,6 +117,8 @@ class FlightLog:
         sigmas = standard_deviations(solutions)
         for symbol, unit, part in (("phi", "rad", 0), ("p_PD_B", "m", 3), ("v_PD_B", "m_s", 6)):
             columns |= _components(f"nav_sigma_{symbol}", unit, sigmas[:, part : part + 3])
+        columns["nav_heading_rad"] = [s.heading_rad for s in solutions]
+        columns["nav_sigma_heading_rad"] = [s.heading_sigma_rad for s in solutions]
         columns |= _components("command_velocity", "m_s", [s.command.velocity_m_s for s in solutions])
         columns |= _components("command_acceleration", "m_s2", [s.command.acceleration_m_s2 for s in solutions])
         return columns

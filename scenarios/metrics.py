@@ -36,6 +36,18 @@ class NavigationFigures:
     frames_used: int
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HeadingFigures:
+    """The receiver's own heading, counted from the flight's start, against the truth."""
+
+    turned_deg: float  #: in truth, to the left, at the end
+    error_deg: float  #: believed less true, at the end; NaN (null in JSON) where the heading is lost
+    sigma_deg: float  #: as the navigation has it, at the end
+    error_rms_deg: float  #: over all control ticks at which there was a heading
+    error_max_deg: float
+    beyond_3_sigma: float  #: part of those at which the error was larger than three of its sigmas
+
+
 def line_of_sight_errors(estimated: Array, true: Array) -> tuple[Array, Array]:
     """Return the range errors (n,) and the lateral errors (n,) [m], Eqs. (1) and (2).
 
@@ -115,6 +127,31 @@ def navigation_figures(
         availability=availability([s.valid for s in solutions]),
         frames_used=len(stamps),
     )
+
+
+def heading_figures(solutions: Sequence[NavSolution], truths: Sequence[Truth]) -> HeadingFigures | None:
+    """Compare the headings, one a control tick; None where the navigation kept none."""
+    believed = np.array([s.heading_rad for s in solutions])
+    sigma = np.array([s.heading_sigma_rad for s in solutions])
+    kept = np.isfinite(believed)
+    if not kept.any():
+        return None
+    true = true_headings(truths)
+    error = believed - true
+    return HeadingFigures(
+        turned_deg=float(np.degrees(true[-1])),
+        error_deg=float(np.degrees(error[-1])),
+        sigma_deg=float(np.degrees(sigma[-1])),
+        error_rms_deg=float(np.degrees(_rms(error[kept]))),
+        error_max_deg=float(np.degrees(_largest(error[kept]))),
+        beyond_3_sigma=float(np.mean(np.abs(error[kept]) > 3.0 * sigma[kept])),
+    )
+
+
+def true_headings(truths: Sequence[Truth]) -> Array:
+    """(n,) headings of the receiver's nose since the first, to the left, not wrapped [rad]."""
+    headings = np.unwrap([np.arctan2(truth.R_WB[1, 0], truth.R_WB[0, 0]) for truth in truths])
+    return np.asarray(headings - headings[:1])
 
 
 def availability(valid: Sequence[bool]) -> float:

@@ -81,6 +81,7 @@ def _plots() -> Any:
         rrb.Tabs(
             plot("gyro", "Gyro [deg/s]"), plot("accelerometer", "Specific force [m/s^2]"),
             plot("exposure", "Exposure [us]"), plot("reel", "Hose taken in [m]"), plot("tension", "Hose tension [N]"),
+            plot("heading_error", "Heading error [deg]"),
             rrb.TextDocumentView(origin="summary", name="Result"), active_tab=0,
         ),
     )  # fmt: skip

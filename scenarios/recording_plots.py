@@ -7,7 +7,7 @@ import numpy as np
 
 from dockair.rotations import Array
 from dockair.scenarios.flight_log import FlightLog, standard_deviations
-from dockair.scenarios.metrics import true_relative_state
+from dockair.scenarios.metrics import true_headings, true_relative_state
 from dockair.scenarios.recording_layout import AXES, BELIEF, NEUTRAL, OTHER, PHASES, STATUSES, TRUTH
 
 _SIGMA = [130, 130, 130]
@@ -63,7 +63,22 @@ def plot_series(log: FlightLog) -> Mapping[str, tuple[str, Sequence[int], Array]
     for axis, label in enumerate(("forward", "left", "up")):
         series[f"accelerometer/{'xyz'[axis]}"] = (label, AXES[axis], force[:, axis])
     series["exposure/exposure"] = ("exposure", TRUTH, _held(1e6 * np.array(log.exposures_s)))
+    series.update(_heading_series(log))
     return series
+
+
+def _heading_series(log: FlightLog) -> Mapping[str, tuple[str, Sequence[int], Array]]:
+    """The heading's error and its three sigma; nothing where none is kept."""
+    believed = np.array([s.heading_rad for s in log.solutions])
+    if not np.isfinite(believed).any():
+        return {}
+    error_deg = np.degrees(believed - true_headings(log.truths))
+    bound_deg = np.degrees(3.0 * np.array([s.heading_sigma_rad for s in log.solutions]))
+    return {
+        "heading_error/error": ("belief - truth", BELIEF, error_deg),
+        "heading_error/upper": ("+3 sigma", _SIGMA, bound_deg),
+        "heading_error/lower": ("-3 sigma", _SIGMA, -bound_deg),
+    }
 
 
 def _held(values: Array) -> Array:

@@ -14,7 +14,7 @@ from dockair.scenarios.attempts import Attempt, first_attempt_succeeded, succeed
 from dockair.scenarios.causes import Flown, cause_of_flight, with_cause
 from dockair.scenarios.flight_profile import PhaseEntry, RangeBin, navigation_by_range, timeline
 from dockair.scenarios.hold import Disconnect, Hold, hold_of
-from dockair.scenarios.metrics import NavigationFigures, navigation_figures
+from dockair.scenarios.metrics import HeadingFigures, NavigationFigures, heading_figures, navigation_figures
 from dockair.scenarios.referee import Contact, Outcome, Referee
 
 SCHEMA_VERSION = 1
@@ -44,6 +44,7 @@ class Result:
     truth_navigation: bool
     background: str  #: who drew what the camera saw, "mujoco" or "analytic"; "" without a camera
     nav: NavigationFigures
+    heading: HeadingFigures | None = None  #: None where none was kept
     frames: int
     duration_s: float
     real_time_factor: float
@@ -136,6 +137,7 @@ def summarise(
         truth_navigation=sensing == "truth",
         background=background,
         nav=navigation_figures(flown.solutions, truths, mounting),
+        heading=heading_figures(flown.solutions, truths),
         frames=frames,
         duration_s=duration_s,
         real_time_factor=duration_s / wall_time_s if wall_time_s > 0.0 else float("nan"),

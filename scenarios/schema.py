@@ -78,6 +78,13 @@ class Scenario(Table):
         return self
 
     @model_validator(mode="after")
+    def _frames_for_the_heading(self) -> Self:
+        if self.navigation.heading and self.sensing != "camera":
+            expected = 'false but with camera.sensing = "frames": a heading is kept by pictures'
+            raise DockairError("navigation.heading", expected=expected, got=self.navigation.heading)
+        return self
+
+    @model_validator(mode="after")
     def _parameters_fit(self) -> Self:
         for sheet, overrides in self.parameters.items():
             load_parameters(sheet, make_dataclass(sheet, sorted(read_sheet(sheet))), overrides)  # checks only

@@ -1,11 +1,10 @@
 """The receiver's heading as a navigator keeps it: when to ask for a frame, what of it counts, how sure the result is.
 
-    IMU ► own_attitude ► heading_reference ► heading
-    every `every_s` a full frame of a long exposure ─┘
+    IMU ─────────────────────────────────────────────► heading_filter ► heading, roll, pitch, bias
+    every `every_s` a full frame of a long exposure ► visual ─┘ turn
 
 LEDs want 20 us, cloud deck and ground 500 us: a frame of its own is asked for, of which one camera period takes one.
 What is above the level holds tanker and sky, the probe moves with the camera, the drogue swings: all are masked.
-The variance of the heading grows by a walk, and until the gyro's bias is known by (bias sigma times the time)^2.
 
 Not modelled: what else of the receiver than its probe is in view; correlation with the errors of the drogue's place.
 """
@@ -20,9 +19,10 @@ from numpy.typing import NDArray
 from dockair.calibration import NavigationSheets
 from dockair.errors import DockairError
 from dockair.messages import CameraFrame, ImuSample
-from dockair.nav.heading.heading_reference import HeadingReference, HeadingSettings, HeadingSolution, HeadingStatus
-from dockair.nav.heading.own_attitude import OwnAttitude
-from dockair.rotations import Array
+from dockair.nav.heading.heading_filter import HeadingFilter, HeadingFilterSettings
+from dockair.nav.heading.turn import TurnStatus, VisualSettings
+from dockair.nav.heading.visual import VisualHeading
+from dockair.rotations import Array, exp
 
 _GRID_PX = 8  # between the rays of the mask
 _PROBE_POINTS = 60  # along the probe; closer than its own radius in the picture
@@ -40,15 +40,14 @@ class OwnHeadingSettings:
     airspeed_m_s: float  #: of the formation, as it was briefed
     every_s: float = 2.0  #: in a bank of 25 degrees 3 degrees of turn: most of the view is shared
     exposure_s: float = 500e-6  #: deck and ground are 10 to 50 of 255 grey levels bright then
-    attitude_s: float = 20.0  #: over which roll and pitch are averaged: gusts of some seconds count little
     drogue_radius_m: float = 0.6  #: about the ring's centre: basket and swing
     probe_radius_m: float = 0.15  #: about its axis
     probe_length_m: float = 3.0  #: behind its tip
-    walk_rad_rts: float = 1.2e-3  #: 0.7 degrees in 100 s, half of them in a turn (docs/heading.md)
-    reference: HeadingSettings = field(default_factory=HeadingSettings)
+    filter: HeadingFilterSettings = field(default_factory=HeadingFilterSettings)
+    visual: VisualSettings = field(default_factory=VisualSettings.for_aircraft)
 
     def __post_init__(self) -> None:
-        for name in (f.name for f in fields(self) if f.name != "reference"):
+        for name in (f.name for f in fields(self) if f.name not in ("filter", "visual")):
             if not getattr(self, name) > 0.0:
                 raise DockairError(f"heading.{name}", expected="a number above 0", got=getattr(self, name))
 
@@ -63,17 +62,14 @@ class OwnHeading:
 
     def __init__(self, sheets: NavigationSheets, settings: OwnHeadingSettings) -> None:
         self._sheets, self._settings = sheets, settings
-        gap_s = settings.reference.longest_gap_s
-        self._attitude = OwnAttitude(sheets.mounting, settings.airspeed_m_s, settings.attitude_s, gap_s)
-        self._reference = HeadingReference(sheets.camera, sheets.mounting, sheets.gyro.rate_hz, settings.reference)
+        self._filter = HeadingFilter(sheets.gyro, sheets.mounting, settings.airspeed_m_s, settings.filter)
+        self._visual = VisualHeading(sheets.camera, settings.visual)
         self._next_s, self._until_s = -np.inf, -np.inf  # when to ask next; until when what was asked stands
-        self._variance, self._stamp_s, self._begun_s = 0.0, float("nan"), float("nan")
         self._rays_C = self._grid()
-        self.solution: HeadingSolution | None = None
 
     def ask(self, time_s: float) -> float:
         """Return the exposure to ask of the next frame [s], a full one; NaN for none. One frame takes it."""
-        if time_s >= self._next_s:
+        if self._filter.is_level and time_s >= self._next_s:
             self._next_s = time_s + self._settings.every_s
             self._until_s = time_s + 1.0 / self._sheets.camera_rate_hz
         half_tick_s = 0.5 / self._sheets.control_rate_hz
@@ -87,41 +83,42 @@ class OwnHeading:
         full = frame.window == self._sheets.camera.full_window
         return in_time and full and bool(np.isclose(frame.exposure_s, self._settings.exposure_s))
 
-    def step(self, imu: Sequence[ImuSample], frame: CameraFrame | None, p_CD: Array) -> HeadingSolution:
-        """Take what arrived since the last step.
+    @property
+    def heading_rad(self) -> float:
+        """Since the first sample, to the left, not wrapped; NaN before it, and once the gyro was away for too long."""
+        return self._filter.heading_rad if self._is_known else float("nan")
+
+    @property
+    def sigma_rad(self) -> float:
+        """Standard deviation of the heading; NaN where there is none."""
+        return self._filter.sigma_rad if self._is_known else float("nan")
+
+    @property
+    def _is_known(self) -> bool:
+        return bool(np.isfinite(self._filter.time_stamp_s)) and not self._filter.is_lost
+
+    def step(self, imu: Sequence[ImuSample], frame: CameraFrame | None, p_CD: Array) -> TurnStatus | None:
+        """Take what arrived since the last step; return what came of the frame, None without one that can be used.
 
         Args:
             imu: samples.
             frame: that was asked for.
             p_CD: (3,) the ring's centre there [m].
         """
-        last = self.solution  # while it aligns, attitude and correction would lead each other astray
-        aligned = last is not None and last.status in (HeadingStatus.GYRO, HeadingStatus.VISION)
-        self._attitude.propagate(imu, last.correction_rad_s if last is not None and aligned else 0.0)
-        R_LB = self._attitude.R_LB
-        if frame is not None and self._attitude.is_known:
-            mask = self._mask(R_LB, p_CD)
-            self.solution = self._reference.step(imu, R_LB, frame, mask=mask)
-        else:
-            self.solution = self._reference.step(imu, R_LB)
-        self._grow(self.solution.time_stamp_s)
-        return self.solution
-
-    @property
-    def sigma_rad(self) -> float:
-        """Standard deviation of the heading; NaN when it is lost or has not begun."""
-        if self.solution is None or not np.isfinite(self.solution.heading_rad) or not np.isfinite(self._stamp_s):
-            return float("nan")
-        passed_s = self._stamp_s - self._begun_s
-        drift = self._sheets.gyro.bias_sigma_rad_s * passed_s if self.solution.status is HeadingStatus.ALIGNING else 0.0
-        return float(np.sqrt(self._variance + drift**2))
-
-    def _grow(self, stamp_s: float) -> None:
-        if np.isfinite(self._stamp_s):
-            self._variance += self._settings.walk_rad_rts**2 * (stamp_s - self._stamp_s)
-        else:
-            self._begun_s = stamp_s
-        self._stamp_s = stamp_s
+        self._filter.propagate(imu)
+        if frame is None or not self._is_known:
+            return None
+        predicted_rad = self._filter.predicted_turn_rad(frame.time_stamp_s)
+        if predicted_rad is None:
+            return None
+        R_LB, before_rad = self._filter.R_LB_at(frame.time_stamp_s), self._visual.heading_rad
+        to_visual = exp(np.array([0.0, 0.0, before_rad + predicted_rad]))  # its own heading, here
+        self._visual.tilt(to_visual @ self._filter.tilt_L(), self._sheets.mounting.R_BC)
+        mask, R_LC = self._mask(R_LB, p_CD), R_LB @ self._sheets.mounting.R_BC
+        turn = self._visual.step(frame.pixels, mask=mask, R_HC=R_LC, predicted_turn_rad=predicted_rad)
+        measured = turn.status is TurnStatus.MEASURED
+        self._filter.see(frame.time_stamp_s, self._visual.heading_rad - before_rad if measured else None)
+        return turn.status
 
     def _grid(self) -> Array:
         """(rows, columns, 3) rays of the mask's coarse pixels."""

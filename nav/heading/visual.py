@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from dockair.calibration import Camera
 from dockair.nav.heading.features import Features, features_of
+from dockair.nav.heading.levelling import without_yaw
 from dockair.nav.heading.turn import (
     HeadingLine,
     Turn,
@@ -27,7 +28,7 @@ from dockair.nav.heading.turn import (
     measure_turn,
     turn_between,
 )
-from dockair.rotations import Array
+from dockair.rotations import Array, exp
 
 __all__ = ["HeadingLine", "Turn", "TurnStatus", "VisualHeading", "VisualSettings", "fit_heading_line", "measure_turn"]
 
@@ -98,6 +99,30 @@ class VisualHeading:
             self._take_key(features)
         return replace(believed[0][1], turn_rad=turned)
 
+    def tilt(self, theta: Array, R_BC: Array) -> None:
+        """Correct the attitudes of the images that the next one is compared with: they were believed to be otherwise.
+
+        Two attitudes that are wrong alike do no harm; the step between them, when a filter has learnt, is a false turn.
+
+        Args:
+            theta: (3,) rotation vector, small and level, in axes of heading zero.
+            R_BC: (3, 3) of the camera in the body whose heading this is.
+        """
+        key, last = self._key, self._last
+        if key is None or last is None:
+            return
+        self._key = _tilted(key, theta, R_BC)
+        self._last = self._key if last is key else _tilted(last, theta, R_BC)
+
     def _take_key(self, features: Features) -> None:
         self._key = self._last = _Seen(features, self.heading_rad)
         self.key_frames += 1
+
+
+def _tilted(seen: _Seen, theta: Array, R_BC: Array) -> _Seen:
+    R_HC = seen.features.R_HC
+    if R_HC is None:
+        return seen
+    to_heading = exp(np.array([0.0, 0.0, -seen.heading_rad]))
+    R_LB = without_yaw(exp(to_heading @ theta) @ R_HC @ R_BC.T)
+    return replace(seen, features=replace(seen.features, R_HC=R_LB @ R_BC))

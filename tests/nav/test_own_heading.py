@@ -1,14 +1,20 @@
 """When a frame for the heading is asked for, what of it may be looked at, and how sure the heading is said to be."""
 
+from dataclasses import replace
+
+import cv2
 import numpy as np
 import pytest
 
 from dockair.calibration import Camera, GyroSheet, LedRing, Mounting, NavigationSheets, StartGeometry
 from dockair.errors import DockairError
 from dockair.messages import CameraFrame, ImuSample, Window
+from dockair.nav.heading.levelling import without_yaw
 from dockair.nav.heading.own_heading import OwnHeading, OwnHeadingSettings
+from dockair.nav.heading.turn import TurnStatus
+from dockair.nav.heading.visual import VisualHeading
 from dockair.nav.navigator import Navigator, NavigatorSettings
-from dockair.rotations import matrix_from_yaw_pitch_roll
+from dockair.rotations import exp, matrix_from_yaw_pitch_roll
 
 CAMERA = Camera()
 SHEETS = NavigationSheets(
@@ -42,8 +48,23 @@ def imu(first_s: float, last_s: float) -> list[ImuSample]:
     return [ImuSample(time_stamp_s=float(t), angular_rate_rad_s=np.zeros(3), specific_force_m_s2=up) for t in times]
 
 
-def test_one_camera_period_in_two_seconds_is_asked_for():
+def levelled() -> OwnHeading:
     heading = OwnHeading(SHEETS, SETTINGS)
+    heading.step(imu(-4.5, 0.0), None, DROGUE_C)
+    return heading
+
+
+def test_no_frame_is_asked_for_before_it_could_be_levelled():
+    heading = OwnHeading(SHEETS, SETTINGS)
+    assert np.isnan(heading.ask(0.0))
+    heading.step(imu(-3.0, 0.0), None, DROGUE_C)
+    assert np.isnan(heading.ask(0.0))
+    heading.step(imu(0.0, 2.0), None, DROGUE_C)
+    assert heading.ask(2.0) == 500e-6
+
+
+def test_one_camera_period_in_two_seconds_is_asked_for():
+    heading = levelled()
     asked = [heading.ask(0.01 * k) for k in range(600)]
     assert np.flatnonzero(np.isfinite(asked)).tolist() == [0, 1, 200, 201, 400, 401]  # two control ticks, one exposure
     assert asked[0] == 500e-6
@@ -51,7 +72,7 @@ def test_one_camera_period_in_two_seconds_is_asked_for():
 
 def test_a_frame_was_asked_for_if_it_is_full_and_exposed_as_asked_and_when():
     """In the dark the camera's own control may expose as long: those frames are the LEDs'."""
-    heading = OwnHeading(SHEETS, SETTINGS)
+    heading = levelled()
     assert not heading.was_asked(frame(500e-6))
     heading.ask(0.01)
     assert heading.was_asked(frame(500e-6))
@@ -81,21 +102,61 @@ def test_a_bank_turns_the_level():
     assert mask[400, 100] and not mask[600, 1900]
 
 
-def test_sigma_is_that_of_the_bias_until_frames_show_it_and_of_a_walk():
+def test_before_any_frame_the_heading_is_the_gyro_s_and_its_sigma_grows_with_the_bias():
     heading = OwnHeading(SHEETS, SETTINGS)
-    assert np.isnan(heading.sigma_rad)
+    assert np.isnan([heading.heading_rad, heading.sigma_rad]).all()
+    sigmas = []
     for k in range(100):
-        heading.step(imu(0.1 * k, 0.1 * (k + 1)), None, DROGUE_C)
-    after_s = 10.0 - 0.1
-    expected = np.hypot(SETTINGS.walk_rad_rts * np.sqrt(after_s), SHEETS.gyro.bias_sigma_rad_s * after_s)
-    assert heading.sigma_rad == pytest.approx(expected, rel=1e-6)
+        assert heading.step(imu(0.1 * k, 0.1 * (k + 1)), None, DROGUE_C) is None
+        sigmas.append(heading.sigma_rad)
+    assert abs(heading.heading_rad) < 1e-6
+    grown_rad_s = (sigmas[-1] - sigmas[49]) / 5.0
+    assert 0.8 * SHEETS.gyro.bias_sigma_rad_s < grown_rad_s <= 1.001 * SHEETS.gyro.bias_sigma_rad_s
+
+
+def test_pictures_that_stand_still_show_the_gyro_s_bias():
+    """Two pictures of the same landscape, 2 s apart, with 0.3 degrees/s of bias between them: no turn."""
+    heading = OwnHeading(SHEETS, SETTINGS)
+    rng = np.random.default_rng(0)
+    pixels = cv2.GaussianBlur(rng.integers(0, 255, CAMERA.full_window.shape, np.uint8), (0, 0), 4.0)
+    pixels = cv2.normalize(pixels, None, 0, 255, cv2.NORM_MINMAX)
+    bias, statuses = np.array([0.0, 0.0, np.radians(0.3)]), []
+    for k in range(401):
+        samples = [replace(s, angular_rate_rad_s=bias) for s in imu(0.02 * k, 0.02 * (k + 1))]
+        seen = replace(frame(500e-6, stamp_s=0.02 * k + 0.01), pixels=pixels) if k % 100 == 50 else None
+        statuses.append(heading.step(samples, seen, DROGUE_C))
+    assert [s for s in statuses if s] == [TurnStatus.FIRST, *3 * [TurnStatus.MEASURED]]
+    assert abs(heading.heading_rad) < np.radians(0.2)
+    assert heading.sigma_rad < np.radians(0.5)
+
+
+def test_pictures_of_before_stand_as_is_known_of_them_by_now():
+    """A tilt that both pictures share is no turn; one that only the newer has been rid of would be."""
+    R_BC = SHEETS.mounting.R_BC
+    visual = VisualHeading(CAMERA)
+    believed, tilt = matrix_from_yaw_pitch_roll(0.0, -0.1, 0.02), np.array([0.08, -0.03, 0.0])
+    visual.step(np.zeros((64, 64), np.uint8), R_HC=believed @ R_BC)
+    for heading_rad in (0.0, 2.0):
+        visual._key = visual._last = replace(visual._last, heading_rad=heading_rad)
+        before = visual._key.features.R_HC
+        along = exp(np.array([0.0, 0.0, heading_rad])) @ tilt  # axes of heading zero
+        visual.tilt(along, R_BC)
+        expected = without_yaw(exp(tilt) @ before @ R_BC.T) @ R_BC
+        np.testing.assert_allclose(visual._key.features.R_HC, expected, atol=1e-12)
+        assert visual._last is visual._key
 
 
 def test_after_a_gap_the_heading_is_lost_and_says_no_sigma():
     heading = OwnHeading(SHEETS, SETTINGS)
     heading.step(imu(0.0, 0.1), None, DROGUE_C)
     heading.step(imu(2.0, 2.1), None, DROGUE_C)
-    assert heading.solution is not None and np.isnan(heading.solution.heading_rad) and np.isnan(heading.sigma_rad)
+    assert np.isnan(heading.heading_rad) and np.isnan(heading.sigma_rad)
+
+
+def test_gyros_of_which_nothing_is_known_are_refused():
+    consumer = replace(SHEETS, gyro=replace(SHEETS.gyro, bias_sigma_rad_s=0.087))
+    with pytest.raises(DockairError, match="heading.gyro: expected gyros whose bias is below 0.016 rad/s at 180 m/s"):
+        OwnHeading(consumer, SETTINGS)
 
 
 def test_a_number_that_is_not_positive_is_refused():
@@ -105,14 +166,14 @@ def test_a_number_that_is_not_positive_is_refused():
 
 def test_a_navigator_asks_for_the_frame_in_full_and_does_not_look_for_leds_in_it():
     navigator = Navigator(SHEETS, NavigatorSettings(heading=SETTINGS))
-    solution = navigator.step(imu(0.0, 0.01), None)
+    solution = navigator.step(imu(-4.5, 0.01), None)
     assert solution.exposure_s == 500e-6 and solution.window is None
     later = [navigator.step(imu(0.01 * k, 0.01 * (k + 1)), None) for k in range(1, 4)]
     assert np.isnan(later[-1].exposure_s)
     before = later[-1].status
     after = navigator.step(imu(0.04, 0.05), frame(500e-6))
     assert after.status == before == "no frame yet"
-    assert after.heading_rad == 0.0 and after.heading_sigma_rad > 0.0
+    assert abs(after.heading_rad) < 1e-6 and after.heading_sigma_rad > 0.0
     assert navigator.step(imu(0.05, 0.06), frame(20e-6, stamp_s=0.04)).status == "ring not found"
 
 

@@ -123,8 +123,8 @@ def test_result_json_has_the_documented_keys_and_no_others(hand_made, tmp_path):
     assert list(written) == [
         "schema_version", "scenario", "seed", "outcome", "success", "first_attempt", "cause", "unsafe", "attempts",
         "attempt_log", "contact", "hold", "disconnect", "fuel_kg", "collided_with", "sensing", "truth_navigation",
-        "background", "nav", "frames", "duration_s", "real_time_factor", "wall_time_s", "versions", "timeline",
-        "nav_by_range", "out_dir",
+        "background", "nav", "heading", "frames", "duration_s", "real_time_factor", "wall_time_s", "versions",
+        "timeline", "nav_by_range", "out_dir",
     ]  # fmt: skip
     page = (Path(__file__).parents[2] / "docs" / "results.md").read_text(encoding="utf-8")
     documented = page[page.index("## result.json") : page.index("## as_built.json")]
@@ -159,6 +159,24 @@ def test_what_could_not_be_measured_is_null_and_not_nan(hand_made):
     assert "NaN" not in text
     assert json.loads(text)["nav"]["range_rmse_m"] is None
     assert json.loads(text)["contact"] is None
+
+
+def test_a_heading_is_judged_by_how_far_the_receiver_turned_since_the_start(hand_made):
+    """It turns by 400 degrees from a heading of 170; what is believed is ahead by 1 % of the turn, sigma 1 degree."""
+    log = _log(hand_made, 101)
+    turned = np.radians(4.0) * np.arange(101)
+    headings = zip(log.truths, np.radians(170.0) + turned, strict=True)
+    truths = [replace(t, R_WB=exp(np.array([0.0, 0.0, h])) @ t.R_WB) for t, h in headings]
+    believed = zip(log.solutions, 1.01 * turned, strict=True)
+    solutions = [replace(s, heading_rad=h, heading_sigma_rad=np.radians(1.0)) for s, h in believed]
+    solutions[0] = replace(solutions[0], heading_rad=float("nan"), heading_sigma_rad=float("nan"))
+    figures = metrics.heading_figures(solutions, truths)
+    assert figures.turned_deg == pytest.approx(400.0)
+    assert figures.error_deg == figures.error_max_deg == pytest.approx(4.0)
+    assert figures.sigma_deg == pytest.approx(1.0)
+    assert figures.error_rms_deg == pytest.approx(np.sqrt(np.mean((0.04 * np.arange(1, 101)) ** 2)))
+    assert figures.beyond_3_sigma == pytest.approx(0.25, abs=0.011)
+    assert metrics.heading_figures(log.solutions, log.truths) is None
 
 
 def test_flight_parquet_holds_truth_and_belief_side_by_side(hand_made, tmp_path):
