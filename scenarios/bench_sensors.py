@@ -66,8 +66,9 @@ def _camera_stages(camera: NearInfraredCamera, world: World, name: str) -> Stage
     stages: Stages = {}
     for what, window in (("full frame", _FULL), ("400 rows", _ROWS), ("300 x 300", _SMALL)):
         stages[f"{name}: expose, {what}"] = partial(camera.expose, world.data, 0.0, 0, window)
-        stages[f"{name}: without electronics, {what}"] = partial(camera.expected_electrons, world.data, window)
-        stages[f"{name}: background, {what}"] = partial(camera.background_electrons, world.data, window)
+        out = np.empty(window.shape, dtype=np.float32)  # `expose`, too, has its memory already
+        stages[f"{name}: without electronics, {what}"] = partial(camera.expected_electrons, world.data, window, out=out)
+        stages[f"{name}: background, {what}"] = partial(camera.background_electrons, world.data, window, out=out)
     return stages
 
 

@@ -236,45 +236,48 @@ def _to_pixels(
     dirt: Layer,
 ) -> None:
     """Fill the window, Eq. (1); a layer without nodes is left out."""
-    lines = np.empty((3, 3, max(out.shape[1], scene[0].shape[1])), dtype=np.float32)
-    held = np.full(3, -2)
+    width = max(out.shape[1], scene[0].shape[1])
+    lines = np.empty((9, width), dtype=np.float32)  # of each layer the nodes' rows around the pixels', and one more
+    at, above, below = -2, -2, -2
     for r in range(out.shape[0]):
-        row = out[r]
-        a, b, down = _lines_around(scene, fall_off, white_e, r, row.shape[0], lines[0], held[0:1])
-        for c in range(row.shape[0]):
-            row[c] = a[c] + down * (b[c] - a[c])
+        i = scene[1][0][r] - scene[3][0]
+        if i != at:
+            _spread_rows(scene, fall_off, white_e, at, i, lines[:3])
+            at = i
+        a, b, down = i % 2, (i + 1) % 2, scene[1][1][r]
+        for c in range(out.shape[1]):
+            out[r, c] = lines[a, c] + down * (lines[b, c] - lines[a, c])
         if stray[0].size > 0:
-            a, b, down = _lines_around(stray, _ALIKE, white_e, r, row.shape[0], lines[1], held[1:2])
-            for c in range(row.shape[0]):
-                row[c] += a[c] + down * (b[c] - a[c])
+            i = stray[1][0][r] - stray[3][0]
+            if i != above:
+                _spread_rows(stray, _ALIKE, white_e, above, i, lines[3:6])
+                above = i
+            a, b, down = 3 + i % 2, 3 + (i + 1) % 2, stray[1][1][r]
+            for c in range(out.shape[1]):
+                out[r, c] += lines[a, c] + down * (lines[b, c] - lines[a, c])
         if dirt[0].size > 0:
-            a, b, down = _lines_around(dirt, _ALIKE, white_e, r, row.shape[0], lines[2], held[2:3])
-            for c in range(row.shape[0]):
-                row[c] *= a[c] + down * (b[c] - a[c])
+            i = dirt[1][0][r] - dirt[3][0]
+            if i != below:
+                _spread_rows(dirt, _ALIKE, white_e, below, i, lines[6:])
+                below = i
+            a, b, down = 6 + i % 2, 6 + (i + 1) % 2, dirt[1][1][r]
+            for c in range(out.shape[1]):
+                out[r, c] *= lines[a, c] + down * (lines[b, c] - lines[a, c])
 
 
 @njit(cache=True)
-def _lines_around(
-    layer: Layer,
-    fall_off: FallOff,
-    white_e: np.float32,
-    r: int,
-    width: int,
-    lines: NDArray[np.float32],
-    held: NDArray[np.int64],
-) -> tuple[NDArray[np.float32], NDArray[np.float32], np.float32]:
-    """Rows of nodes before and after row r of the window, spread to pixels, and the part of the way between them."""
-    (nodes, (rows, down), columns, first, spacing), (whole, top, left) = layer, fall_off
-    i = rows[r] - first[0]
-    for node in range(max(i, held[0] + 2), i + 2):
+def _spread_rows(
+    layer: Layer, fall_off: FallOff, white_e: np.float32, held: int, i: int, lines: NDArray[np.float32]
+) -> None:
+    """Spread to pixels those of the rows of nodes i and i + 1 that are not held; the third line is for work."""
+    (nodes, _, columns, first, spacing), (whole, top, left) = layer, fall_off
+    for node in range(max(i, held + 2), i + 2):
         line = nodes[node]
         if whole.size > 0:
             line, bright, factor = lines[2], nodes[node], whole[top + node, left : left + nodes.shape[1]]
             for k in range(bright.shape[0]):
                 line[k] = bright[k] * factor[k] * white_e
-        _spread(line, columns, first[1], spacing, lines[node % 2, :width])
-    held[0] = i
-    return lines[i % 2, :width], lines[(i + 1) % 2, :width], down[r]
+        _spread(line, columns, first[1], spacing, lines[node % 2, : columns[0].shape[0]])
 
 
 @njit(cache=True)

@@ -222,7 +222,7 @@ class NearInfraredCamera:
         veil = 1.0 if dirt is None else dirt.veil_factor
         sun_C, visible = self._sun_in_view(data, pose)
         stray = self._glare.stray(sun_C, visible, exposure_s, window, veil) if visible > 0.0 else None
-        image = self.background_electrons(data, window, exposure_s, stray, dirt, out)
+        image = self.background_electrons(data, window, exposure_s, stray, dirt, out, pose)
         start = window.row_start, window.column_start
         if self._sun is not None and visible > 0.0:
             self._glare.add_fine(image, start, sun_C, visible, exposure_s, veil)
@@ -243,10 +243,10 @@ class NearInfraredCamera:
         stray: CoarseGrid | None = None,
         dirt: Dirt | None = None,
         out: NDArray[np.float32] | None = None,
+        pose: tuple[Array, Array] | None = None,
     ) -> NDArray[np.float32]:
         """Return (rows, columns) expected electrons of sky and scene alone, with stray light and dirt if given."""
-        exposure_s = self.exposure_s() if exposure_s is None else exposure_s
-        pose = self.pose(data)
+        exposure_s, pose = self.exposure_s() if exposure_s is None else exposure_s, pose or self.pose(data)
         return self._background.electrons(
             data,
             pose,
@@ -255,7 +255,7 @@ class NearInfraredCamera:
             stray=stray,
             dirt=None if dirt is None else dirt.grid,
             extinction_1_m=self._extinction_1_m,
-            place_m=pose[1] + np.array([self._airspeed_m_s * data.time, 0.0, 0.0]),
+            place_m=pose[1] + (self._airspeed_m_s * data.time, 0.0, 0.0),
             out=out,
         )
 

@@ -36,6 +36,7 @@ class Meshes(NamedTuple):
     corners_m: Array  #: (n, 3)
     normals: Array  #: (n, 3) unit vectors outward
     triangles: NDArray[np.int64]  #: (m, 3) numbers of corners, counter-clockwise from outside
+    planes: Array  #: (4, m) the triangles' unit normals n, and n . p of the points p in their planes [m]
     run_start: NDArray[np.int64]  #: (r + 1,) first triangle of each run
     run_box_m: Array  #: (r, 2, 3) lowest and highest corner
 
@@ -49,7 +50,7 @@ class Meshes(NamedTuple):
         parts = [patch for patches in cut.values() for patch in patches]
         corners, normals, triangles = (np.concatenate([np.empty((0, 3)), *(p[k] for p in parts)]) for k in range(3))
         first_corner, first_triangle = (_starts([len(part[k]) for part in parts]) for k in (0, 2))
-        number = np.repeat(first_corner[:-1], np.diff(first_triangle))
+        triangles = triangles.astype(np.int64) + np.repeat(first_corner[:-1], np.diff(first_triangle))[:, None]
         runs = [np.arange(0, len(part[2]), _RUN) for part in parts]
         begun = [starts + first for starts, first in zip(runs, first_triangle, strict=False)]
         boxes = [
@@ -68,7 +69,8 @@ class Meshes(NamedTuple):
             first_run=_starts([len(starts) for starts in runs]),
             corners_m=corners,
             normals=normals,
-            triangles=triangles.astype(np.int64) + number[:, None],
+            triangles=triangles,
+            planes=_planes(corners[triangles]),
             run_start=np.concatenate([*begun, first_triangle[-1:]]).astype(np.int64),
             run_box_m=np.reshape(boxes, (-1, 2, 3)),
         )
@@ -112,6 +114,13 @@ def _patches(mesh: Mesh) -> list[Mesh]:
         used, number = np.unique(triangles[start : start + _PATCH], return_inverse=True)
         patches.append((corners[used], normals[used], number.reshape(-1, 3).astype(np.int64)))
     return patches
+
+
+def _planes(corners: Array) -> Array:
+    """(4, m) as of `Meshes`, from (m, 3, 3) corners."""
+    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+    n = _units(np.cross(b - a, c - a))
+    return np.vstack([n.T, np.sum(n * a, axis=1)])
 
 
 def _box(points: Array) -> Array:

@@ -84,9 +84,9 @@ class Rim:
 
     def torus_W(self, data: mujoco.MjData) -> tuple[Vector, Vector, float, float]:
         """Centre, axis and the two radii in W, as `curved_mirrors` takes them."""
-        axis = data.xmat[self.body, ::3]
-        centre = data.xpos[self.body] + self.centre_x_m * axis
-        return vector(centre), vector(axis), self.radius_m, self.tube_radius_m
+        axis, (x, y, z), ahead = vector(data.xmat[self.body, ::3]), vector(data.xpos[self.body]), self.centre_x_m
+        centre = (x + ahead * axis[0], y + ahead * axis[1], z + ahead * axis[2])
+        return centre, axis, self.radius_m, self.tube_radius_m
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -172,17 +172,23 @@ def _row(
     step: np.uint32,
     row_gain: np.float32,
     chain: Chain,
-) -> None:
-    """Digitise a row away from full well by Eq. (5), and beyond it: one normal number a pixel."""
+) -> np.int32:
+    """Digitise a row away from full well by Eq. (5), and beyond it: one normal number a pixel.
+
+    Returns the bits of the most expected electrons: of numbers that are not negative they rise as these do.
+    """
+    highest = np.int32(0)
     for i in range(out.size):
         z = normal_from_bits(mix(np.uint32(seed + np.uint32(i) * step)))
         e = _electrons(x[i], gain[i], row_gain, chain)
+        highest = max(highest, np.float32(e).view(np.int32))
         kept = min(e, chain.full_well_e)
         shot = e if e < chain.far_e else np.float32(0.0)
         v = np.float32(shot + chain.variance_e2)
         skew = np.float32(np.float32(0.16666667) * shot / v)
         m = fma(skew, fma(z, z, np.float32(-1.0)), fma(np.sqrt(v), z, kept))
         out[i] = _level(m, offset[i], column[i], chain)
+    return highest
 
 
 @njit(cache=True)
@@ -237,14 +243,6 @@ def _row_exact(
 
 
 @njit(cache=True)
-def _count_between(x: Reals, low: np.float32, high: np.float32) -> int:
-    count = 0
-    for i in range(x.size):
-        count += (x[i] > low) & (x[i] < high)
-    return count
-
-
-@njit(cache=True)
 def _single(a: Chain) -> Chain:
     f = np.float32
     return Chain(
@@ -278,6 +276,7 @@ def digitise_rows(
     # A row goes on into the next, whose turn is later, up to whole lanes: single pixels take ten times as long
     padded = min((columns + _LANES - 1) // _LANES * _LANES, gain.shape[1] - first)
     flat, levels = x.ravel(), out.ravel()
+    near = np.float32(chain.near_e).view(np.int32)
     sensitivity, exposure_s, overhead_s, row_s = parasitic
     for r in range(rows):
         waits_s = overhead_s + (start[0] + r) * row_s
@@ -291,9 +290,6 @@ def digitise_rows(
         if exact:
             _row_exact(x[r], g, o, c, out[r], seed, step, row_gain, chain, cdf, guide)
             continue
-        _row(flat[begin:end], g, o, c, levels[begin:end], seed, step, row_gain, chain)
-        widest = np.float32(1.0) + np.float32(128.0) * chain.gain_step
-        low = (chain.near_e - chain.dark_e) / (row_gain * widest) - np.float32(1.0)
-        high = chain.far_e / (row_gain * (np.float32(2.0) - widest)) + np.float32(1.0)
-        if _count_between(x[r], low, high) > 0:
+        highest = _row(flat[begin:end], g, o, c, levels[begin:end], seed, step, row_gain, chain)
+        if highest >= near:
             _row_near_full_well(x[r], g, o, c, out[r], seed, step, row_gain, chain)

@@ -109,8 +109,7 @@ class Sky:
         place = np.zeros(3) if place_m is None else np.asarray(place_m, dtype=float)
         R, x, y = np.ascontiguousarray(R_WC, dtype=float), np.asarray(x, dtype=float), np.asarray(y, dtype=float)
         below = np.empty((len(y), 2), dtype=np.int64)
-        height_m = self._altitude_m + float(place[2]) - self._top_m
-        sine = dip_sine(self._p.earth_radius_m + self._top_m, height_m)
+        sine = dip_sine(self._p.earth_radius_m + self._top_m, self._altitude_m + float(place[2]) - self._top_m)
         first, stop, any_below = columns_below(R, x, y, sine, below)
         if first < stop:
             self._table.fill(out[first:stop], R, x, y[first:stop])
@@ -132,7 +131,9 @@ class Sky:
         """Return the relative radiance of endless haze toward a direction (3,): what far objects fade into."""
         if self._weather.night:
             return self._p.night
-        return float(self._haze(unit(np.asarray(direction_W, dtype=float)[None]) @ self._sun)[0])
+        (x, y, z), (a, b, c) = np.asarray(direction_W).tolist(), self._sun.tolist()
+        cosine = (x * a + y * b + z * c) / math.sqrt(x * x + y * y + z * z)
+        return float(self._haze(np.array(min(max(cosine, -1.0), 1.0))))
 
     @property
     def diffuse_share(self) -> float:

@@ -11,7 +11,7 @@ s and the place n of the entry are no small differences of large numbers, so tha
 linear in x, and its coefficients are worked out in double precision. A capsule is a tube up to its two balls, a
 cylinder a tube cut by one slab. The nearest solid wins, block by block. Only entries count: a solid that the lens
 stands in is not seen, as with OpenGL's culled back faces. What a block shows depends on its own ray alone; which are
-looked at for a solid, `spans` says. Meshes are `traced_meshes`.
+looked at for a solid, `spans` says. Meshes are `traced_meshes`. The haze is laid over when all are drawn.
 
 Not modelled: more than one ray a block (edges are steps of a block).
 Source: Glassner (ed.), An Introduction to Ray Tracing, ch. 2.
@@ -23,6 +23,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from dockair.rotations import Array
+from dockair.sim.camera.fading import lay_before
+from dockair.sim.camera.mesh_view import MeshView, view_meshes
 from dockair.sim.camera.meshes import Meshes
 from dockair.sim.camera.solids import BALL, BOX, CAPSULE, CYLINDER, Haze, Lighting, Solids, depth_limits_m
 from dockair.sim.camera.spans import Placed, place
@@ -31,19 +33,14 @@ from dockair.sim.camera.traced_meshes import trace_meshes
 _F = np.float32
 _ZERO, _ONE, _MISS = _F(0.0), _F(1.0), _F(np.nan)
 _ALONG = _F(1e-30)  # least squared component across a tube, of a ray that runs along it
-_FAINTEST = _F(80.0)  # exponent beyond which nothing is seen through the haze
 _LANES = 16  # rays that are taken at once
-_LOG2_E = _F(1.44269504)
-#: 2^-f on [0, 1] to 2e-9, but for rounding; highest power first, 1 at f = 0 to the bit.
-_POWER = tuple(_F(a) for a in (1.0902322e-4, -1.2747482e-3, 9.5791798e-3, -5.5490758e-2, 0.24022436, -0.69314706, 1.0))
 
 Row = NDArray[np.float32]
 Triple = tuple[float, float, float]
 Single = tuple[np.float32, np.float32, np.float32]
 #: Of one row, in a solid's axes and units: o; d = a + x b; w = p + x q.
 Rays = tuple[Single, Single, Single, Single, Single]
-#: Reflectance, ambient and direct light, extinction, airlight, 1 + y^2, depth of the near plane.
-Shade = tuple[np.float32, np.float32, np.float32, np.float32, np.float32, np.float32, np.float32]
+Shade = tuple[np.float32, np.float32, np.float32, np.float32]  # reflectance, ambient and direct light, near plane
 
 
 class TracedSolids:
@@ -57,7 +54,7 @@ class TracedSolids:
 
     def __init__(self, model: mujoco.MjModel, lighting: Lighting) -> None:
         self._solids, self._meshes, self._lighting = Solids.of(model), Meshes.of(model), lighting
-        self._limits_m = depth_limits_m(model)
+        self._limits_m, self._view = depth_limits_m(model), MeshView.room_for(self._meshes)
         self._memory = np.empty(0, dtype=np.float32)
         self._placed = Placed.room_for(len(self._solids.geoms), 0)
 
@@ -91,11 +88,13 @@ class TracedSolids:
         count = place(s.kinds, s.half_sizes_m, poses, (R_WC, p_WC), x, y, near, self._placed)
         nearest = self._memory[: out.size].reshape(out.shape)
         nearest.fill(far)
-        shade = light.ambient, light.direct, haze.extinction_1_m, haze.airlight
         solids = s.kinds, s.half_sizes_m, s.reflectances
-        sun_C = R_WC.T @ light.toward_W
+        shade, sun_C = (light.ambient, light.direct), R_WC.T @ light.toward_W
         _trace(out, nearest, solids, self._placed, count, x, y, sun_C, shade, near)
-        trace_meshes(out, nearest, self._meshes, poses[1:], pose, x, y, sun_C, shade, near)
+        triangles = view_meshes(self._meshes, poses[1:], pose, x, y, sun_C, shade, near, self._view)
+        trace_meshes(out, nearest, self._meshes, self._view, triangles, x, y, near)
+        if haze.extinction_1_m > 0.0:
+            lay_before(out, nearest, x, y, haze.extinction_1_m, haze.airlight, far)
 
     def close(self) -> None:
         """Nothing to free."""
@@ -111,12 +110,11 @@ def _trace(
     x: Array,
     y: Array,
     sun_C: Array,
-    light: tuple[float, float, float, float],
+    light: tuple[float, float],
     near: float,
 ) -> None:
-    """Draw the first `count` placed solids; `nearest` (rows, columns) holds depths so far."""
+    """Draw the first `count` placed solids, without haze; `nearest` (rows, columns) holds depths so far."""
     kinds, half_sizes, reflectances = solids
-    ambient, direct, extinction, air = _F(light[0]), _F(light[1]), _F(light[2]), _F(light[3])
     tangents = x.astype(np.float32)
     for k in range(count):
         g = placed.solid[k]
@@ -137,7 +135,7 @@ def _trace(
             a = (ahead[0] + y[i] * down[0], ahead[1] + y[i] * down[1], ahead[2] + y[i] * down[2])
             rays = _single(o), _single(a), _single(across), _single(_cross(o, a)), _single(q)
             part, picture, depths = tangents[left:right], out[i, left:right], nearest[i, left:right]
-            shade = _F(reflectances[g]), ambient, direct, extinction, air, _F(1.0 + y[i] * y[i]), _F(near)
+            shade = _F(reflectances[g]), _F(light[0]), _F(light[1]), _F(near)
             if kind == BALL:
                 _draw_ball(rays, inverse, sun, shade, part, picture, depths)
             elif kind == BOX:
@@ -177,28 +175,28 @@ def _single(a: Triple) -> Single:
 def _draw_ball(rays: Rays, inverse: Single, sun: Single, shade: Shade, x: Row, out: Row, nearest: Row) -> None:
     for j in range(x.shape[0]):
         t, cos = _enter_ball(rays, inverse, sun, x[j])
-        out[j], nearest[j] = _lay_over(t, cos, x[j], shade, out[j], nearest[j])
+        out[j], nearest[j] = _lay_over(t, cos, shade, out[j], nearest[j])
 
 
 @njit(cache=True, error_model="numpy")
 def _draw_capsule(rays: Rays, half: np.float32, sun: Single, shade: Shade, x: Row, out: Row, nearest: Row) -> None:
     for j in range(x.shape[0]):
         t, cos = _enter_capsule(rays, half, sun, x[j])
-        out[j], nearest[j] = _lay_over(t, cos, x[j], shade, out[j], nearest[j])
+        out[j], nearest[j] = _lay_over(t, cos, shade, out[j], nearest[j])
 
 
 @njit(cache=True, error_model="numpy")
 def _draw_cylinder(rays: Rays, half: np.float32, sun: Single, shade: Shade, x: Row, out: Row, nearest: Row) -> None:
     for j in range(x.shape[0]):
         t, cos = _enter_cylinder(rays, half, sun, x[j])
-        out[j], nearest[j] = _lay_over(t, cos, x[j], shade, out[j], nearest[j])
+        out[j], nearest[j] = _lay_over(t, cos, shade, out[j], nearest[j])
 
 
 @njit(cache=True, error_model="numpy")
 def _draw_box(rays: Rays, sun: Single, shade: Shade, x: Row, out: Row, nearest: Row) -> None:
     for j in range(x.shape[0]):
         t, cos = _enter_box(rays, sun, x[j])
-        out[j], nearest[j] = _lay_over(t, cos, x[j], shade, out[j], nearest[j])
+        out[j], nearest[j] = _lay_over(t, cos, shade, out[j], nearest[j])
 
 
 @njit(cache=True, error_model="numpy", inline="always")
@@ -272,24 +270,10 @@ def _enter_box(rays: Rays, sun: Single, x: np.float32) -> tuple[np.float32, np.f
 
 @njit(cache=True, inline="always")
 def _lay_over(
-    t: np.float32, cos: np.float32, x: np.float32, shade: Shade, behind: np.float32, nearest: np.float32
+    t: np.float32, cos: np.float32, shade: Shade, behind: np.float32, nearest: np.float32
 ) -> tuple[np.float32, np.float32]:
-    """Radiance, [solids, eq 1], and depth of a solid where it is nearest so far, else of what is behind it."""
-    reflectance, ambient, direct, extinction, air, beyond, near = shade
+    """Radiance, [solids, eq 1] without haze, and depth of a solid where it is nearest so far, else what is behind."""
+    reflectance, ambient, direct, near = shade
     seen = (t >= near) & (t < nearest)  # NaN is a miss
     radiance = reflectance * (ambient + direct * (cos if cos > _ZERO else _ZERO))
-    clear = _fading(extinction * t * np.sqrt(beyond + x * x))
-    radiance = radiance * clear + air * (_ONE - clear)
     return radiance if seen else behind, t if seen else nearest
-
-
-@njit(cache=True)
-def _fading(depth: np.float32) -> np.float32:
-    """exp(-depth) of 0 to 80, of more that of 80, to 1e-7."""
-    y = (depth if depth < _FAINTEST else _FAINTEST) * _LOG2_E
-    whole = np.int32(y)
-    f = y - _F(whole)
-    power = _POWER[0]
-    for a in _POWER[1:]:
-        power = power * f + a
-    return np.int32(_F(power).view(np.int32) - (whole << np.int32(23))).view(np.float32)

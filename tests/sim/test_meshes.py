@@ -160,6 +160,27 @@ def test_a_window_is_the_full_pictures_bit_for_bit(world: Any) -> None:
         assert np.array_equal(_draw(traced, data, pose, X[columns], Y[rows]), whole[rows, columns])
 
 
+@pytest.mark.parametrize("width", [1, 2, 15, 16, 17, 31])
+def test_strips_narrower_and_wider_than_the_lots_that_rays_are_taken_in_are_the_full_pictures(width: int) -> None:
+    drum = body(np.array([[0.5, 1.0, 1.0, 0.0, 0.0, 2.0], [-0.5, 1.0, 1.0, 0.0, 0.0, 2.0]]), 37, 5)
+    model, data = _world([Skin("drum", drum, 1.0)])
+    traced, pose = TracedSolids(model, SUNLIT), (np.eye(3), np.array([-4.0, 0.0, 0.0]))
+    whole = _draw(traced, data, pose)
+    seen = np.flatnonzero((whole != SKY).any(axis=0))
+    for start in (0, int(seen[0]) - 1, int(seen[-1]) - width + 2, len(X) - width):
+        columns = slice(start, start + width)
+        assert np.array_equal(_draw(traced, data, pose, X[columns]), whole[:, columns])
+
+
+def test_planes_hold_their_triangles_and_look_outward(world: Any) -> None:
+    """Normals as those of the corners, which the skins' makers give, but for creases."""
+    meshes = Meshes.of(world[1])
+    corners, n, offset = meshes.corners_m[meshes.triangles], meshes.planes[:3].T, meshes.planes[3]
+    assert np.allclose(np.linalg.norm(n, axis=1), 1.0)
+    assert np.allclose(np.einsum("mki,mi->mk", corners, n), offset[:, None], atol=1e-9)
+    assert (np.einsum("mki,mi->mk", meshes.normals[meshes.triangles], n) > 0.8).all()
+
+
 def test_no_ray_slips_between_triangles() -> None:
     """A closed drum before the lens: no sky inside its outline, at a hundred attitudes."""
     drum = body(np.array([[0.5, 1.0, 1.0, 0.0, 0.0, 2.0], [-0.5, 1.0, 1.0, 0.0, 0.0, 2.0]]), 37, 5)

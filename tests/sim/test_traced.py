@@ -174,3 +174,24 @@ def test_haze_of_no_thickness_changes_nothing_and_thick_haze_hides_all() -> None
     assert np.allclose(_draw(model, data, SUNLIT, Haze(extinction_1_m=1e-12, airlight=0.3)), plain, atol=1e-7)
     thick = _draw(model, data, SUNLIT, Haze(extinction_1_m=10.0, airlight=0.3))
     assert np.allclose(thick[plain != SKY], 0.3, atol=1e-6)
+
+
+def test_haze_dims_each_solid_by_its_slant_range_and_leaves_the_sky_alone() -> None:
+    """Koschmieder's law on three walls at three depths, to 1e-6; sky between, the last wall at the edge."""
+    x, extinction, airlight = np.arange(-200, 201) / 250.0, 0.04, 0.3
+    walls = {-0.6: 9.0, 0.05: 25.0, 0.78: 60.0}  # middle's tangent: depth of the face
+    size = [0.5, 0.05, 2.0]
+    geoms = [
+        {"type": GEOM.mjGEOM_BOX, "size": [size[0], size[1] * at, size[2] * at], "pos": [at + size[0], -m * at, 0.0]}
+        for m, at in walls.items()
+    ]
+    model, data = _scene(*geoms)
+    clear = _draw(model, data, SUNLIT, x=x)
+    hazy = _draw(model, data, SUNLIT, Haze(extinction_1_m=extinction, airlight=airlight), x=x)
+    assert np.array_equal(hazy[clear == SKY], clear[clear == SKY])
+    for middle, depth in walls.items():
+        columns = np.abs(x - middle) < 0.045
+        range_m = depth * np.sqrt(1.0 + x[columns] ** 2 + Y[:, None] ** 2)
+        through = np.exp(-extinction * range_m)
+        assert (clear[:, columns] != SKY).all()
+        assert np.allclose(hazy[:, columns], clear[:, columns] * through + airlight * (1.0 - through), atol=1e-6)
