@@ -158,7 +158,7 @@ TRANSITIONS: dict[Phase, tuple[Transition, ...]] = {
         Transition(Phase.DISCONNECT, "refuelled", lambda limits, s: s.in_phase_s >= limits.hold_s),
     ),
     Phase.DISCONNECT: (
-        Transition(Phase.CLEAR, "drogue well ahead", lambda limits, s: s.ring_ahead_m >= limits.clear_m),
+        Transition(Phase.CLEAR, "drogue well ahead", _far_enough),
     ),
     Phase.BACK_OFF: _AWAY,
     Phase.BREAKAWAY: _AWAY,

@@ -18,9 +18,9 @@ airspeed beyond that of the inertial velocity, through a first-order low pass. A
 is countered like one. At its first step the control engages without a bump: the model starts from trim with the
 aircraft's velocity, g from its measurement, and z, in a trim of air that sinks, from what holds it.
 What keeps the model inside the actuators' limits are those of the reference, which are taken back where a surface meets
-its rate limit or comes near its stop (`rate_relief`); beyond them the aircraft falls behind its model, and comes back. As
-long as surfaces are busy (h of `rate_relief`) the feedback asks for less, so that gusts too large to be met do not drive
-the airframe apart.
+its rate limit or comes near its stop (`rate_relief`); beyond them the aircraft falls behind its model, and comes back.
+As long as surfaces are busy (h of `rate_relief`) the feedback asks for less: gusts that are too large to be met do not
+drive the airframe apart.
 
 Valid while the aircraft stays near the path's trim (attitude within some 30 degrees, airspeed within some 10 m/s).
 Not modelled: structural modes, quantisation, delay of computing beyond a tick; its model of the airframe is exact.

@@ -63,6 +63,8 @@ HELD = {"ahead_m": 0.0, "ring_ahead_m": -0.3, "closing_m_s": 0.0}
         ("hold", HELD | {"ahead_m": 0.5}, "breakaway"),
         ("disconnect", HELD, None),
         ("disconnect", HELD | {"ring_ahead_m": 3.1}, "clear"),
+        ("disconnect", HELD | {"in_phase_s": 9.9}, None),
+        ("disconnect", HELD | {"in_phase_s": 10.0}, "clear"),
         ("back_off", {"ring_ahead_m": 2.9}, None),
         ("back_off", {"ring_ahead_m": 3.1}, "pre_contact"),
         ("back_off", {"ring_ahead_m": 3.1, "attempts": 3}, "clear"),
