@@ -157,9 +157,7 @@ TRANSITIONS: dict[Phase, tuple[Transition, ...]] = {
         Transition(Phase.BREAKAWAY, "drogue has left the probe", _left),
         Transition(Phase.DISCONNECT, "refuelled", lambda limits, s: s.in_phase_s >= limits.hold_s),
     ),
-    Phase.DISCONNECT: (
-        Transition(Phase.CLEAR, "drogue well ahead", _far_enough),
-    ),
+    Phase.DISCONNECT: (Transition(Phase.CLEAR, "drogue well ahead", _far_enough),),
     Phase.BACK_OFF: _AWAY,
     Phase.BREAKAWAY: _AWAY,
     Phase.CLEAR: (),
