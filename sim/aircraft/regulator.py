@@ -7,7 +7,7 @@ Tip at p from the centre of gravity, w the angular velocity beyond trim, R_trim 
     y = C x = v + R_trim (w x p)                                                                            (1)
 
 Surfaces at their limits answer late, and a feedback that asks for more drives an airframe that is not stable by itself
-apart: K_busy tolerates more of everything but the surfaces, and asks for a third.
+apart: K_busy tolerates more of everything but the surfaces, and asks for about half.
 
 Feedback knows the gust as the flight control thinks of it, dg/dt = -(V/L) g + noise:
 

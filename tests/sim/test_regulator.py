@@ -80,13 +80,13 @@ def test_every_mixture_with_the_gains_for_busy_surfaces_is_stable_and_damped(
 
 
 @every_flight
-def test_errors_of_attitude_and_rate_ask_busy_surfaces_for_less_than_half(
+def test_errors_of_attitude_and_rate_ask_busy_surfaces_for_about_half(
     sheet: str, airspeed_m_s: float, altitude_m: float
 ) -> None:
     _, gains = designed(sheet, airspeed_m_s, altitude_m)
     for errors in (slice(3, 6), RATE):
         busy, calm = (np.linalg.norm(K[:3, errors]) for K in (gains.K_busy, gains.K))
-        assert busy < 0.5 * calm
+        assert busy < 0.6 * calm
 
 
 @pytest.mark.parametrize("broken", range(INPUTS), ids=["elevator", "aileron", "rudder", "thrust"])
