@@ -42,8 +42,8 @@ class Predictive:
         response_s: (3,) response times.
         acceleration_limit_m_s2: (3,) that the receiver may fly.
         jerk_limit_m_s3: (3,) likewise.
-        patient_share: of both, what is used across where patience is wanted.
         step_s: control period.
+        patient_share: of both limits, what is used across where patience is wanted.
     """
 
     def __init__(

@@ -133,11 +133,6 @@ class HeadingFilter:
         return without_yaw(self._R_NB)
 
     @property
-    def covariance(self) -> Array:
-        """(6, 6) of theta and b."""
-        return self._P[:6, :6].copy()
-
-    @property
     def sigma_rad(self) -> float:
         """Standard deviation of the heading."""
         g = self._to_heading

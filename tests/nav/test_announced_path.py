@@ -56,12 +56,13 @@ def test_change_announced_while_the_last_one_comes_in_waits_for_its_own_start():
 
 def test_guidance_commands_the_announced_path_and_leans_on_the_drift_it_sees():
     def drifting(t, turn=0.0):
+        drifts, left = t > 2.0, 0.6 * max(t - 2.0, 0.0)  # at first it is at rest: nobody follows a swing unseen yet
         return RelativeState(
             usable=True,
             contact_usable=True,
-            p_PD_B=np.array([4.0, 0.6 * t, 0.0]),
-            rate_PD_B=np.array([0.0, 0.6, 0.0]),
-            p_PK_B=np.array([4.3, 0.6 * t, 0.0]),
+            p_PD_B=np.array([4.0, left, 0.0]),
+            rate_PD_B=np.array([0.0, 0.6 * drifts, 0.0]),
+            p_PK_B=np.array([4.3, left, 0.0]),
             w_WB_B=np.array([0.0, 0.0, turn]),
             sigma_lateral_m=0.01,
         )
@@ -70,7 +71,7 @@ def test_guidance_commands_the_announced_path_and_leans_on_the_drift_it_sees():
     told.announce(_said(starts_s=0.0, entry_s=0.1, climb=-0.05))
     path, turn = AnnouncedPath(), 0.0
     path.announce(_said(starts_s=0.0, entry_s=0.1, climb=-0.05))
-    for k in range(150):
+    for k in range(300):
         a, b = silent.step(drifting(0.01 * k)), told.step(drifting(0.01 * k, turn))  # the body turns as announced
         turn, _ = path.step(0.01)
     assert (a.turn_rate_rad_s, a.climb_rad) == (0.0, 0.0)

@@ -8,6 +8,7 @@ import pytest
 
 from dockair.messages import ReceiverCommand
 from dockair.nav.guidance.approach import Guidance, GuidanceSettings, PhaseLimits, RelativeState
+from dockair.nav.guidance.path_plan import PlanSettings
 from dockair.nav.guidance.phases import Phase
 
 RATE_HZ = 50
@@ -28,6 +29,7 @@ class Plant:
         self.p_WD0, self.v, self.t, self.latched, self.take_in = np.array(offset), np.zeros(3), 0.0, False, 0.0
         self.waiting = [deque([0.0] * round(tau * RATE_HZ)) for tau in SETTINGS.response_s]
         self.crossings = []  # (2,) ring centre off the tip where it crossed the ring's plane, and the closing speed
+        self.off_half_way_m = np.nan  # likewise, where the tip last came half-way from there to the coupling
 
     @property
     def p_WD(self):
@@ -49,6 +51,8 @@ class Plant:
         rate = (after - before) / dt
         if before[0] >= 0.0 > after[0]:
             self.crossings.append((after[1:].copy(), -rate[0]))
+        if before[0] >= -0.5 * DEPTH_M > after[0]:
+            self.off_half_way_m = float(np.hypot(*after[1:]))
         if self.latched:
             self.take_in += self.v[0] * dt
             self.latched = self.take_in > -0.05
@@ -123,10 +127,15 @@ def test_prediction_meets_a_swing_that_the_pid_is_too_late_for():
     ours, theirs = Plant(drogue=_swing), Plant(drogue=_swing)
     strong = {"acceleration_limit_m_s2": (0.75, 4.0, 4.0), "jerk_limit_m_s3": (4.0, 20.0, 20.0)}
     loose = dataclasses.replace(PID, limits=PhaseLimits(capture_radius_m=1.0), **strong)
-    fly(ours, settings=dataclasses.replace(SETTINGS, **strong))
+    swift = dataclasses.replace(SETTINGS, **strong)
+    at_ring = dataclasses.replace(SETTINGS.predictive, plan=PlanSettings(half_way_s=0.0))
+    fly(ours, settings=dataclasses.replace(swift, predictive=at_ring))
     fly(theirs, settings=loose)
-    assert ours.radial_at_contact < 0.05  # of 0.3 m, at the ring; the swing is met half-way to the coupling
+    assert ours.radial_at_contact < 0.04  # of 0.3 m
     assert theirs.radial_at_contact > 0.1
+    as_flown = Plant(drogue=_swing)
+    fly(as_flown, settings=swift)
+    assert as_flown.off_half_way_m < min(0.04, ours.off_half_way_m)
 
 
 def test_a_swing_beyond_the_airframe_s_acceleration_is_waited_for_astern():
