@@ -24,6 +24,7 @@ Row = NDArray[np.float32]
 def lay_before(
     out: NDArray[np.float32],
     nearest: NDArray[np.float32],
+    reach: NDArray[np.int64],
     x: Array,
     y: Array,
     extinction_1_m: float,
@@ -35,6 +36,7 @@ def lay_before(
     Args:
         out: (rows, columns) relative radiance.
         nearest: (rows, columns) depths [m].
+        reach: (rows, 2) first column that may hold a solid and one past the last; may go beyond the picture.
         x: (columns,) tangents to the right of the axis, of the blocks' centres.
         y: (rows,) tangents below it.
         extinction_1_m: of the air.
@@ -44,14 +46,21 @@ def lay_before(
     tangents, last = x.astype(np.float32), _F(far)
     for i in range(out.shape[0]):
         air = _F(extinction_1_m), _F(airlight), _F(1.0 + y[i] * y[i]), last
-        begin, n = -1, out.shape[1]
-        for left in range(0, n + _STRETCH, _STRETCH):
+        begin, n = -1, min(reach[i, 1], out.shape[1])
+        for left in range(max(reach[i, 0], 0) // _STRETCH * _STRETCH, n + _STRETCH, _STRETCH):
             solid = left < n and _count_nearer(nearest[i, left : min(left + _STRETCH, n)], last) > 0
             if solid and begin < 0:
                 begin = left
             elif begin >= 0 and not solid:
                 _fade_row(out[i, begin:left], nearest[i, begin:left], tangents[begin:left], air)
                 begin = -1
+
+
+@njit(cache=True)
+def clear(nearest: NDArray[np.float32], reach: NDArray[np.int64], far: float) -> None:
+    """Make depths (rows, columns) far again wherever something may have been drawn; `reach` as in `lay_before`."""
+    for i in range(nearest.shape[0]):
+        nearest[i, max(reach[i, 0], 0) : min(reach[i, 1], nearest.shape[1])] = far
 
 
 @njit(cache=True)

@@ -23,7 +23,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from dockair.rotations import Array
-from dockair.sim.camera.fading import lay_before
+from dockair.sim.camera.fading import clear, lay_before
 from dockair.sim.camera.mesh_view import MeshView, view_meshes
 from dockair.sim.camera.meshes import Meshes
 from dockair.sim.camera.solids import BALL, BOX, CAPSULE, CYLINDER, Haze, Lighting, Solids, depth_limits_m
@@ -55,7 +55,7 @@ class TracedSolids:
     def __init__(self, model: mujoco.MjModel, lighting: Lighting) -> None:
         self._solids, self._meshes, self._lighting = Solids.of(model), Meshes.of(model), lighting
         self._limits_m, self._view = depth_limits_m(model), MeshView.room_for(self._meshes)
-        self._memory = np.empty(0, dtype=np.float32)
+        self._depths = np.empty(0, dtype=np.float32)  # far wherever nothing is drawn, between pictures everywhere
         self._placed = Placed.room_for(len(self._solids.geoms), 0)
 
     def draw(
@@ -82,19 +82,19 @@ class TracedSolids:
         most = len(s.geoms) * len(y)
         if len(self._placed.runs) < most:
             self._placed = Placed.room_for(len(s.geoms), len(y))
-        if self._memory.size < out.size:
-            self._memory = np.empty(out.size, dtype=np.float32)
+        if self._depths.size < out.size:
+            self._depths = np.full(out.size, far, dtype=np.float32)
         poses = s.geoms, data.geom_xpos, data.geom_xmat
         count = place(s.kinds, s.half_sizes_m, poses, (R_WC, p_WC), x, y, near, self._placed)
-        nearest = self._memory[: out.size].reshape(out.shape)
-        nearest.fill(far)
+        nearest, reach = self._depths[: out.size].reshape(out.shape), np.full((len(y), 2), (len(x), 0))
         solids = s.kinds, s.half_sizes_m, s.reflectances
         shade, sun_C = (light.ambient, light.direct), R_WC.T @ light.toward_W
-        _trace(out, nearest, solids, self._placed, count, x, y, sun_C, shade, near)
+        _trace(out, nearest, reach, solids, self._placed, count, x, y, sun_C, shade, near)
         triangles = view_meshes(self._meshes, poses[1:], pose, x, y, sun_C, shade, near, self._view)
-        trace_meshes(out, nearest, self._meshes, self._view, triangles, x, y, near)
+        trace_meshes(out, nearest, reach, self._meshes, self._view, triangles, x, y, near)
         if haze.extinction_1_m > 0.0:
-            lay_before(out, nearest, x, y, haze.extinction_1_m, haze.airlight, far)
+            lay_before(out, nearest, reach, x, y, haze.extinction_1_m, haze.airlight, far)
+        clear(nearest, reach, far)
 
     def close(self) -> None:
         """Nothing to free."""
@@ -104,6 +104,7 @@ class TracedSolids:
 def _trace(
     out: NDArray[np.float32],
     nearest: NDArray[np.float32],
+    reach: NDArray[np.int64],
     solids: tuple[NDArray[np.int64], Array, Array],
     placed: Placed,
     count: int,
@@ -113,7 +114,10 @@ def _trace(
     light: tuple[float, float],
     near: float,
 ) -> None:
-    """Draw the first `count` placed solids, without haze; `nearest` (rows, columns) holds depths so far."""
+    """Draw the first `count` placed solids, without haze; `nearest` (rows, columns) holds depths so far.
+
+    `reach` (rows, 2), the first column that may have been drawn in each row and one past the last, is widened.
+    """
     kinds, half_sizes, reflectances = solids
     tangents = x.astype(np.float32)
     for k in range(count):
@@ -132,6 +136,7 @@ def _trace(
             if left == right:
                 continue
             right = min(left + (right - left + _LANES - 1) // _LANES * _LANES, len(x))
+            reach[i, 0], reach[i, 1] = min(reach[i, 0], left), max(reach[i, 1], right)
             a = (ahead[0] + y[i] * down[0], ahead[1] + y[i] * down[1], ahead[2] + y[i] * down[2])
             rays = _single(o), _single(a), _single(across), _single(_cross(o, a)), _single(q)
             part, picture, depths = tangents[left:right], out[i, left:right], nearest[i, left:right]

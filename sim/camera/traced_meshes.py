@@ -43,6 +43,7 @@ Line = tuple[np.float32, np.float32]  # value at x = 0 and slope; or volume and 
 def trace_meshes(
     out: NDArray[np.float32],
     nearest: NDArray[np.float32],
+    reach: NDArray[np.int64],
     meshes: Meshes,
     view: MeshView,
     count: int,
@@ -55,6 +56,7 @@ def trace_meshes(
     Args:
         out: (rows, columns) relative radiance, written.
         nearest: (rows, columns) depths so far, written.
+        reach: (rows, 2) first column that may have been drawn and one past the last, widened.
         meshes: of the model.
         view: of them.
         count: of the triangles in it.
@@ -65,7 +67,7 @@ def trace_meshes(
     tangents, columns, rows = x.astype(np.float32), _even(x), _even(y)
     for i in view.triangles[:count]:
         corners = meshes.triangles[i, 0], meshes.triangles[i, 1], meshes.triangles[i, 2]
-        _draw_triangle(corners, view.places, view.radiances, out, nearest, tangents, columns, rows, y, near)
+        _draw_triangle(corners, view.places, view.radiances, out, nearest, reach, tangents, columns, rows, y, near)
 
 
 @njit(cache=True)
@@ -87,6 +89,7 @@ def _draw_triangle(
     lit: Array,
     out: NDArray[np.float32],
     nearest: NDArray[np.float32],
+    reach: NDArray[np.int64],
     tangents: Row,
     x: Even,
     y: Even,
@@ -119,6 +122,8 @@ def _draw_triangle(
             continue
         lines = _line(e[0], at), _line(e[1], at), _line(e[2], at), _line(total, at), _line(bright, at)
         where = np.uint64(line), np.uint64(left), np.uint64(right)
+        reach[line, 0] = min(reach[line, 0], left - _LANES)  # a lot is taken whole
+        reach[line, 1] = max(reach[line, 1], right + _LANES)
         if x[2] < _LANES:
             _draw_narrow(lines, limits, tangents, out, nearest, where)
         else:

@@ -117,6 +117,17 @@ def test_a_mesh_that_reaches_past_the_lens_is_seen_as_far_as_the_near_plane(
     assert (pictures[0] != pictures[1]).sum() <= 3
 
 
+def test_a_picture_leaves_nothing_behind_in_the_next(world: Any) -> None:
+    """From all sides, near and far, narrow and wide by turns: as drawn by one that never drew before."""
+    name, model, data = world
+    used = TracedSolids(model, SUNLIT)
+    for seed in range(12):
+        pose = _looking_at_it((1.5, 0.5, 0.2)[seed % 3] * FAR[name], seed)
+        x, y = ((X, Y), (X[3:12], Y[5:40]), (X[20:90], Y))[seed % 3]
+        fresh = TracedSolids(model, SUNLIT)
+        assert np.array_equal(_draw(used, data, pose, x, y), _draw(fresh, data, pose, x, y))
+
+
 def test_blocks_show_a_mesh_where_mujocos_rays_meet_it(world: Any) -> None:
     """A block in 23; the skins are closed, so that the first face met looks at the lens."""
     name, model, data = world
