@@ -1,59 +1,28 @@
-"""What is infinitely far away: clear sky, cloud above with gaps, cloud deck and ground below, haze, night.
+"""Pictures of what is infinitely far away: `sky_radiance`, read from tables for every block of every frame.
 
-Relative radiance, 1 = a white Lambertian surface in normal sunlight, toward a direction in W: c is the cosine of the
-angle X from the Sun, s the sine of the elevation.
-
-    J(c) = airlight f,   f = 1 + a (exp(-d X) - exp(-d pi/2)) + e c^2                                           (1)
-    clear sky   J (1 - exp(-b m)),   b = -ln(1 - zenith/airlight),   m = 1/(|s| + 0.025 exp(-11 |s|))              (2)
-                below level, down to the lowest point and up:  80 exp(D/H) - m,   D = r (1 - sqrt(1 - s^2))
-    cloud above at (x, y) = height (d_x, d_y)/(s + w), crossed at mu = (s + w)/(1 + w)                             (3)
-    surface below, depth h down:  d = -r s - sqrt(q),  q = (r - h)^2 - r^2 (1 - s^2),  mu = sqrt(q)/(r - h)          (4)
-    deck        R min(mu_0 (1 + w n), 1) + (1 - R) (what is below),   R = 1 - T(tau/mu)                           (5)
-    air before  L <- L exp(-b' m) + J' (1 - exp(-b' m)),   b' = aerosol (exp(-z_1/H) - exp(-z_2/H))                (6)
-    haze        L <- L exp(-b_h m) + J_h (1 - exp(-b_h m)),   b_h = (3.912/V - 3.912/V_clear) depth, not below 0   (7)
-
-Eq. (1) is the CIE clear sky's indicatrix, which is 1 at 90 degrees; (2) its gradation, scaled so that the zenith and
-endless air at 90 degrees from the Sun are the sheet's. w is the thickness of cloud elements over their width: it keeps
-slant paths finite where a layer is seen edge-on. J' has less Sun in it where cloud shades the air (mean of the
-layer); J_h less where the haze itself does. The light that cloud sends down is `clouds`.
-
-Deck and ground stay where they are as the camera passes over them (`layer_table`); land is patches of all sizes, darker
-and lighter, and water. What is above goes along with the camera, as W does.
-Not modelled: wind, twilight, moon, vapour trails, shadows on the deck, polarisation; cloud at flight level but as haze.
-Cloud above is one layer that starts over the aircraft; within it, or under the deck's top, this is not valid.
-Sources: ISO 15469 (CIE S 011), sky type 12; Rozenberg 1966 (air mass at the horizon); 3.912/V as in radiometry (7).
+Deck and ground stay where they are as the camera passes over them (`layer_table`); what is above goes along with it
+(`sky_table`). Tables hold the law and not the sky, so that a sky that nobody needs is gone at once, with its tables.
 """
-
-import math
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtri
 
 from dockair.rotations import Array
-from dockair.sim.camera.clouds import Droplets, Texture, optical_depth
-from dockair.sim.camera.earth import air_mass, columns_below, dip_sine, meet_sphere, unit
+from dockair.sim.camera.earth import columns_below, dip_sine
 from dockair.sim.camera.layer_table import LayerTable, lay_under
-from dockair.sim.camera.radiometry import extinction_1_m
 from dockair.sim.camera.sheets import SkyParameters
+from dockair.sim.camera.sky_radiance import LAYER_NODE_RAD, NODE_RAD, SkyRadiance
 from dockair.sim.camera.sky_table import DirectionTable
 from dockair.sim.camera.weather import Weather
 
 __all__ = ["Sky", "Weather"]
 
-_TILES, _SMOOTH_TILES = 48, 24  # of the table, a side; without clouds
-_NODE_RAD = 2.0 / (64 * _TILES)
-_LAYER_TILES = 32  # of the tables of deck and ground
-_LAYER_NODE_RAD = 2.0 / (64 * _LAYER_TILES)
-_OVERHEAD = (0.0, 0.0, 1.0)
-#: Keys apart: cloud above, deck, ground, coasts.
-_LAYERS = 0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0xD6E8FEB86659FD93, 0xA0761D6478BD642F
-_COAST = 0.1  # standard deviations of the noise over which land turns into water
-_AMBIENT_DIRECTIONS = 1024
+_TILES, _LAYER_TILES = (round(2.0 / (64 * node)) for node in (NODE_RAD, LAYER_NODE_RAD))  # of the tables, a side
+_SMOOTH_TILES = _TILES // 2  # without clouds
 
 
 class Sky:
-    """Radiance and transmittance by direction. Keeps what it has worked out; its answers do not depend on that."""
+    """Pictures by attitude and place, and the law behind. Keeps what it has worked out; no answer depends on that."""
 
     def __init__(
         self, parameters: SkyParameters, weather: Weather, sun_direction_W: Array | None, altitude_m: float, key: int
@@ -67,31 +36,14 @@ class Sky:
             altitude_m: of the camera above the ground.
             key: 64 bits of the stream "clouds".
         """
-        p = self._p = parameters
-        self._weather, self._altitude_m = weather, altitude_m
-        sun = np.array(_OVERHEAD if sun_direction_W is None else sun_direction_W, dtype=float)
-        self._sun = sun / math.sqrt(float(sun @ sun))
-        self._mu_sun = (max(float(self._sun[2]), 0.0) + p.cloud_aspect) / (1.0 + p.cloud_aspect)
-        self._sine_sun = max(float(self._sun[2]), 0.0)
-        self._droplets = Droplets(
-            asymmetry=p.cloud_asymmetry, size_parameter=2.0 * math.pi * p.droplet_radius_m / p.wavelength_m
-        )
-        cells = p.cloud_cell_m, p.deck_cell_m, p.ground_cell_m, p.coast_cell_m
-        self._above, self._deck, self._ground, self._coasts = (
-            Texture(key=key ^ layer, cell_m=cell, spectral_exponent=p.cloud_spectral_exponent)
-            for layer, cell in zip(_LAYERS, cells, strict=True)
-        )
-        self._clear_depth = -math.log(1.0 - p.zenith / p.airlight)
-        self._clear_share = 1.0 - math.exp(-p.cloud_height_m / p.aerosol_scale_m)  # of the air, under the cloud
-        excess = extinction_1_m(weather.visibility_m) - extinction_1_m(p.clear_visibility_m)
-        self._haze_depth = max(excess, 0.0) * p.haze_depth_m
-        self._shade()
+        law = self._law = SkyRadiance(parameters, weather, sun_direction_W, altitude_m, key)
+        self._night = parameters.night if weather.night else None
         tiles = _TILES if weather.cloud_cover > 0.0 else _SMOOTH_TILES
-        self._table = DirectionTable(self._upward, tiles, smooth=tiles == _SMOOTH_TILES)
-        top_m = self._top_m = p.deck_top_m if self._has_deck else 0.0  # of what is met first from above
-        self._ground_table = LayerTable(self._below, _LAYER_TILES, 1, altitude_m, p.earth_radius_m)
-        self._deck_table = LayerTable(self._over, _LAYER_TILES, 2, altitude_m - top_m, p.earth_radius_m + top_m)
-        self.ambient = self._ambient()  #: mean relative radiance of all directions: what lights the Sun's lee
+        self._table = DirectionTable(law.upward, tiles, smooth=tiles == _SMOOTH_TILES)
+        earth_m = parameters.earth_radius_m
+        self._top_m, self._height_m = earth_m + law.top_m, altitude_m - law.top_m  # of what is met first from above
+        self._ground_table = LayerTable(law.below, _LAYER_TILES, 1, altitude_m, earth_m)
+        self._deck_table = LayerTable(law.over, _LAYER_TILES, 2, self._height_m, self._top_m)
 
     def fill(self, out: NDArray[np.float32], R_WC: Array, x: Array, y: Array, place_m: Array | None = None) -> None:
         """Write what is seen in directions of the camera's axes.
@@ -103,198 +55,40 @@ class Sky:
             y: (rows,) evenly spaced.
             place_m: (3,) where it has come to since the start, in axes that stay with the air; None is the start.
         """
-        if self._weather.night:
-            out[:] = self._p.night
+        if self._night is not None:
+            out[:] = self._night
             return
         place = np.zeros(3) if place_m is None else np.asarray(place_m, dtype=float)
         R, x, y = np.ascontiguousarray(R_WC, dtype=float), np.asarray(x, dtype=float), np.asarray(y, dtype=float)
         below = np.empty((len(y), 2), dtype=np.int64)
-        sine = dip_sine(self._p.earth_radius_m + self._top_m, self._altitude_m + float(place[2]) - self._top_m)
+        sine = dip_sine(self._top_m, self._height_m + float(place[2]))
         first, stop, any_below = columns_below(R, x, y, sine, below)
         if first < stop:
             self._table.fill(out[first:stop], R, x, y[first:stop])
         if any_below:
             ground = self._ground_table.nodes(place, R, x, y, below)
-            deck = self._deck_table.nodes(place, R, x, y, below) if self._has_deck else ground
-            lay_under(out, R, x, y, below, ground, deck, self._has_deck)
+            has_deck = self._law.has_deck
+            deck = self._deck_table.nodes(place, R, x, y, below) if has_deck else ground
+            lay_under(out, R, x, y, below, ground, deck, has_deck)
 
-    def beam(self, directions_W: Array) -> Array:
-        """Return (n,) transmittance of cloud and haze for sunlight from (n, 3) directions; 1 without either."""
-        d = unit(directions_W)
-        if self._weather.night:
-            return np.zeros(len(d))
-        mu = self._slope(d) / (1.0 + self._p.cloud_aspect)
-        through = np.exp(-self._depth_above(d) / mu - self._haze_depth * air_mass(d[:, 2]))
-        return np.where(self._surface(d[:, 2], 0.0)[0], 0.0, through)
-
-    def airlight(self, direction_W: Array) -> float:
-        """Return the relative radiance of endless haze toward a direction (3,): what far objects fade into."""
-        if self._weather.night:
-            return self._p.night
-        (x, y, z), (a, b, c) = np.asarray(direction_W).tolist(), self._sun.tolist()
-        cosine = (x * a + y * b + z * c) / math.sqrt(x * x + y * y + z * z)
-        return float(self._haze(np.array(min(max(cosine, -1.0), 1.0))))
+    @property
+    def ambient(self) -> float:
+        """Mean relative radiance of all directions: what lights the Sun's lee."""
+        return self._law.ambient
 
     @property
     def diffuse_share(self) -> float:
         """Share of the light on a surface that faces the Sun which does not come from the Sun's direction."""
-        direct = float(self.beam(self._sun[None])[0])  # 0 at night
-        return self.ambient / (self.ambient + direct)
+        return self._law.diffuse_share
+
+    def beam(self, directions_W: Array) -> Array:
+        """Return (n,) transmittance of cloud and haze for sunlight from (n, 3) directions; 1 without either."""
+        return self._law.beam(directions_W)
+
+    def airlight(self, direction_W: Array) -> float:
+        """Return the relative radiance of endless haze toward a direction (3,): what far objects fade into."""
+        return self._law.airlight(direction_W)
 
     def radiance(self, directions_W: Array) -> Array:
         """Return (n,) relative radiances toward (n, 3) directions at the start: what `fill` reads between nodes."""
-        return self._radiance(unit(directions_W), with_aureole=True)
-
-    def _radiance(self, d: Array, with_aureole: bool) -> Array:
-        if self._weather.night:
-            return np.full(len(d), self._p.night)
-        out, here = self._upward(d, with_aureole), np.zeros(3)
-        down = np.flatnonzero(self._surface(d[:, 2], self._top_m)[0])
-        out[down] = self._below(d[down], here)[:, 0]
-        if self._has_deck:
-            light, clear = self._over(d[down], here).T
-            out[down] = light + clear * out[down]
-        return out
-
-    def _upward(self, d: Array, with_aureole: bool = True) -> Array:
-        """Sky behind haze; where there is a layer, as if there were none."""
-        return self._behind_haze(self._sky(d, self._cosine(d), with_aureole), d)
-
-    def _below(self, d: Array, key_m: Array) -> Array:
-        """(n, 1) ground from a place; sky where a ray passes it. Behind haze, but for when a deck is before it."""
-        cosine = self._cosine(d)
-        out = self._sky(d, cosine, with_aureole=True)
-        down = np.flatnonzero(self._surface(d[:, 2], 0.0, float(key_m[2]))[0])
-        out[down] = self._land(d[down], cosine[down], key_m)
-        return (out if self._has_deck else self._behind_haze(out, d))[:, None]
-
-    def _over(self, d: Array, key_m: Array) -> Array:
-        """(n, 2) light of the deck from a place, behind haze, and transmittance of deck, air and haze before it."""
-        light, through = self._cloud_deck(d, self._cosine(d), key_m)
-        return np.column_stack([self._behind_haze(light, d), through * np.exp(-self._haze_depth * air_mass(d[:, 2]))])
-
-    def _behind_haze(self, light: Array, d: Array) -> Array:
-        clear = np.exp(-self._haze_depth * air_mass(d[:, 2]))
-        return np.asarray(light * clear + self._haze(self._cosine(d)) * (1.0 - clear))
-
-    def _cosine(self, d: Array) -> Array:
-        s = self._sun
-        return np.clip(d[:, 0] * s[0] + d[:, 1] * s[1] + d[:, 2] * s[2], -1.0, 1.0)
-
-    def _sky(self, d: Array, cosine: Array, with_aureole: bool) -> Array:
-        """Clear sky, Eq. (2), and the cloud in it, Eq. (3)."""
-        mass = self._clear_mass(d[:, 2])
-        before = np.exp(-self._clear_share * self._clear_depth * mass)
-        beyond = self._source(cosine, 1.0, 1.0) * (before - np.exp(-self._clear_depth * mass))
-        front = self._source(cosine, self._light_below, self._direct_below) * (1.0 - before)
-        if self._weather.cloud_cover <= 0.0:
-            return np.asarray(front + beyond)
-        depth = self._depth_above(d)
-        mu = self._slope(d) / (1.0 + self._p.cloud_aspect)
-        light = self._droplets.diffuse(depth, mu, self._mu_sun, cosine)
-        light += (
-            self._p.ground_reflectance
-            * self._sine_sun
-            * self._light_below
-            * (1.0 - self._droplets.transmittance(depth))
-        )
-        if with_aureole:
-            light += self._droplets.aureole(depth, mu, cosine)
-        return np.asarray(front + before * light + beyond * np.exp(-depth / mu))
-
-    def _land(self, d: Array, cosine: Array, key_m: Array) -> Array:
-        """The ground through the air under the deck's top (or under the aircraft), Eqs. (4) and (6)."""
-        p = self._p
-        _, distance, mu = self._surface(d[:, 2], 0.0, float(key_m[2]))
-        at = key_m[0] + d[:, 0] * distance, key_m[1] + d[:, 1] * distance, _LAYER_NODE_RAD * distance / np.sqrt(mu)
-        land = p.ground_reflectance * np.maximum(1.0 + p.ground_contrast * self._ground.at(*at), 0.0)
-        if p.water_cover > 0.0:
-            shore = float(ndtri(1.0 - p.water_cover))
-            water = np.clip(0.5 + (self._coasts.at(*at) - shore) / _COAST, 0.0, 1.0)
-            land += water * (p.water_reflectance - land)
-        light = land * self._sine_sun * self._light_below
-        return self._through_air(light, d[:, 2], cosine, 0.0, p.deck_top_m if self._has_deck else self._altitude_m)
-
-    def _cloud_deck(self, d: Array, cosine: Array, key_m: Array) -> tuple[Array, Array]:
-        """Light of the deck with the air before it, and the transmittance of both, Eqs. (4) to (6)."""
-        p = self._p
-        _, distance, mu = self._surface(d[:, 2], p.deck_top_m, float(key_m[2]))
-        at = key_m[0] + d[:, 0] * distance, key_m[1] + d[:, 1] * distance, _LAYER_NODE_RAD * distance / np.sqrt(mu)
-        noise = self._deck.at(*at)
-        depth = optical_depth(noise, p.deck_cover, p.deck_optical_depth)
-        reflectance = 1.0 - self._droplets.transmittance(depth * (1.0 + p.cloud_aspect) / (mu + p.cloud_aspect))
-        facing = np.clip(self._mu_sun * (1.0 + p.cloud_aspect * noise), 0.0, 1.0)
-        light, high = reflectance * facing * self._light_below, self._altitude_m
-        clear = self._clear(d[:, 2], p.deck_top_m, high)
-        return self._through_air(light, d[:, 2], cosine, p.deck_top_m, high), (1.0 - reflectance) * clear
-
-    def _through_air(self, light: Array, sine: Array, cosine: Array, low_m: float, high_m: float) -> Array:
-        """Light from below through the clear air between two heights, Eq. (6)."""
-        clear = self._clear(sine, low_m, high_m)
-        return np.asarray(light * clear + self._source(cosine, self._light_below, self._direct_below) * (1.0 - clear))
-
-    def _clear(self, sine: Array, low_m: float, high_m: float) -> Array:
-        p = self._p
-        depth = p.aerosol_optical_depth * (math.exp(-low_m / p.aerosol_scale_m) - math.exp(-high_m / p.aerosol_scale_m))
-        return np.asarray(np.exp(-depth * air_mass(sine)))
-
-    def _source(self, cosine: Array, light: float, direct: float) -> Array:
-        """J of Eq. (1) in air that `light` of all sunlight reaches, `direct` of that as a beam."""
-        p = self._p
-        angle = np.arccos(cosine)
-        decayed = np.exp(-p.aureole_decay_1_rad * angle) - math.exp(-0.5 * math.pi * p.aureole_decay_1_rad)
-        shape = p.aureole * decayed + p.molecular * cosine * cosine
-        return np.asarray(p.airlight * light * (1.0 + direct * shape))
-
-    def _haze(self, cosine: Array) -> Array:
-        """J_h of Eq. (7): the beam that gets through the haze makes J, the rest of the light is the same all round."""
-        beam, rest = self._haze_light
-        return self._source(cosine, self._light_below, self._direct_below) * beam + rest
-
-    def _shade(self) -> None:
-        """Mean light under the layer above, and how much of it still is a beam; of that in haze, beam and rest."""
-        cover, depth = self._weather.cloud_cover, self._weather.cloud_optical_depth
-        self._light_below = 1.0 - cover + cover * float(self._droplets.transmittance(np.asarray(depth)))
-        self._direct_below = (1.0 - cover + cover * math.exp(-0.5 * depth / self._mu_sun)) / self._light_below
-        self._has_deck = self._p.deck_cover > 0.0 and self._altitude_m > self._p.deck_top_m
-        beam = math.exp(-self._haze_depth * float(air_mass(self._sun[2:])[0]))
-        through = float(self._droplets.transmittance(np.asarray(self._haze_depth)))
-        self._haze_light = beam, self._mu_sun * max(through - beam, 0.0) * self._light_below
-
-    def _clear_mass(self, sine: Array) -> Array:
-        """(n,) air mass of clear air, Eq. (2); a ray that would go through the ground counts as one that skims it."""
-        mass, level = air_mass(sine), float(air_mass(np.zeros(1))[0])
-        r = self._p.earth_radius_m + self._altitude_m
-        drop_m = r * sine * sine / (1.0 + np.sqrt(np.maximum(1.0 - sine * sine, 0.0)))
-        thicker = np.exp(np.minimum(drop_m, self._altitude_m) / self._p.aerosol_scale_m)
-        return np.where(sine < 0.0, 2.0 * level * thicker - mass, mass)
-
-    def _depth_above(self, d: Array) -> Array:
-        """(n,) optical depth straight through the layer where rays (n, 3) cross it, Eq. (3)."""
-        p = self._p
-        if self._weather.cloud_cover <= 0.0:
-            return np.zeros(len(d))
-        slope = self._slope(d)
-        reach = p.cloud_height_m / slope
-        noise = self._above.at(d[:, 0] * reach, d[:, 1] * reach, _NODE_RAD * reach / np.sqrt(slope))
-        return optical_depth(noise, self._weather.cloud_cover, self._weather.cloud_optical_depth)
-
-    def _slope(self, d: Array) -> Array:
-        """Return s + w of Eq. (3); the rays that see the layer stay above half of w below level."""
-        w = self._p.cloud_aspect
-        return np.maximum(d[:, 2] + w, 0.5 * w)
-
-    def _surface(self, sine: Array, top_m: float, rise_m: float = 0.0) -> tuple[NDArray[np.bool_], Array, Array]:
-        """What rays of (n,) sines do to the sphere of a height, from so much higher than the flight."""
-        return meet_sphere(sine, self._p.earth_radius_m + top_m, self._altitude_m + rise_m - top_m)
-
-    def _ambient(self) -> float:
-        """Mean radiance over a Fibonacci sphere; the aureole counts as direct light."""
-        if self._weather.night:
-            return self._p.night
-        k = np.arange(_AMBIENT_DIRECTIONS) + 0.5
-        z = 1.0 - 2.0 * k / _AMBIENT_DIRECTIONS
-        turn = math.pi * (1.0 + math.sqrt(5.0)) * k
-        across = np.sqrt(1.0 - z * z)
-        directions = np.stack([across * np.cos(turn), across * np.sin(turn), z], axis=1)
-        return float(self._radiance(directions, with_aureole=False).mean())
+        return self._law.radiance(directions_W)

@@ -1,6 +1,8 @@
 """The sky: published radiances, the horizon's place, cloud gaps that look like LEDs, haze, night; bits that repeat."""
 
+import gc
 import math
+import weakref
 from dataclasses import replace
 
 import numpy as np
@@ -319,3 +321,16 @@ def test_cloud_before_the_sun_makes_all_light_diffuse() -> None:
 def test_impossible_weather_is_refused_by_name(key: str, value: float) -> None:
     with pytest.raises(DockairError, match=key):
         Weather(**{key: value})
+
+
+def test_a_sky_that_nobody_needs_is_gone_at_once() -> None:
+    """Its tables are many megabytes: flight after flight in one process must not wait for the garbage collector."""
+    sky = _sky()
+    _picture(sky)
+    table = weakref.ref(sky._deck_table)
+    gc.disable()
+    try:
+        del sky
+        assert table() is None
+    finally:
+        gc.enable()
