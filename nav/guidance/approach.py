@@ -56,7 +56,7 @@ class Guidance:
         self._passed: Array | None = None  # where the ring was when the tip last came to its plane, left and up
         self._closure, self._good, self._committed = 0.0, False, False
         self._attempts, self._docked = 0, False
-        self._time_s = self._in_phase_s = self._steady_s = self._waiting_s = 0.0
+        self._time_s = self._in_phase_s = self._steady_s = self._waiting_s = self._patient_s = 0.0
         self._unusable_s = self._doubtful_s = self._inside_s = self._pushed_in_m = 0.0
 
     def announce(self, announcement: TankerAnnouncement) -> None:
@@ -120,6 +120,7 @@ class Guidance:
             and state.sigma_lateral_m < limits.steady_sigma_m
         )
         self._steady_s = self._steady_s + self._dt if steady else 0.0
+        self._patient_s = self._patient_s + self._dt if self.phase in (Phase.PRE_CONTACT, Phase.APPROACH) else 0.0
         if self.phase is Phase.APPROACH:
             self._close(state, float(ring[0]))
             self._inside_s = self._inside_s + self._dt if ring[0] <= 0.0 else 0.0
@@ -131,7 +132,7 @@ class Guidance:
         s = self._settings
         error = float(np.hypot(*self._controller.error_to_come(self._aim_now())))
         miss = self._miss.at_contact_m(error, distance_m, s.closure_speed_m_s)
-        radius = s.limits.capture_radius_m * (s.closing.hysteresis if self._good else 1.0)
+        radius = self._radius_m() * (s.closing.hysteresis if self._good else 1.0)
         self._good = state.usable and state.contact_usable and miss <= radius
         self._committed = self._closure > 0.0 and (
             self._committed or distance_m <= room_to_stop_m(s.closing, self._closure)
@@ -143,12 +144,19 @@ class Guidance:
         self._closure = min(max(closure, least), s.closure_speed_m_s)
         self._waiting_s = self._waiting_s + self._dt if self._closure <= 0.0 else 0.0
 
+    def _radius_m(self) -> float:
+        """How well the drogue has to be followed now: the longer a calm moment is waited for, the less."""
+        limits = self._settings.limits
+        share = min(self._patient_s / limits.patience_s, 1.0)
+        return limits.capture_radius_m * (1.0 + (limits.late_radius - 1.0) * share)
+
     def _situation(self, ring: Array, rate: Array, coupling: Array) -> Situation:
         return Situation(
             time_s=self._time_s,
             in_phase_s=self._in_phase_s,
             steady_s=self._steady_s,
             spread_m=self._miss.spread_m,
+            radius_m=self._radius_m(),
             waiting_s=self._waiting_s,
             inside_s=self._inside_s,
             unusable_s=self._unusable_s,

@@ -33,8 +33,10 @@ class PhaseLimits:
     station_m: float = 0.5  # assumed: astern, that is near enough to the stand-off point
     steady_along_m: float = 0.35  # assumed: twice the way that moderate gusts push receiver and drogue apart
     steady_sigma_m: float = 0.05  # assumed: a third of the 0.15 m that a contact may be off
-    capture_radius_m: float = 0.10  # assumed: of the following; what is flown at contact is better by a third
-    waiting_s: float = 20.0  # assumed: gusts that pass by have passed; a retry would wait as long
+    capture_radius_m: float = 0.08  # assumed: of the following, half of the 0.15 m that a contact may be off
+    patience_s: float = 60.0  # assumed: some swings' worth of gusts; who has waited so long for a calm moment ...
+    late_radius: float = 1.5  # ... closes within so many times that radius, which grows on the way there
+    waiting_s: float = 60.0  # assumed: gusts that pass by have passed; a retry would wait as long
     inside_s: float = 1.0  # assumed: the way from the ring to the coupling takes 0.2 s
     coupling_reached_m: float = 0.05  # assumed: the coupling takes the tip within 0.03 m, the range errs by 0.02 m
     come_along_m: float = 0.2  # assumed: a drogue farther from the tip than this is not held by it
@@ -59,6 +61,7 @@ class Situation:
     in_phase_s: float  #: since the phase began
     steady_s: float  #: time for which the receiver has been steady astern of the drogue
     spread_m: float  #: root mean square of the error across over the last swing
+    radius_m: float  #: what that may be, after so much waiting
     waiting_s: float  #: time for which the approach has stood still for want of a good moment
     inside_s: float  #: time for which the tip has been past the ring's plane
     unusable_s: float  #: time for which the relative state has been unusable
@@ -132,7 +135,7 @@ TRANSITIONS: dict[Phase, tuple[Transition, ...]] = {
         Transition(
             Phase.APPROACH,
             "steady",
-            lambda limits, s: s.steady_s >= limits.stabilise_s and s.spread_m <= limits.capture_radius_m,
+            lambda limits, s: s.steady_s >= limits.stabilise_s and s.spread_m <= s.radius_m,
         ),
     ),
     Phase.APPROACH: (
@@ -141,6 +144,7 @@ TRANSITIONS: dict[Phase, tuple[Transition, ...]] = {
         Transition(Phase.BREAKAWAY, "integrity lost", _doubtful),
         Transition(Phase.BREAKAWAY, "far off axis", _off_axis),
         Transition(Phase.BREAKAWAY, "beside the basket", _beside),
+        Transition(Phase.BACK_OFF, "time slot over", lambda limits, s: s.time_s >= limits.slot_s and s.waiting_s > 0.0),
         Transition(Phase.BACK_OFF, "no good moment to close", lambda limits, s: s.waiting_s >= limits.waiting_s),
         Transition(Phase.BACK_OFF, "coupling not reached", lambda limits, s: s.inside_s >= limits.inside_s),
         Transition(Phase.CONTACT, "coupling reached", lambda limits, s: s.ahead_m <= limits.coupling_reached_m),

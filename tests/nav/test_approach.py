@@ -123,11 +123,25 @@ def _swing(t):
     return 0.3 * np.array([0.0, np.sin(2.1 * t), np.cos(2.6 * t)])
 
 
+def test_the_longer_a_calm_moment_is_waited_for_the_less_calm_it_has_to_be():
+    """A drogue that is followed to 0.9 of what is asked for at last: not closed upon before some time has passed."""
+    seen = []
+    none = PhaseLimits(capture_radius_m=1e-3)
+    fly(Plant(drogue=_swing), 30.0, dataclasses.replace(PID, limits=none), lambda s: seen.append(s.p_PD_B) or s)
+    rms_m = float(np.sqrt(np.mean(np.sum(np.square(np.array(seen)[10 * RATE_HZ :, 1:]), axis=1))))
+    begun = []
+    for seconds, late_radius in ((50.0, 1.0), (10.0, 1.5), (50.0, 1.5)):
+        limits = PhaseLimits(capture_radius_m=rms_m / 1.35, patience_s=40.0, late_radius=late_radius)
+        phases, _ = fly(Plant(drogue=_swing), seconds, dataclasses.replace(PID, limits=limits))
+        begun.append(Phase.APPROACH in phases)
+    assert begun == [False, False, True]
+
+
 def test_prediction_meets_a_swing_that_the_pid_is_too_late_for():
     ours, theirs = Plant(drogue=_swing), Plant(drogue=_swing)
     strong = {"acceleration_limit_m_s2": (0.75, 4.0, 4.0), "jerk_limit_m_s3": (4.0, 20.0, 20.0)}
     loose = dataclasses.replace(PID, limits=PhaseLimits(capture_radius_m=1.0), **strong)
-    swift = dataclasses.replace(SETTINGS, **strong)
+    swift = dataclasses.replace(SETTINGS, limits=PhaseLimits(capture_radius_m=0.1, late_radius=1.0), **strong)
     at_ring = dataclasses.replace(SETTINGS.predictive, plan=PlanSettings(half_way_s=0.0))
     fly(ours, settings=dataclasses.replace(swift, predictive=at_ring))
     fly(theirs, settings=loose)

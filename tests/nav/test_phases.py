@@ -16,6 +16,7 @@ CALM = Situation(
     in_phase_s=0.0,
     steady_s=0.0,
     spread_m=0.05,
+    radius_m=0.08,
     waiting_s=0.0,
     inside_s=0.0,
     unusable_s=0.0,
@@ -39,7 +40,8 @@ HELD = {"ahead_m": 0.0, "ring_ahead_m": -0.3, "closing_m_s": 0.0}
         ("join_up", {"station_m": 0.4}, "pre_contact"),
         ("pre_contact", {}, None),
         ("pre_contact", {"steady_s": 3.0}, "approach"),
-        ("pre_contact", {"steady_s": 3.0, "spread_m": 0.11}, None),
+        ("pre_contact", {"steady_s": 3.0, "spread_m": 0.081}, None),
+        ("pre_contact", {"steady_s": 3.0, "spread_m": 0.081, "radius_m": 0.09}, "approach"),
         ("pre_contact", {"steady_s": 3.0, "spread_m": math.inf}, None),
         ("approach", {}, None),
         ("approach", {"unusable_s": 0.6}, "breakaway"),
@@ -51,7 +53,8 @@ HELD = {"ahead_m": 0.0, "ring_ahead_m": -0.3, "closing_m_s": 0.0}
         ("approach", {"lateral_m": 0.3, "ring_ahead_m": -0.01}, "breakaway"),
         ("approach", {"lateral_m": 0.2, "ring_ahead_m": -0.01}, None),
         ("approach", {"closing_m_s": 2.7}, "breakaway"),
-        ("approach", {"waiting_s": 20.1}, "back_off"),
+        ("approach", {"waiting_s": 59.9}, None),
+        ("approach", {"waiting_s": 60.1}, "back_off"),
         ("approach", {"inside_s": 1.01}, "back_off"),
         ("approach", {"ahead_m": 0.04}, "contact"),
         ("contact", HELD, None),
@@ -84,6 +87,13 @@ def test_no_approach_is_begun_once_the_time_slot_is_over():
     for phase in (Phase.JOIN_UP, Phase.PRE_CONTACT):
         assert next_phase(phase, PhaseLimits(slot_s=45.0), late).to is Phase.CLEAR
         assert next_phase(phase, PhaseLimits(slot_s=45.1), late).to is not Phase.CLEAR
+
+
+def test_an_approach_that_stands_still_is_given_up_once_the_time_slot_is_over():
+    late = dataclasses.replace(CALM, time_s=45.0, waiting_s=0.1)
+    assert next_phase(Phase.APPROACH, PhaseLimits(slot_s=45.0), late).to is Phase.BACK_OFF
+    assert next_phase(Phase.APPROACH, PhaseLimits(slot_s=45.1), late) is None
+    assert next_phase(Phase.APPROACH, PhaseLimits(slot_s=45.0), dataclasses.replace(late, waiting_s=0.0)) is None
 
 
 def test_docs_and_code_have_the_same_table():
