@@ -9,6 +9,7 @@ from scipy.stats import chi2
 from dockair.calibration import Camera, GyroSheet, LedRing, Mounting, NavigationSheets, StartGeometry
 from dockair.errors import DockairError
 from dockair.messages import ImuSample
+from dockair.nav import fusion
 from dockair.nav.fusion import FusionSettings, RelativeFilter
 from dockair.nav.pose.estimate import PoseEstimate, solve_pose
 from dockair.nav.pose.planar import mirrored
@@ -659,3 +660,27 @@ def test_a_bias_of_the_gyro_hardly_harms_the_velocity_from_the_tip():
     assert np.abs(e[7:]).max() < 0.12
     assert np.sqrt(np.diag(P)[7:].max()) < 0.08
     assert nees(e, P) < chi2.ppf(0.9999, 9)
+
+
+def test_a_long_silence_is_gone_through_once_however_often_the_present_is_asked_for(monkeypatch):
+    """40 s without a message, asked at 50 Hz: the way that is gone is theirs, and a buffer's length a question."""
+    asked, quiet = RelativeFilter(sheets(6.0)), RelativeFilter(sheets(6.0))
+    world = World(sheets(6.0), SETTINGS, np.random.default_rng(3))
+    for _ in range(50):
+        sample = world.step()
+        for filter_ in (asked, quiet):
+            filter_.propagate([sample])
+    gone, real = [], fusion.propagated
+    monkeypatch.setattr(fusion, "propagated", lambda *a: gone.append(a[4] - a[3]) or real(*a))
+    begun_s, rate_hz, silence_s = asked.imu_time_s, 50, 40.0
+    times = begun_s + np.arange(1, round(silence_s * rate_hz) + 1) / rate_hz
+    for time_s in times:
+        state = asked.state(time_s)
+    assert sum(gone) < silence_s + len(times) * SETTINGS.buffer_s
+    at_once = quiet.state(times[-1])
+    assert np.allclose(state.p_PD_B, at_once.p_PD_B, atol=1e-6)
+    assert np.allclose(state.covariance, at_once.covariance, rtol=1e-6)
+    sample = replace(world.gyro(), time_stamp_s=begun_s + 0.5)  # and a message is the end of it
+    for filter_ in (asked, quiet):
+        filter_.propagate([sample])
+    assert np.array_equal(asked.state(begun_s + 0.6).covariance, quiet.state(begun_s + 0.6).covariance)
