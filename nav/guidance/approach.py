@@ -10,10 +10,14 @@ so that the closure speed is what the coupling wants whatever the drogue does.
 After contact the view says nothing about the way to the tanker: the way pushed in is the integral of what was
 commanded beyond the drogue's drift.
 
-Where the tanker turns or descends, the receiver's own path does so as announced (`announced_path`), and u stays small.
-What announced and true turn differ by shows as a drift across that grows; u to the left goes into the turn:
+Where the tanker turns or descends, the receiver's own path does so as announced, and leans on what announced and true
+turn differ by (`announced_path`). None of this is left to the controller: to its u is added the velocity v, level to
+the left (l), that the path is learnt to leave, and what the turn n of the axes does to the drogue's place p is taken
+off,
 
-    r = r_announced + k_r (u_left + integral of u_left dt / T_r)                                          (2)
+    commanded = u + v l - n x p                                                                           (2)
+
+so that the drogue's drift is the same on the way to it, on the probe and back.
 
 The push of the receiver's own bow wave is part of the prediction, and what it did otherwise at one attempt is part of
 the next one's aim (`bow_wave_push`).
@@ -51,7 +55,9 @@ class Guidance:
         self._miss = PredictedMiss(settings.closing, self._dt)
         self._u: Array = np.zeros(3)
         self._u_dot: Array = np.zeros(3)
-        self._path, self._turn_rad_s, self._turn_error_m_s = AnnouncedPath(), 0.0, 0.0
+        self._path = AnnouncedPath()
+        self._turned: Array = np.zeros((2, 3))  # n x p of Eq. (2) and its rate
+        self._commanded: Array = np.zeros(3)  # Eq. (2)
         self._aim: Array = np.zeros(2)
         self._passed: Array | None = None  # where the ring was when the tip last came to its plane, left and up
         self._closure, self._good, self._committed = 0.0, False, False
@@ -69,9 +75,11 @@ class Guidance:
         Args:
             state: the relative state now; a prediction when not usable.
         """
-        self._axes.step(state.w_WB_B, self._turn_rad_s)
+        self._axes.step(state.w_WB_B, self._path.turn_rate_rad_s, self._path.bank_rad)
         ring, rate = self._axes.moved(state.p_PD_B, state.rate_PD_B)
         coupling = self._axes.R_NB @ state.p_PK_B
+        if self._path.is_announced:
+            self._follow_path(state, ring, rate)
         self._observe(state, ring, rate)
         self._count(state, ring, coupling)
         self._change_phase(self._situation(ring, rate, coupling))
@@ -84,7 +92,15 @@ class Guidance:
         self._u_dot = u_dot
         self._u = _limited(self._u + u_dot * self._dt, self._settings.velocity_limit_m_s)
         self._controller.given(self._u, u_dot)
-        return self._command(state, u_dot)
+        return self._command(u_dot)
+
+    def _follow_path(self, state: RelativeState, ring: Array, rate: Array) -> None:
+        """Go on with the announced path, and learn from the drogue what it leaves."""
+        if state.usable:
+            self._turned = np.array([self._axes.turned(ring), self._axes.turned(rate)])
+        learns = state.usable and self.phase in _FOLLOWING and not self._committed  # not from a drogue pushed about
+        left = float((rate + self._turned[0] + self._commanded) @ self._axes.left_N)
+        self._path.step(self._dt, left if learns else None)
 
     def _observe(self, state: RelativeState, ring: Array, rate: Array) -> None:
         """Show the drogue to the controller, and its distance from the probe's line to the prediction of the miss."""
@@ -118,13 +134,14 @@ class Guidance:
             and state.usable
             and abs(ring[0] - settings.stand_off_m) < limits.steady_along_m
             and state.sigma_lateral_m < limits.steady_sigma_m
+            and self._controller.bears_the_gusts
         )
         self._steady_s = self._steady_s + self._dt if steady else 0.0
         self._patient_s = self._patient_s + self._dt if self.phase in (Phase.PRE_CONTACT, Phase.APPROACH) else 0.0
         if self.phase is Phase.APPROACH:
             self._close(state, float(ring[0]))
             self._inside_s = self._inside_s + self._dt if ring[0] <= 0.0 else 0.0
-        if self.phase is Phase.CONTACT:
+        if self.phase in _TOUCHING:
             self._pushed_in_m += (self._u[0] - self._controller.drift_m_s[0]) * self._dt
 
     def _close(self, state: RelativeState, distance_m: float) -> None:
@@ -231,6 +248,8 @@ class Guidance:
         """(3,) du/dt toward the drogue's drift, plus the speed along that the phase asks for."""
         s = self._settings
         target = self._controller.drift_m_s
+        if self._path.is_announced and self.phase in _TOUCHING:  # the drogue has come along
+            target += self._axes.turned(np.array([self._pushed_in_m, 0.0, 0.0]))
         if self.phase is Phase.CONTACT:  # slows down so as to stop where it is to hold
             to_go = max(s.limits.take_in_m - self._pushed_in_m, 0.0)
             target[0] += min(s.closure_speed_m_s, s.take_in_gain_1_s * to_go)
@@ -240,18 +259,19 @@ class Guidance:
             target[0] = self._u[0]
         return np.asarray(s.course_gain_1_s * (target - self._u))
 
-    def _command(self, state: RelativeState, u_dot: Array) -> ReceiverCommand:
-        """Turn the command into body axes, and add what the path does."""
-        settings = self._settings
-        turn, climb = self._path.step(self._dt)
-        self._turn_rad_s = turn
-        if self._path.is_announced:
-            if state.usable and self.phase in _FOLLOWING:
-                self._turn_error_m_s += float(self._u[1]) * self._dt / settings.turn_learning_s
-            turn += settings.turn_gain_rad_m * (float(self._u[1]) + self._turn_error_m_s)  # Eq. (2)
-        R_BN = self._axes.R_NB.T
+    def _command(self, u_dot: Array) -> ReceiverCommand:
+        """Eq. (2) and its rate in body axes, and what the path does."""
+        path, axes, u = self._path, self._axes, self._u
+        if path.is_announced:
+            u = u + path.left_m_s * axes.left_N - self._turned[0]
+            u_dot = u_dot + path.left_m_s2 * axes.left_N - self._turned[1]
+            self._commanded = u
+        R_BN = axes.R_NB.T
         return ReceiverCommand(
-            velocity_m_s=R_BN @ self._u, acceleration_m_s2=R_BN @ u_dot, turn_rate_rad_s=turn, climb_rad=climb
+            velocity_m_s=R_BN @ u,
+            acceleration_m_s2=R_BN @ u_dot,
+            turn_rate_rad_s=path.flown_rad_s,
+            climb_rad=path.climb_rad,
         )
 
 

@@ -50,6 +50,11 @@ class Controller(Protocol):
         """(3,) velocity that keeps company with the drogue, its swing apart."""
         ...
 
+    @property
+    def bears_the_gusts(self) -> bool:
+        """Whether swings like those of the last half minute can be followed at all, for an approach to be begun."""
+        ...
+
     def error_to_come(self, aim_m: Array) -> Array:
         """(2,) off the drogue across, when what has been commanded has been flown."""
         ...

@@ -23,6 +23,7 @@ class PredictiveSettings:
     keep_away_m: float = 4.0  # farther astern of a swing that asks for twice what is bearable: another stand-off
     excess_max: float = 1.5  # of that: three times what is bearable is severe turbulence
     bearing_s: float = 4.0  # over which that mean is taken: a swing and a half
+    gusts_s: float = 30.0  # over which it is taken before an approach: a lull in severe turbulence is over too soon
     plan: PlanSettings = field(default_factory=PlanSettings)
     swing: SwingSettings = field(default_factory=SwingSettings)
 

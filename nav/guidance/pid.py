@@ -46,6 +46,11 @@ class Pid:
         """(3,) velocity that keeps company with the drogue, its swing apart: what the integrals hold."""
         return self._integral.copy()
 
+    @property
+    def bears_the_gusts(self) -> bool:
+        """Always: it does not know."""
+        return True
+
     def error_to_come(self, aim_m: Array) -> Array:
         """(2,) off the drogue across, now: it has no better idea."""
         return np.asarray(self._place[1:] + aim_m)

@@ -13,7 +13,8 @@ predicted and flown against like the drogue's own motion, with the same filter.
 A swing that asks for more than a share of the acceleration that the receiver may fly (rms over some swings) is not
 followed but waited for astern: then y_D is the middle of the swing, and haste has a higher price. In gusts that move
 the drogue so much the surfaces have no rate to spare for haste, and drogue and receiver come together by metres
-unasked: the more the swing asks for, the farther astern it is waited for.
+unasked: the more the swing asks for, the farther astern it is waited for, and a drogue that is reeled in and out is not
+run after faster than the receiver joins up.
 
 Not modelled: limits of the airframe beyond those of acceleration and jerk; what they cut off is missing from y_r's
 scale until it is seen.
@@ -71,6 +72,7 @@ class Predictive:
         self._u_dot: Array = np.zeros(3)
         self._bearable = (settings.bearable_share * acceleration_limit_m_s2[1:]) ** 2
         self._asked = _AT_FIRST * self._bearable  # mean square of the drogue's acceleration, left and up
+        self._gusts: Array = np.zeros(3)  # the same over some swings more, and the weight of what has been seen
 
     @property
     def looks_ahead_s(self) -> Array:
@@ -93,7 +95,9 @@ class Predictive:
         self._path = self._motion.path(push)
         if sight is not None:
             share = self._step_s / self._settings.bearing_s
-            self._asked = self._asked + share * (self._ahead[2][1:] ** 2 - self._asked)
+            squares = self._ahead[2][1:] ** 2
+            self._asked = self._asked + share * (squares - self._asked)
+            self._gusts += self._step_s / self._settings.gusts_s * (np.append(squares, 1.0) - self._gusts)
 
     def given(self, velocity_m_s: Array, acceleration_m_s2: Array) -> None:
         """Take note of velocity and acceleration (3,) commanded for the next period."""
@@ -104,6 +108,11 @@ class Predictive:
     def drift_m_s(self) -> Array:
         """(3,) velocity that keeps company with the drogue, its swing apart."""
         return self._motion.drift_m_s
+
+    @property
+    def bears_the_gusts(self) -> bool:
+        """Whether the swings of the last half minute ask for no more than can be followed."""
+        return bool((self._gusts[:2] <= self._gusts[2] * self._bearable).all())
 
     def error_to_come(self, aim_m: Array) -> Array:
         """(2,) off the drogue across, when what has been commanded has been flown."""
@@ -128,7 +137,10 @@ class Predictive:
         else:
             to_go = place - self._own.place_ahead_m[0] - wanted.distance_m
             speed, change = clipped(gain * to_go, wanted.speed_m_s), gain * (velocity - u[0])
-        return float(acceleration + change + s.smoothing_1_s * (velocity + speed - u[0]))
+        goal = velocity + speed
+        if wanted.distance_m is not None:
+            goal = min(goal, wanted.speed_m_s)
+        return float(acceleration + change + s.smoothing_1_s * (goal - u[0]))
 
     def _across(self, u: Array, wanted: Wanted, bearable: bool) -> Array:
         """(2,) next acceleration of the plans, left and up."""

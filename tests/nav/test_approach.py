@@ -289,3 +289,43 @@ def test_a_receiver_that_came_to_a_stand_close_in_falls_back_for_room_to_close()
     waited = np.array(distances)[20 * RATE_HZ : 24 * RATE_HZ]
     assert waited.min() > SETTINGS.closing.wait_at_m - 0.15
     assert plant.crossings[0][1] > 1.0
+
+
+def test_a_drogue_that_is_reeled_in_while_it_is_waited_for_is_not_run_after():
+    """6 m in 2 s, as the reel takes them in while the air brakes, and back again: 3 m/s could not be braked off."""
+
+    def reeled(t):
+        return np.array(
+            [6.0 * np.clip((t - 12.0) / 2.0, 0.0, 1.0) - 6.0 * np.clip((t - 15.0) / 3.0, 0.0, 1.0), 0.0, 0.0]
+        )
+
+    plant, speeds, nearest = Plant(drogue=lambda t: reeled(t) + 2.0 * _swing(t)), [], []
+    settings = dataclasses.replace(SETTINGS, limits=PhaseLimits(stabilise_s=60.0))
+
+    def watched(s):
+        speeds.append(plant.v[0])
+        nearest.append(s.p_PD_B[0])
+        return s
+
+    fly(plant, seconds=25.0, settings=settings, seen=watched)
+    assert max(speeds) < SETTINGS.join_up_speed_m_s + 0.1
+    assert min(nearest) > 2.0
+
+
+def test_a_lull_in_gusts_that_are_too_strong_is_no_moment_to_begin_an_approach():
+    """Strong swings for half a minute, then hardly any: what is calm enough otherwise is not trusted before long."""
+
+    def lull(t):
+        return (3.0 if t < 30.0 else 0.1) * _swing(t)
+
+    begun_s = []
+    for gusts_s in (SETTINGS.predictive.gusts_s, 0.1):
+        plant = Plant(drogue=lull)
+        predictive = dataclasses.replace(SETTINGS.predictive, gusts_s=gusts_s)
+        guidance = Guidance(dataclasses.replace(SETTINGS, predictive=predictive), RATE_HZ)
+        now = plant.step(ReceiverCommand())
+        while guidance.phase is not Phase.APPROACH and plant.t < 120.0:
+            now = plant.step(guidance.step(now))
+        begun_s.append(plant.t)
+    assert begun_s[1] < 60.0
+    assert begun_s[0] > begun_s[1] + 20.0

@@ -57,3 +57,18 @@ def test_the_rate_is_the_derivative_of_the_place():
     # the rotation of a step comes before the place is taken: differences are centred between two of them
     between = 0.5 * (places[1][1] + places[2][1])
     np.testing.assert_allclose((places[2][0] - places[1][0]) / 1e-4, between, rtol=1e-3)
+
+
+def test_an_announced_turn_takes_them_along_into_its_bank_and_a_place_abeam_of_it_is_turned():
+    """A body that rolls into a turn and flies it, coordinated: its attitude is R_z(heading) R_x(bank), exactly."""
+    axes, R_before, heading, turn = StabilisedAxes(10.0, STEP_S), np.eye(3), 0.0, 0.025
+    for k in range(3000):
+        bank = -0.43 * min(k / 1000.0, 1.0)
+        heading += turn * STEP_S
+        R_WB = exp(np.array([0.0, 0.0, heading])) @ exp(np.array([bank, 0.0, 0.0]))
+        axes.step(log(R_before.T @ R_WB) / STEP_S, turn, bank)
+        R_before = R_WB
+    np.testing.assert_allclose(axes.R_NB, np.eye(3), atol=2e-4)
+    np.testing.assert_allclose(R_WB @ axes.left_N, [-np.sin(heading), np.cos(heading), 0.0], atol=1e-12)
+    p_W = np.cross([0.0, 0.0, turn], R_WB @ [4.0, 1.0, 0.5])
+    np.testing.assert_allclose(R_WB @ axes.turned(np.array([4.0, 1.0, 0.5])), p_W, atol=1e-12)
