@@ -11,7 +11,7 @@ import numpy as np
 from dockair.calibration import NavigationSheets
 from dockair.messages import CameraFrame, ImuSample, NavSolution, TankerAnnouncement
 from dockair.nav.guidance.approach import Guidance, GuidanceSettings, RelativeState
-from dockair.rotations import Array
+from dockair.sim.hose.chain import cross
 from dockair.sim.truth import Truth
 
 
@@ -21,6 +21,10 @@ class TruthNavigator:
     def __init__(self, sheets: NavigationSheets, settings: GuidanceSettings) -> None:
         self._sheets = sheets
         self._guidance = Guidance(settings, sheets.control_rate_hz)
+        # of every solution: LEDs and candidates, none of which is seen, and the covariance of what is exact
+        self._always = np.full((len(sheets.ring.positions_D), 2), np.nan), np.empty((0, 2)), np.zeros((9, 9))
+        for array in self._always:
+            array.setflags(write=False)
         self.truth: Truth | None = None
 
     def announce(self, announcement: TankerAnnouncement) -> None:
@@ -31,20 +35,20 @@ class TruthNavigator:
         """Return the true relative state and what the guidance commands on it."""
         truth = self.truth
         assert truth is not None, "the loop sets the truth before each step"
-        R_BD = truth.R_WB.T @ truth.R_WD
-        p_PD_B = truth.p_PD_B
-        v_PD_B = truth.R_WB.T @ (truth.v_WD - truth.v_WP)
-        rate_PD_B = v_PD_B - np.cross(truth.w_WB_B, p_PD_B)
+        R_WB, w_WB_B, p_PD_B = truth.R_WB, truth.w_WB_B, truth.p_PD_B
+        R_BD = R_WB.T @ truth.R_WD
+        v_PD_B = (truth.v_WD - truth.v_WP).dot(R_WB)
+        rate_PD_B = v_PD_B - cross(w_WB_B, p_PD_B)
         state = RelativeState(
             usable=True,
             contact_usable=True,
             p_PD_B=p_PD_B,
             rate_PD_B=rate_PD_B,
             p_PK_B=p_PD_B + R_BD[:, 0] * self._sheets.coupling_depth_m,
-            w_WB_B=truth.w_WB_B,
+            w_WB_B=w_WB_B,
             sigma_lateral_m=0.0,
         )
-        command = self._guidance.step(state)
+        command, (led_pixels_px, candidates_px, covariance) = self._guidance.step(state), self._always
         return NavSolution(
             time_stamp_s=truth.time_s,
             valid=True,
@@ -53,15 +57,11 @@ class TruthNavigator:
             p_PD_B=p_PD_B,
             v_PD_B=v_PD_B,
             R_BD=R_BD,
-            covariance=np.zeros((9, 9)),
+            covariance=covariance,
             command=command,
             window=None,
             frame_time_stamp_s=float("nan"),
-            candidates_px=np.empty((0, 2)),
-            led_pixels_px=_not_seen(len(self._sheets.ring.positions_D)),
+            candidates_px=candidates_px,
+            led_pixels_px=led_pixels_px,
             phase_reason=self._guidance.phase_reason,
         )
-
-
-def _not_seen(count: int) -> Array:
-    return np.full((count, 2), np.nan)

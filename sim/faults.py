@@ -217,7 +217,7 @@ class Faults:
 
     def reel_locked(self, time_s: float) -> bool:
         """Whether the reel is dead at a time."""
-        return bool(self._acting(DeadReel, time_s))
+        return bool(self._faults) and bool(self._acting(DeadReel, time_s))
 
     def _acting(self, kind: type[T], time_s: float) -> list[T]:
         return [f for f in self._faults if isinstance(f, kind) and f.start_s <= time_s < f.stop_s]

@@ -240,7 +240,9 @@ def _accelerometer_sheet(p: ImuParameters) -> TriadParameters:
 
 
 def _row(vector: Array) -> Array:
-    return np.array(vector, dtype=float, order="C", ndmin=2)
+    row = np.empty((1, 3))
+    row[0] = vector
+    return row
 
 
 def _rows(motion: Array | None, part: slice, still: Array) -> Array:

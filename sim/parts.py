@@ -67,8 +67,8 @@ class Airframe(Protocol):
         air_rotation_B: Array,
         specific_force_B: Array,
         command: ReceiverCommand,
-    ) -> tuple[Array, Array]:
-        """Force and moment about the centre of gravity in W, without gravity."""
+    ) -> Array:
+        """(2, 3) force and moment about the centre of gravity in W, without gravity."""
         ...
 
 

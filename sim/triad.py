@@ -31,6 +31,7 @@ from scipy.signal import cont2discrete
 
 from dockair.rotations import Array
 
+_BLOCK = 64  # samples whose random numbers are drawn at a time, at least
 GAUSS_MARKOV_PEAK = 0.617364283  # highest Allan deviation of Eq. (5) over its standard deviation
 
 
@@ -80,11 +81,12 @@ class Triad:
         self._state = np.zeros((4, 3))  # filter (2), b_GM, b_RW
         self._state[2] = sigma * drawn[7]
         self._started = False
+        self._normal, self._used = np.empty((0, 3, 3)), 0  # numbers drawn ahead, in the order of use
 
     @property
     def bias(self) -> Array:
         """(3,) b_0 + b_GM + b_RW of the last sample."""
-        return self._turn_on + self._state[2] + self._state[3]
+        return np.asarray(self._turn_on + self._state[2] + self._state[3])
 
     def sense(self, main: Array, other: Array, extra_bias: Array | None = None, limit: float = math.inf) -> Array:
         """(n, 3) samples of n inputs, Eq. (1).
@@ -95,7 +97,7 @@ class Triad:
             extra_bias: (3,) of a fault.
             limit: of a fault: range that holds where it is less than the sheet's.
         """
-        z = self._rng.standard_normal((len(main), 3, 3))
+        z = self._drawn(len(main))
         bias = self._turn_on if extra_bias is None else self._turn_on + extra_bias
         if not self._started:
             first = self._gain @ main[0] + self._cross @ other[0]
@@ -103,6 +105,15 @@ class Triad:
             self._started = True
         limit = min(limit, self._range)
         return _sense(main, other, z, bias, limit, self._gain, self._cross, self._filter, self._laws, self._state)
+
+    def _drawn(self, n: int) -> Array:
+        """(n, 3, 3) standard normal numbers, the same however many are asked for at a time."""
+        if self._used + n > len(self._normal):
+            new = self._rng.standard_normal((max(n, _BLOCK), 3, 3))
+            self._normal, self._used = np.concatenate([self._normal[self._used :], new]), 0
+        self._used += n
+        z: Array = self._normal[self._used - n : self._used]
+        return z
 
 
 @njit(cache=True)

@@ -127,7 +127,7 @@ class World:
     def step(self, command: ReceiverCommand) -> Truth:
         """Advance by one physics tick under a command; return the new truth."""
         x, air = self._seen, self._air_state
-        self._force_W[:], self._torque_W[:] = self._receiver.step(
+        self._wrench_W[:] = self._receiver.step(
             R_WB=self._R_WB,
             v_WB=x[layout.V_WB],
             w_WB_B=x[layout.W_WB_B],
@@ -164,17 +164,17 @@ class World:
 
     def _keep_views(self, at: Addresses, d: mujoco.MjData) -> None:
         """Views of MuJoCo's own memory, which every tick reads: to ask for them anew takes a tenth of its time."""
-        self._kinematics = d.xpos, d.xmat, d.cvel, d.subtree_com, d.xipos, d.xanchor, d.qpos, d.qvel, d.qacc
-        self._where = np.append(at.observed, [at.tow.start, at.drogue_joint])
         R = d.xmat[at.tow].reshape(-1, 3, 3)
         self._tow_places = d.xipos[at.tow], R, d.cvel[at.tow], d.subtree_com[at.tanker]
         self._tow_wrenches, self._reel_force = d.xfrc_applied[at.tow], d.qfrc_applied[at.reel_dof : at.reel_dof + 1]
-        self._force_W, self._torque_W = d.xfrc_applied[at.receiver, :3], d.xfrc_applied[at.receiver, 3:]
+        self._wrench_W = d.xfrc_applied[at.receiver].reshape(2, 3)
         self._reactions = d.cfrc_int, d.xmat, d.qacc
         drogue = self.parameters.drogue
         canopy, gravity = drogue.drag_centre_x_m - drogue.centre_of_mass_x_m, [0.0, 0.0, -STANDARD_GRAVITY_M_S2]
         tip, depth = self.parameters.mounting.p_BP, self.parameters.coupling.depth_m
-        self._constants = np.array([*tip, depth, *gravity, canopy])
+        where, constants = np.append(at.observed, [at.tow.start, at.drogue_joint]), [*tip, depth, *gravity, canopy]
+        bodies, joints = (d.xpos, d.xmat, d.cvel, d.subtree_com, d.xipos), (d.xanchor, d.qpos, d.qvel, d.qacc)
+        self._sight = (*bodies, *joints, where, np.array(constants))
 
     def _put_behind(self, p_WD: Array, p_PD_B: Array) -> None:
         """Put the receiver behind the drogue at p_WD, trimmed in the wake that blows where it then is."""
@@ -213,9 +213,8 @@ class World:
         """One tick, the receiver's forces being applied already."""
         x, time_s = self._seen, self._clock.seconds(tick)
         position, rate = float(x[layout.REEL_POSITION]), float(x[layout.REEL_RATE])
-        self._tow_wrenches[:] = self._tow.wrenches(
-            *self._tow_places, self._air_state.tow_W, position, self._tanker.pod()
-        )
+        pod = self._tanker.pod() if position > 0.0 else None  # nobody asks for it while all of the hose is outside
+        self._tow_wrenches[:] = self._tow.wrenches(*self._tow_places, self._air_state.tow_W, position, pod)
         locked = self._reel_locked is not None and self._reel_locked(self._clock.seconds(self._tick))
         self._reel_force[0] = self._tow.reel.step(self._tensions[0], position, rate, locked)
         self._tanker.set_out(time_s)
@@ -247,7 +246,9 @@ class World:
 
     def _decide_coupling(self) -> None:
         p = self.parameters.coupling
-        if self._coupling is CouplingState.READY and self._seen[layout.TIP_DISTANCE] > p.capture_distance_m:
+        far = self._coupling is CouplingState.READY and self._seen[layout.TIP_DISTANCE] > p.capture_distance_m
+        held = self._coupling is CouplingState.LATCHED and self._tensions[2] <= p.release_force_n
+        if far or held:
             return  # nothing to decide, and no time to lose
         probe = probe_in_coupling(self.truth, self._tensions[2], p)
         self._coupling = next_coupling_state(self._coupling, probe, p)
@@ -257,7 +258,7 @@ class World:
         """Take the truth of the present state, and the air's motion where everything is."""
         data, tanker, bodies = self.data, self._tanker, len(self._tow_wrenches)
         x, hose = np.empty(layout.OBSERVED), np.empty((2, bodies, 3))
-        observe(*self._kinematics, self._where, self._constants, x, hose)
+        observe(x, hose, *self._sight)
         self._tick, self._seen, self._R_WB = tick, x, x[layout.R_WB].reshape(3, 3)
         if self._air is None:
             air = still_air(bodies)
@@ -267,8 +268,9 @@ class World:
         own, self._air_state = self._receiver, air
         flow = own.airspeed_m_s, own.angle_of_attack_rad, own.sideslip_rad, own.throttle
         latched, time_s = self._coupling is CouplingState.LATCHED, self._clock.seconds(tick)
-        fuel, seen = (self._fuel.given_kg, self._fuel.flow_kg_s), (tick, time_s, x, hose, tanker.state)
-        self.truth = truth_of(Seen(*seen, self._tensions, air, flow, latched, fuel, touches))
+        fuel = self._fuel.given_kg, self._fuel.flow_kg_s
+        seen = Seen(tick, time_s, x, hose, tanker.state, self._tensions, air, flow, latched, fuel, touches)
+        self.truth = truth_of(seen)
 
 
 @njit(cache=True)
@@ -277,9 +279,11 @@ def _solved(cfrc_int, xmat, qacc, at_exit, drogue, limit):  # type: ignore[no-un
     converged = True
     for a in qacc:
         converged = converged and abs(a) < limit  # also when it is not a number
-    tensions = np.empty(2)
-    for i, body in enumerate((at_exit, drogue)):
-        f, R = cfrc_int[body], xmat[body]
-        size = np.sqrt(f[3] * f[3] + f[4] * f[4] + f[5] * f[5])
-        tensions[i] = np.copysign(size, f[3] * R[0] + f[4] * R[3] + f[5] * R[6])
-    return tensions[0], tensions[1], converged
+    return _tension(cfrc_int, xmat, at_exit), _tension(cfrc_int, xmat, drogue), converged
+
+
+@njit(cache=True)
+def _tension(cfrc_int, xmat, body):  # type: ignore[no-untyped-def]
+    f, R = cfrc_int[body], xmat[body]
+    size = np.sqrt(f[3] * f[3] + f[4] * f[4] + f[5] * f[5])
+    return np.copysign(size, f[3] * R[0] + f[4] * R[3] + f[5] * R[6])

@@ -58,11 +58,11 @@ class ReceiverOnRails:
         air_rotation_B: Array,
         specific_force_B: Array,
         command: ReceiverCommand,
-    ) -> tuple[Array, Array]:
+    ) -> Array:
         self.specific_force_B = specific_force_B
         self.air_velocity_W, self.air_rotation_B = air_velocity_W, air_rotation_B
         self.force_W = self.mass_kg * (np.array([0.0, 0.0, 9.80665]) + self.gain_1_s * (command.velocity_m_s - v_WB))
-        return self.force_W, R_WB @ (self.inertia_B @ (-self.gain_1_s * w_WB_B))
+        return np.array([self.force_W, R_WB @ (self.inertia_B @ (-self.gain_1_s * w_WB_B))])
 
 
 def make_world(

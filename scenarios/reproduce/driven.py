@@ -50,13 +50,11 @@ class DrivenReceiver:
         """(3, 3) attitude that it keeps."""
         return exp(np.array([0.0, self.pitch_rad, 0.0]))
 
-    def step(
-        self, *, R_WB: Array, v_WB: Array, w_WB_B: Array, command: ReceiverCommand, **_: Any
-    ) -> tuple[Array, Array]:
-        """Force and moment about the centre of gravity in W, without gravity."""
+    def step(self, *, R_WB: Array, v_WB: Array, w_WB_B: Array, command: ReceiverCommand, **_: Any) -> Array:
+        """(2, 3) force and moment about the centre of gravity in W, without gravity."""
         up = np.array([0.0, 0.0, STANDARD_GRAVITY_M_S2])
         force_W = self.mass_kg * (up + self.gain_1_s * (command.velocity_m_s - v_WB))
-        return force_W, R_WB @ (self.inertia_B @ (-self.gain_1_s * w_WB_B))
+        return np.array([force_W, R_WB @ (self.inertia_B @ (-self.gain_1_s * w_WB_B))])
 
 
 def driven_world(

@@ -178,7 +178,6 @@ def _join(gust_F, wake_T, bow_B, R_WB, R_WT, fit, rolling, out):  # type: ignore
     ahead_x, ahead_y = R_WT[0, 0] / level, R_WT[1, 0] / level
     load = level * level / R_WT[2, 2]  # cos(climb)/cos(bank)
     linear, v = np.zeros((4, 3)), np.empty(3)
-    out[n:] = 0.0
     for i in range(n + m):
         v[0] = ahead_x * gust_F[i, 0] - ahead_y * gust_F[i, 1]
         v[1] = ahead_y * gust_F[i, 0] + ahead_x * gust_F[i, 1]
@@ -188,13 +187,14 @@ def _join(gust_F, wake_T, bow_B, R_WB, R_WT, fit, rolling, out):  # type: ignore
                 v[axis] += load * R_WT[axis, other] * wake_T[i, other]
                 if i < n:
                     v[axis] += R_WB[axis, other] * bow_B[i, other]
-        if i < n:
-            out[i] = v
-        else:
-            for row in range(4):
-                for axis in range(3):
+        for axis in range(3):
+            if i < n:
+                out[i, axis] = v[axis]
+            else:
+                for row in range(4):
                     linear[row, axis] += fit[row, i - n] * v[axis]  # gradients along B's axes of velocities in W
-    out[n] = linear[0]
+    for axis in range(3):
+        out[n, axis], out[n + 1, axis] = linear[0, axis], 0.0
     for axis in range(3):  # Eq. (2); the velocities are in W, their components along B's y and z are wanted
         out[n + 1, 0] += R_WB[axis, 2] * linear[2, axis]
         out[n + 1, 1] -= R_WB[axis, 2] * linear[1, axis]

@@ -115,8 +115,8 @@ def wake_velocity(points_T: Array, k: Array) -> Array:
 @njit(cache=True)
 def write_wake_velocity(points_T: Array, k: Array, out: Array) -> None:
     """`wake_velocity` into an array that is there already (n, 3)."""
-    out[:] = 0.0
     for i in range(points_T.shape[0]):
+        out[i, 0] = out[i, 1] = out[i, 2] = 0.0
         for j in range(k.shape[0]):
             x, y, z = points_T[i, 0] - k[j, 0], points_T[i, 1] - k[j, 1], points_T[i, 2] - k[j, 2]
             half, strength, core = k[j, 3], k[j, 4], k[j, 5]

@@ -33,16 +33,16 @@ class Actuators:
         self._engine, self._step_s = parameters, step_s
         self._range = trim.thrust_range
         self.surfaces_rad: Array = trim.surfaces_rad  #: (3,) elevator, aileron, rudder; moved in place
-        self.thrust_n = trim.thrust_n
+        self.thrust_n = float(trim.thrust_n)
         self.throttle = trim.thrust_range.throttle(trim.thrust_n)  #: as commanded, after its limits
 
     def step(self, surfaces_command_rad: Array, thrust_command_n: float) -> None:
         """Advance by one tick toward the commands (3,) [rad] and [N]."""
-        limits = (self._limits_rad, self._largest_step_rad)
-        _follow(self.surfaces_rad, surfaces_command_rad, *limits, self._surface_share)
-        command_n = min(max(thrust_command_n, self._range.idle_n), self._range.military_n)
-        self.throttle = self._range.throttle(command_n)
-        rise = self.throttle - self._range.throttle(self.thrust_n)
+        _follow(self.surfaces_rad, surfaces_command_rad, self._limits_rad, self._largest_step_rad, self._surface_share)
+        span = self._range
+        command_n = min(max(thrust_command_n, span.idle_n), span.military_n)
+        self.throttle = span.throttle(command_n)
+        rise = self.throttle - span.throttle(self.thrust_n)
         share = self._quick_share
         if rise > self._engine.engine_quick_rise:
             share = -float(np.expm1(-engine_lag_1_s(self._engine, rise) * self._step_s))

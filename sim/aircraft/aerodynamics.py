@@ -108,6 +108,10 @@ class TabulatedAerodynamics:
         _force_and_moment(self.tables, self.constants, v_B, w_B, surfaces_rad, air_rotation_B, wrench)
         return wrench[:3], wrench[3:]
 
+    def write_wrenches(self, motions: Array, wrenches: Array) -> None:
+        """See `airframe.Aerodynamics`."""
+        _write_wrenches(self.tables, self.constants, motions, wrenches)
+
     def coefficients(self, alpha_rad: float, beta_rad: float, rates: Array, surfaces_rad: Array) -> Array:
         """(6,) CX, CY, CZ, Cl, Cm, Cn of Eqs. (2) to (7).
 
@@ -130,12 +134,15 @@ def flow_angles(v_B: Array) -> tuple[float, float, float]:
 
 
 @njit(cache=True)
-def flow_about(R_WB: Array, v_WB: Array, air_velocity_W: Array, v_B: Array) -> tuple[float, float, float]:
-    """Write the velocity relative to the air (3,), body axes, of a body that moves with v_WB; return `flow_angles`."""
+def flow_about(
+    R_WB: Array, v_WB: Array, w_WB_B: Array, air_velocity_W: Array, air_rotation_B: Array, motion: Array
+) -> tuple[float, float, float]:
+    """Write a motion (1, 12) of `airframe.Aerodynamics`, but for the surfaces; return `flow_angles`."""
     x, y, z = v_WB[0] - air_velocity_W[0], v_WB[1] - air_velocity_W[1], v_WB[2] - air_velocity_W[2]
     for i in range(3):
-        v_B[i] = R_WB[0, i] * x + R_WB[1, i] * y + R_WB[2, i] * z
-    airspeed, alpha, beta = _flow_angles(v_B)
+        motion[0, i] = R_WB[0, i] * x + R_WB[1, i] * y + R_WB[2, i] * z
+        motion[0, 3 + i], motion[0, 9 + i] = w_WB_B[i], air_rotation_B[i]
+    airspeed, alpha, beta = _flow_angles(motion[0])
     return airspeed, alpha, beta
 
 
@@ -168,6 +175,12 @@ def _cell(x, first, step, count):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
+def _along(tables, row, column, t):  # type: ignore[no-untyped-def]
+    """Linear value between two columns of a row."""
+    return tables[row, column] + t * (tables[row, column + 1] - tables[row, column])
+
+
+@njit(cache=True)
 def _at(tables, row, t_row, column, t):  # type: ignore[no-untyped-def]
     """Bilinear value between two rows and two columns."""
     low = tables[row, column] + t * (tables[row, column + 1] - tables[row, column])
@@ -187,22 +200,20 @@ def _coefficients(tables, k, alpha, beta, rates, surfaces):  # type: ignore[no-u
     side = -1.0 if beta < 0.0 else 1.0
     b, t_b = _cell(abs(beta), k[15], k[16], _SIDESLIPS)
     s, t_s = _cell(beta, k[17], k[18], _SIDESLIPS)
-    d = np.empty(9)
-    for j in range(9):
-        row = _DAMPING + j
-        d[j] = tables[row, i] + t * (tables[row, i + 1] - tables[row, i])
-    CZ = tables[_CZ, i] + t * (tables[_CZ, i + 1] - tables[_CZ, i])
     P, Q, R = rates
-    C = np.empty(6)
-    C[0] = _at(tables, _CX + e, t_e, i, t) + d[0] * Q  # Eq. (2)
-    C[1] = CY_beta * beta + CY_aileron * surfaces[1] + CY_rudder * surfaces[2] + d[1] * R + d[2] * P  # Eq. (3)
-    C[2] = CZ * (1.0 - beta * beta) + CZ_elevator * elevator + d[3] * Q  # Eq. (4)
-    C[3] = side * _at(tables, _CL + b, t_b, i, t) + d[4] * R + d[5] * P  # Eq. (5)
-    C[3] += _at(tables, _CL_AILERON + s, t_s, i, t) * aileron + _at(tables, _CL_RUDDER + s, t_s, i, t) * rudder
-    C[4] = _at(tables, _CM + e, t_e, i, t) + C[2] * arm + d[6] * Q  # Eq. (6)
-    C[5] = side * _at(tables, _CN + b, t_b, i, t) - C[1] * arm * k[3] / k[2] + d[7] * R + d[8] * P  # Eq. (7)
-    C[5] += _at(tables, _CN_AILERON + s, t_s, i, t) * aileron + _at(tables, _CN_RUDDER + s, t_s, i, t) * rudder
-    return C
+    CX = _at(tables, _CX + e, t_e, i, t) + _along(tables, _DAMPING, i, t) * Q  # Eq. (2)
+    CY = CY_beta * beta + CY_aileron * surfaces[1] + CY_rudder * surfaces[2]  # Eq. (3)
+    CY = CY + _along(tables, _DAMPING + 1, i, t) * R + _along(tables, _DAMPING + 2, i, t) * P
+    CZ = _along(tables, _CZ, i, t) * (1.0 - beta * beta) + CZ_elevator * elevator  # Eq. (4)
+    CZ = CZ + _along(tables, _DAMPING + 3, i, t) * Q
+    Cl = side * _at(tables, _CL + b, t_b, i, t)  # Eq. (5)
+    Cl = Cl + _along(tables, _DAMPING + 4, i, t) * R + _along(tables, _DAMPING + 5, i, t) * P
+    Cl += _at(tables, _CL_AILERON + s, t_s, i, t) * aileron + _at(tables, _CL_RUDDER + s, t_s, i, t) * rudder
+    Cm = _at(tables, _CM + e, t_e, i, t) + CZ * arm + _along(tables, _DAMPING + 6, i, t) * Q  # Eq. (6)
+    Cn = side * _at(tables, _CN + b, t_b, i, t) - CY * arm * k[3] / k[2]  # Eq. (7)
+    Cn = Cn + _along(tables, _DAMPING + 7, i, t) * R + _along(tables, _DAMPING + 8, i, t) * P
+    Cn += _at(tables, _CN_AILERON + s, t_s, i, t) * aileron + _at(tables, _CN_RUDDER + s, t_s, i, t) * rudder
+    return CX, CY, CZ, Cl, Cm, Cn
 
 
 @njit(cache=True)
@@ -217,3 +228,10 @@ def _force_and_moment(tables, k, v_B, w_B, surfaces, air_rotation_B, wrench):  #
     for i in range(3):
         wrench[i] = _FLIP[i] * qbar_S * C[i]
         wrench[3 + i] = _FLIP[i] * qbar_S * (c if i == 1 else b) * C[3 + i]
+
+
+@njit(cache=True)
+def _write_wrenches(tables, k, motions, wrenches):  # type: ignore[no-untyped-def]
+    for i in range(motions.shape[0]):
+        m = motions[i]
+        _force_and_moment(tables, k, m[:3], m[3:6], m[6:9], m[9:], wrenches[i])

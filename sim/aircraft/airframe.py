@@ -33,6 +33,15 @@ class Aerodynamics(Protocol):
         """
         ...
 
+    def write_wrenches(self, motions: Array, wrenches: Array) -> None:
+        """The same of several motions at once, in arrays that are there already.
+
+        Args:
+            motions: (n, 12) v_B, w_B, surfaces_rad and air_rotation_B, a motion in each row.
+            wrenches: (n, 6) written: force and moment.
+        """
+        ...
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class AirframeData(ABC):

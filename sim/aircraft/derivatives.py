@@ -69,6 +69,10 @@ class DerivativeAerodynamics:
         _force_and_moment(self.constants, self.lateral, v_B, w_B, surfaces_rad, air_rotation_B, wrench)
         return wrench[:3], wrench[3:]
 
+    def write_wrenches(self, motions: Array, wrenches: Array) -> None:
+        """See `airframe.Aerodynamics`."""
+        _write_wrenches(self.constants, self.lateral, motions, wrenches)
+
 
 @njit(cache=True)
 def _force_and_moment(k, lateral, v_B, w_B, surfaces, air_rotation_B, wrench):  # type: ignore[no-untyped-def]
@@ -98,3 +102,10 @@ def _force_and_moment(k, lateral, v_B, w_B, surfaces, air_rotation_B, wrench):  
     wrench[3] = _FLIP[0] * qbar_S * b * (Cl * cosine - Cn * sine)
     wrench[4] = _FLIP[1] * qbar_S * c * Cm
     wrench[5] = _FLIP[2] * qbar_S * b * (Cn * cosine + Cl * sine)
+
+
+@njit(cache=True)
+def _write_wrenches(k, lateral, motions, wrenches):  # type: ignore[no-untyped-def]
+    for i in range(motions.shape[0]):
+        m = motions[i]
+        _force_and_moment(k, lateral, m[:3], m[3:6], m[6:9], m[9:], wrenches[i])

@@ -27,12 +27,12 @@ Not modelled: structural modes, quantisation, delay of computing beyond a tick; 
 """
 
 import numpy as np
-from numba import njit
 
 from dockair.messages import ReceiverCommand
 from dockair.rotations import Array
 from dockair.sim.air.atmosphere import STANDARD_GRAVITY_M_S2, Air
 from dockair.sim.aircraft.airframe import AirframeData
+from dockair.sim.aircraft.control_law import AIRSPEED, TRIM, rotation_rows, write_commands, write_state, write_states
 from dockair.sim.aircraft.flight_control_parameters import FlightControlParameters
 from dockair.sim.aircraft.flight_path import FlightPath
 from dockair.sim.aircraft.gain_schedule import RATE_0, SURFACES_0, THRUST_0, Design, GainSchedule
@@ -44,10 +44,6 @@ from dockair.sim.aircraft.regulator import FOLLOWED
 from dockair.sim.aircraft.trim import Trim
 
 __all__ = ["FlightControl", "FlightControlParameters"]
-
-# Layouts that the kernels know: a trim of now is attitude, rates, surfaces, thrust per mass, slope of the path
-_SLOPE, _TRIM = 10, 11
-_AIRSPEED, _MASS, _GUST_SHARE, _LAG_SHARE, _LAG, _PROBE = 1, 2, 3, 4, 5, 6  # in `_constants`, the step first
 
 
 class FlightControl:
@@ -97,14 +93,18 @@ class FlightControl:
         )
         rates_rad_s = np.asarray(airframe.surface_rate_limits_rad_s)
         self._relief = RateRelief(parameters.relief, airframe.actuator_bandwidth_rad_s, rates_rad_s, limits_rad, step_s)
-        self.model = ModelFlight(airframe, trim.aerodynamics, step_s)
+        self.model = ModelFlight(airframe, step_s)
         self._x_m: Array = np.zeros(FOLLOWED)
         self._z: Array = np.zeros(3)
         self._gust: Array = np.zeros(3)
         self._force_B: Array = np.zeros(3)
-        self._room = np.empty((3, 3)), np.empty(3), np.empty(_TRIM), np.empty(STATES), np.empty(3)  # of one step
-        self._model_room = np.empty((3, 3)), np.empty(3), np.empty(4)
-        self._R_WB, self._w_m = np.empty((3, 3)), np.zeros(3)  # attitude of now; the model's rates, as late as measured
+        self._w_m: Array = np.zeros(3)  # the model's rates, as late as measured
+        # of one step: attitude of now and against the path, trim, x, commands to surfaces and model; motions of
+        # aircraft and model in still air, and what it does to them
+        self._seen = np.empty((3, 3)), np.empty((3, 3)), np.empty(TRIM), np.empty(STATES)
+        self._commands = np.empty(3), np.empty(4)
+        self._motions, self._wrenches = np.zeros((2, 12)), np.empty((2, 6))
+        self._sight, self._law = self._arguments()
         self._engaged = False
 
     @property
@@ -117,7 +117,7 @@ class FlightControl:
         row, x, R_FB, v_B = self.schedule.at(0.0), np.empty(STATES), np.empty((3, 3)), np.empty(3)
         attitude, at = (np.eye(3), trim.R_WB, trim.velocity_W), (trim.w_WB_B, trim.surfaces_rad)
         about = (trim.thrust_n / self._mass_kg, 0.0, row.trim, self._constants)
-        _state(*attitude, *at, *about, R_FB, v_B, np.empty(_TRIM), x)
+        write_state(*attitude, *at, *about, R_FB, v_B, np.empty(TRIM), x)
         force_B, _ = self._aerodynamics.force_and_moment(v_B, *at)
         residual = trim.R_WB[2] * STANDARD_GRAVITY_M_S2 - force_B / self._mass_kg
         residual[0] = np.linalg.norm(v_B) - np.linalg.norm(trim.velocity_W - trim.air_velocity_W)
@@ -125,7 +125,7 @@ class FlightControl:
         missing = np.append(x[SURFACES], x[THRUST]) + row.K @ known
         weights = np.append(self._limits[1, :3], STANDARD_GRAVITY_M_S2)  # radians and m/s^2, made comparable
         K_z = row.K[:, STATES : STATES + 3]
-        self._z = -np.linalg.lstsq(K_z / weights[:, np.newaxis], missing / weights, rcond=None)[0]
+        self._z[:] = -np.linalg.lstsq(K_z / weights[:, np.newaxis], missing / weights, rcond=None)[0]
 
     def step(
         self,
@@ -151,158 +151,38 @@ class FlightControl:
             thrust_n: thrust.
             command: increment on the path, and what the path does.
         """
-        path, model, x_m = self.path, self.model, self._x_m
+        path, model, relief = self.path, self.model, self._relief
         path.step(command.turn_rate_rad_s, command.climb_rad)
-        row, (R_FB, v_B, trim, x, surfaces_command) = self.schedule.at(path.turn_rate_rad_s), self._room
-        R_FM, v_M, commands_m = self._model_room
-        _ahead(R_WB, w_WB_B, self._constants[_LAG], self._R_WB)
-        flown = (self._R_WB, velocity_W, w_WB_B, surfaces_rad, thrust_n / self._mass_kg)
-        about = (path.climb_rad, row.trim, self._constants)
-        _state(path.axes(), *flown, *about, R_FB, v_B, trim, x)
-        force_B, _ = self._aerodynamics.force_and_moment(v_B, w_WB_B, surfaces_rad)
+        row, (surfaces_command, commands_m) = self.schedule.at(path.turn_rate_rad_s), self._commands
+        flown = (R_WB, velocity_W, w_WB_B, surfaces_rad, thrust_n, path.climb_rad, row.trim, *self._sight)
         if not self._engaged:
-            self._start(x[:3], trim)
-            self.reference.start(x[:3], R_FB, command)
-        modelled = (model.R_WB, model.velocity_W, model.w_WB_B, model.actuators[:3], model.actuators[3])
-        _state(path.axes(), *modelled, *about, R_FM, v_M, trim, x_m[:STATES])
-        share = self._relief.step(surfaces_command, surfaces_rad, model.actuators) if self._engaged else 1.0
-        chain = self.reference.step(R_FB, command, x_m[ATTITUDE.start], share)
-        measured = (x, v_B, force_B, specific_force_B, airspeed_m_s, trim, chain)
-        haste = self._relief.haste
+            write_states(*flown)
+            self._start(command)
+        write_states(*flown)
+        self._aerodynamics.write_wrenches(self._motions, self._wrenches)
+        share = relief.step(surfaces_command, surfaces_rad, model.actuators) if self._engaged else 1.0
+        self.reference.step(self._seen[1], command, float(self._x_m[ATTITUDE.start]), share)
+        haste, felt = relief.haste, (specific_force_B, airspeed_m_s)
         K = row.K if haste == 0.0 else (1.0 - haste) * row.K + haste * row.K_busy
         gains = (row.C, K, row.K_followed, row.K_command, row.gust_from_residual)
-        memory = (x_m, self._w_m, self._z, self._gust, self._force_B)
-        limits = (self._engaged, self._limits, self._constants)
-        thrust_command_n = _command(*measured, *gains, *memory, *limits, surfaces_command, commands_m)
-        model.step(v_M, commands_m)
+        thrust_command_n = write_commands(*felt, self._engaged, *gains, *self._law)
+        model.step(self._wrenches[1], commands_m)
         self._engaged = True
         return surfaces_command, thrust_command_n
 
-    def _start(self, velocity_F: Array, trim: Array) -> None:
-        """Let the model begin in the trim of now, with a velocity beyond it."""
-        R_WF, R_FB = self.path.axes(), np.array(_attitude(trim)).reshape(3, 3)
-        ahead = np.array([self._constants[_AIRSPEED], 0.0, 0.0])
-        self.model.start(R_WF @ R_FB, R_WF @ (velocity_F + ahead), trim[RATE_0], trim[SURFACES_0.start : THRUST_0 + 1])
+    def _arguments(self) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
+        """What `write_states` and `write_commands` take at every tick: arrays that are written in place."""
+        model, (R_now, R_FB, trim, x) = self.model, self._seen
+        modelled = (model.R_WB, model.velocity_W, model.w_WB_B, model.actuators)
+        sight = (self.path.axes(), *modelled, self._constants, R_now, R_FB, trim, x, self._x_m, self._motions)
+        known = (x, self._motions, self._wrenches, trim, self.reference.chain)
+        memory = (self._x_m, self._w_m, self._z, self._gust, self._force_B)
+        return sight, (*known, *memory, self._limits, self._constants, *self._commands)
 
-
-@njit(cache=True)
-def _ahead(R, w, late, now):  # type: ignore[no-untyped-def]
-    """Write R exp(w late), to the second order: the attitude of now."""
-    x, y, z = late * w[0], late * w[1], late * w[2]
-    half = 0.5 * (x * x + y * y + z * z)
-    for i in range(3):
-        along = 0.5 * (R[i, 0] * x + R[i, 1] * y + R[i, 2] * z)
-        now[i, 0] = R[i, 0] * (1.0 - half) + R[i, 1] * z - R[i, 2] * y + along * x
-        now[i, 1] = R[i, 1] * (1.0 - half) + R[i, 2] * x - R[i, 0] * z + along * y
-        now[i, 2] = R[i, 2] * (1.0 - half) + R[i, 0] * y - R[i, 1] * x + along * z
-
-
-@njit(cache=True)
-def _state(R_WF, R_WB, velocity_W, w, surfaces, thrust, slope, level, k, R_FB, v_B, trim, x):  # type: ignore[no-untyped-def]
-    """Write attitude against the path, velocity along the body, the path's trim, and x beyond it.
-
-    The velocity in x is the one with which C x is that of the tip however much the body is turned from trim.
-    """
-    trim[:10], trim[_SLOPE] = level, slope
-    trim[THRUST_0] += STANDARD_GRAVITY_M_S2 * np.sin(slope)
-    R_trim, p = _attitude(trim), k[_PROBE:]
-    of_tip = (w[1] * p[2] - w[2] * p[1], w[2] * p[0] - w[0] * p[2], w[0] * p[1] - w[1] * p[0])
-    for i in range(3):
-        v_B[i] = R_WB[0, i] * velocity_W[0] + R_WB[1, i] * velocity_W[1] + R_WB[2, i] * velocity_W[2]
-        x[i] = R_WF[0, i] * velocity_W[0] + R_WF[1, i] * velocity_W[1] + R_WF[2, i] * velocity_W[2]
-        for j in range(3):
-            R_FB[i, j] = R_WF[0, i] * R_WB[0, j] + R_WF[1, i] * R_WB[1, j] + R_WF[2, i] * R_WB[2, j]
-            x[i] += (R_FB[i, j] - R_trim[3 * i + j]) * of_tip[j]
-    x[0] -= k[_AIRSPEED]
-    _rotation_between(R_FB, R_trim, x[3:6])
-    for i in range(3):
-        x[6 + i], x[9 + i] = w[i] - trim[3 + i], surfaces[i] - trim[6 + i]
-    x[12] = thrust - trim[THRUST_0]
-
-
-@njit(cache=True)
-def _estimate(v_B, force, felt, airspeed, gust_from_residual, gust, force_m, engaged, k):  # type: ignore[no-untyped-def]
-    """Advance the gust g."""
-    residual = np.empty(3)  # airspeed and specific forces across the body beyond those of still air
-    for i in range(3):
-        if not engaged:
-            force_m[i] = force[i] / k[_MASS]
-        force_m[i] += k[_LAG_SHARE] * (force[i] / k[_MASS] - force_m[i])  # as late as the accelerometers
-        residual[i] = felt[i] - force_m[i]
-    residual[0] = np.sqrt(v_B[0] * v_B[0] + v_B[1] * v_B[1] + v_B[2] * v_B[2]) - airspeed
-    for i in range(3):
-        now = 0.0
-        for j in range(3):
-            now += gust_from_residual[i, j] * residual[j]
-        gust[i] = gust[i] + k[_GUST_SHARE] * (now - gust[i]) if engaged else now
-
-
-@njit(cache=True)
-def _command(  # type: ignore[no-untyped-def]
-    x, v_B, force, felt, airspeed, trim, chain, C, K, K_m, K_c, gust_from_residual, x_m, w_m, z, gust, force_m, engaged,
-    limits, k, surfaces, commands_m,
-):  # fmt: skip
-    """Eqs. (1) and (2): write commands to surfaces and model, return thrust [N]; advance gust and integrals."""
-    _estimate(v_B, force, felt, airspeed, gust_from_residual, gust, force_m, engaged, k)
-    n, step = len(x), k[0]
-    error, u, off = np.empty(n + 6), np.zeros(4), np.zeros(3)
-    error[:n], error[n : n + 3], error[n + 3 :] = x - x_m[:n], z, gust
-    for i in range(3):
-        w_m[i] += k[_LAG_SHARE] * (x_m[6 + i] - w_m[i])
-        error[6 + i] = x[6 + i] - w_m[i]
-    _add(-1.0, K_m, x_m, u)
-    _add(-1.0, K_c, chain[:3].reshape(9), u)
-    free_m = free = True
-    for i in range(4):
-        wanted = trim[6 + i] + u[i]
-        commands_m[i] = min(max(wanted, limits[0, i]), limits[1, i])
-        free_m = free_m and commands_m[i] == wanted
-    _add(-1.0, K, error, u)
-    for i in range(4):
-        wanted = trim[6 + i] + u[i]
-        u[i] = min(max(wanted, limits[0, i]), limits[1, i])
-        free = free and u[i] == wanted
-    surfaces[:] = u[:3]
-    if free:
-        _add(step, C, error, z)
-    if free_m:
-        _add(1.0, C, x_m, off)
-        for i in range(3):
-            x_m[n + i] += step * (off[i] - chain[0, i])
-    return u[3] * k[_MASS]
-
-
-@njit(cache=True)
-def _add(factor, M, x, out):  # type: ignore[no-untyped-def]
-    """Add factor M x to out, as many of x as M has columns."""
-    for i in range(M.shape[0]):
-        total = 0.0
-        for j in range(M.shape[1]):
-            total += M[i, j] * x[j]
-        out[i] += factor * total
-
-
-@njit(cache=True)
-def _attitude(angles):  # type: ignore[no-untyped-def]
-    """R_z R_y R_x, row by row, of angles about x, y, z."""
-    cx, sx, cy, sy = np.cos(angles[0]), np.sin(angles[0]), np.cos(angles[1]), np.sin(angles[1])
-    cz, sz = np.cos(angles[2]), np.sin(angles[2])
-    return (
-        cz * cy, cz * sy * sx - sz * cx, cz * sy * cx + sz * sx,
-        sz * cy, sz * sy * sx + cz * cx, sz * sy * cx - cz * sx,
-        -sy, cy * sx, cy * cx,
-    )  # fmt: skip
-
-
-@njit(cache=True)
-def _rotation_between(R, S, phi):  # type: ignore[no-untyped-def]
-    """Write the rotation vector phi (3,) of R S' = exp(phi), for |phi| < pi; S row by row."""
-    M = np.empty((3, 3))
-    for i in range(3):
-        for j in range(3):
-            M[i, j] = R[i, 0] * S[3 * j] + R[i, 1] * S[3 * j + 1] + R[i, 2] * S[3 * j + 2]
-    phi[0], phi[1], phi[2] = 0.5 * (M[2, 1] - M[1, 2]), 0.5 * (M[0, 2] - M[2, 0]), 0.5 * (M[1, 0] - M[0, 1])
-    sine = np.sqrt(phi[0] * phi[0] + phi[1] * phi[1] + phi[2] * phi[2])
-    if sine >= 1e-12:
-        cosine = 0.5 * (M[0, 0] + M[1, 1] + M[2, 2] - 1.0)
-        phi *= np.arctan2(sine, cosine) / sine
+    def _start(self, command: ReceiverCommand) -> None:
+        """Let model and reference begin in the trim of now, with the aircraft's velocity beyond it."""
+        _, R_FB, trim, x = self._seen
+        R_WF, R_FM = self.path.axes(), np.array(rotation_rows(trim)).reshape(3, 3)
+        ahead = np.array([self._constants[AIRSPEED], 0.0, 0.0])
+        self.model.start(R_WF @ R_FM, R_WF @ (x[:3] + ahead), trim[RATE_0], trim[SURFACES_0.start : THRUST_0 + 1])
+        self.reference.start(x[:3], R_FB, command)

@@ -36,14 +36,16 @@ class InertialVelocity:
         frame_velocity_m_s: Array | None = None,
     ) -> None:
         self._rng = rng
-        self._frame_m_s: Array = np.zeros(3) if frame_velocity_m_s is None else frame_velocity_m_s
         self._decay = float(np.exp(-KNOT_S / correlation_time_s))
         self._kick_m_s = sigma_m_s * float(np.sqrt(-np.expm1(-2.0 * KNOT_S / correlation_time_s)))
         self._step_s, self._time_s, self._knot = step_s, 0.0, 0
-        self._before: Array = sigma_m_s * rng.standard_normal(3)
-        self._after: Array = self._drawn(self._before)
-        self.drift_m_s: Array = self._before.copy()
         self._measured: Array = np.empty(3)
+        self._rows = np.zeros((4, 3))  # drift at the knots before and after now, the frame's velocity, drift
+        self._rows[0] = sigma_m_s * rng.standard_normal(3)
+        self._rows[1] = self._drawn(self._rows[0])
+        if frame_velocity_m_s is not None:
+            self._rows[2] = frame_velocity_m_s
+        self._rows[3] = self._rows[0]
 
     def step(self, velocity_m_s: Array) -> Array:
         """(3,) measured velocity over the ground [m/s] of a true one (3,), same axes; advances by one tick.
@@ -53,18 +55,22 @@ class InertialVelocity:
         self._time_s += self._step_s
         while self._time_s >= (self._knot + 1) * KNOT_S:
             self._knot += 1
-            self._before, self._after = self._after, self._drawn(self._after)
-        velocities = (velocity_m_s, self._frame_m_s, self.drift_m_s, self._measured)
-        _measure(self._before, self._after, self._time_s / KNOT_S - self._knot, *velocities)
+            self._rows[0], self._rows[1] = self._rows[1], self._drawn(self._rows[1])
+        _measure(self._rows, self._time_s / KNOT_S - self._knot, velocity_m_s, self._measured)
         return self._measured
+
+    @property
+    def drift_m_s(self) -> Array:
+        """(3,) b at the last step."""
+        return np.array(self._rows[3])
 
     def _drawn(self, knot_m_s: Array) -> Array:
         return np.asarray(self._decay * knot_m_s + self._kick_m_s * self._rng.standard_normal(3))
 
 
 @njit(cache=True)
-def _measure(before, after, share, velocity, frame, drift, measured):  # type: ignore[no-untyped-def]
+def _measure(rows, share, velocity, measured):  # type: ignore[no-untyped-def]
     """Write the drift between two knots, and the velocity with it."""
     for i in range(3):
-        drift[i] = (1.0 - share) * before[i] + share * after[i]
-        measured[i] = velocity[i] + frame[i] + drift[i]
+        rows[3, i] = (1.0 - share) * rows[0, i] + share * rows[1, i]
+        measured[i] = velocity[i] + rows[2, i] + rows[3, i]

@@ -15,7 +15,7 @@ from numba import njit
 
 from dockair.rotations import Array
 from dockair.sim.air.atmosphere import STANDARD_GRAVITY_M_S2
-from dockair.sim.aircraft.airframe import Aerodynamics, AirframeData
+from dockair.sim.aircraft.airframe import AirframeData
 
 
 class ModelFlight:
@@ -23,40 +23,37 @@ class ModelFlight:
 
     Args:
         airframe: the on-board model.
-        aerodynamics: of the flight's air.
         step_s: length of a tick.
     """
 
-    def __init__(self, airframe: AirframeData, aerodynamics: Aerodynamics, step_s: float) -> None:
-        self._aerodynamics = aerodynamics
+    def __init__(self, airframe: AirframeData, step_s: float) -> None:
         inertia, lags = airframe.inertia_B, np.full(4, airframe.actuator_bandwidth_rad_s)
         lags[3] = 1.0 / airframe.engine_time_constant_s
-        self._inertia = inertia, np.asarray(np.linalg.inv(inertia)), lags
-        self._constants = np.array([step_s, airframe.mass_kg, airframe.rotor_momentum_kg_m2_s])
+        constants = np.array([step_s, airframe.mass_kg, airframe.rotor_momentum_kg_m2_s])
         self.R_WB: Array = np.eye(3)  #: all moved in place
         self.velocity_W: Array = np.zeros(3)  #: inertial [m/s]
         self.w_WB_B: Array = np.zeros(3)
         self.actuators: Array = np.zeros(4)  #: elevator, aileron, rudder [rad], thrust per mass [m/s^2]
+        state = (self.R_WB, self.velocity_W, self.w_WB_B, self.actuators)
+        self._arguments = (*state, inertia, np.asarray(np.linalg.inv(inertia)), lags, constants)
 
     def start(self, R_WB: Array, velocity_W: Array, w_WB_B: Array, actuators: Array) -> None:
         """Begin in this state."""
         self.R_WB[:], self.velocity_W[:], self.w_WB_B[:], self.actuators[:] = R_WB, velocity_W, w_WB_B, actuators
 
-    def step(self, velocity_B: Array, commands: Array) -> None:
+    def step(self, wrench_B: Array, commands: Array) -> None:
         """Advance by one tick.
 
         Args:
-            velocity_B: (3,) its velocity in its own axes [m/s].
+            wrench_B: (6,) force and moment of the air on it as it flies, body axes [N, N m].
             commands: (4,) to the actuators.
         """
-        force_B, moment_B = self._aerodynamics.force_and_moment(velocity_B, self.w_WB_B, self.actuators[:3])
-        state = (self.R_WB, self.velocity_W, self.w_WB_B, self.actuators)
-        _advance(*state, force_B, moment_B, commands, *self._inertia, self._constants)
+        _advance(wrench_B, commands, *self._arguments)
 
 
 @njit(cache=True)
-def _advance(R, v, w, actuators, force, moment, commands, J, J_inverse, lags, k):  # type: ignore[no-untyped-def]
-    step, mass, h = k[0], k[1], k[2]
+def _advance(wrench, commands, R, v, w, actuators, J, J_inverse, lags, k):  # type: ignore[no-untyped-def]
+    step, mass, h, force, moment = k[0], k[1], k[2], wrench[:3], wrench[3:]
     L = (
         J[0, 0] * w[0] + J[0, 1] * w[1] + J[0, 2] * w[2],
         J[1, 0] * w[0] + J[1, 1] * w[1] + J[1, 2] * w[2],

@@ -49,8 +49,8 @@ class OwnSensors:
     def __init__(self, parameters: OwnSensorsParameters, step_s: float, rng: np.random.Generator) -> None:
         self._rng, self._sigmas, self._step_s = rng, parameters.sigmas, step_s
         self._lag_s = parameters.inertial_lag_s
-        self._shares = np.array([_share(self._lag_s, step_s)] * 6 + [_share(parameters.air_data_lag_s, step_s)])
-        self._lagged = np.full(7, np.nan)  # rates, specific force, airspeed
+        shares = [_share(self._lag_s, step_s)] * 6 + [_share(parameters.air_data_lag_s, step_s)]
+        self._lagged = np.array([shares, [np.nan] * 7])  # share of a tick, y: of rates, specific force, airspeed
         self._measured = np.empty((3, 3)), np.empty(3), np.empty(3), np.empty(3)
         self._noise, self._ticks, self._drawn = np.zeros(13), 0, -1
 
@@ -65,10 +65,9 @@ class OwnSensors:
         if sample > self._drawn:
             self._noise, self._drawn = self._sigmas * self._rng.standard_normal(13), sample
         self._ticks += 1
-        true = (R_WB, w_WB_B, specific_force_B, velocity_W, airspeed_m_s)
         R, w, f, v = self._measured
-        airspeed = _measure(self._lagged, self._shares, self._noise, self._lag_s, *true, R, w, f, v)
-        return R, w, f, v, airspeed
+        memory, true = (self._lagged, self._noise, self._lag_s), (R_WB, w_WB_B, specific_force_B, velocity_W)
+        return R, w, f, v, _measure(*memory, *true, airspeed_m_s, R, w, f, v)
 
 
 def _share(lag_s: float, step_s: float) -> float:
@@ -76,10 +75,9 @@ def _share(lag_s: float, step_s: float) -> float:
 
 
 @njit(cache=True)
-def _measure(  # type: ignore[no-untyped-def]
-    lagged, shares, noise, lag, R_WB, w, f, v, airspeed, R_out, w_out, f_out, v_out
-):  # fmt: skip
+def _measure(lags, noise, lag, R_WB, w, f, v, airspeed, R_out, w_out, f_out, v_out):  # type: ignore[no-untyped-def]
     """Write what is measured; return the airspeed."""
+    shares, lagged = lags[0], lags[1]
     settled = not np.isnan(lagged[6])
     for i in range(7):
         now = w[i] if i < 3 else f[i - 3] if i < 6 else airspeed

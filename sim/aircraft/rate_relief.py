@@ -19,6 +19,9 @@ Flight control system design considering rate saturation, Aerospace Science and 
 import math
 from dataclasses import dataclass
 
+import numpy as np
+from numba import njit
+
 from dockair.rotations import Array
 
 
@@ -52,22 +55,25 @@ class RateRelief:
         step_s: float,
     ) -> None:
         self._parameters = parameters
-        self._largest = [float(rate) / bandwidth_rad_s for rate in rate_limits_rad_s]
-        self._stops = [parameters.stop_share * float(stop) for stop in stops_rad]
+        largest = [float(rate) / bandwidth_rad_s for rate in rate_limits_rad_s]
+        self._limits = np.array([largest, [parameters.stop_share * float(stop) for stop in stops_rad]])
         self._keep = math.exp(-step_s / parameters.time_s)
         self._busy = 0.0
+        self.haste = 0.0  #: Eq. (3)
 
     def step(self, commands_rad: Array, surfaces_rad: Array, modelled_rad: Array) -> float:
         """Return the share after a tick: commands to the surfaces (3,), where these and the model's (3,) were."""
-        busy = any(
-            abs(commands_rad[i] - surfaces_rad[i]) > self._largest[i]
-            or max(abs(commands_rad[i]), abs(modelled_rad[i])) > self._stops[i]
-            for i in range(3)
-        )
+        busy = _is_busy(commands_rad, surfaces_rad, modelled_rad, self._limits)
         self._busy = self._keep * self._busy + (1.0 - self._keep if busy else 0.0)
+        self.haste = min(self._busy / self._parameters.busy_share, 1.0)
         return 1.0 - (1.0 - self._parameters.least) * self.haste
 
-    @property
-    def haste(self) -> float:
-        """Eq. (3)."""
-        return min(self._busy / self._parameters.busy_share, 1.0)
+
+@njit(cache=True)
+def _is_busy(commands, surfaces, modelled, limits):  # type: ignore[no-untyped-def]
+    """Eq. (1)'s condition."""
+    for i in range(3):
+        near_stop = max(abs(commands[i]), abs(modelled[i])) > limits[1, i]
+        if near_stop or abs(commands[i] - surfaces[i]) > limits[0, i]:
+            return True
+    return False

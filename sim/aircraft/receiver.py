@@ -65,7 +65,7 @@ class Receiver:
         self.own_sensors = OwnSensors(flight_control.own_sensors, step_s, rng.spawn(1)[0])
         self._airframe, self._air, self._step_s = airframe, air, step_s
         self._rotor_momentum = airframe.rotor_momentum_kg_m2_s
-        self._v_air_B, self._wrench = np.empty(3), (np.empty(3), np.empty(3))  # of one step
+        self._motion, self._wrench_B, self._wrench_W = np.empty((1, 12)), np.empty((1, 6)), np.empty((2, 3))
         self.airspeed_m_s = airspeed_m_s
         self.angle_of_attack_rad = self.trim.alpha_rad
         self.sideslip_rad = 0.0
@@ -99,10 +99,10 @@ class Receiver:
         specific_force_B: Array,
         command: ReceiverCommand,
         air_rotation_B: Array = NO_ROTATION,
-    ) -> tuple[Array, Array]:
-        """Force [N] and torque [N m] of air and engine about the centre of gravity, (3,) each, W axes, without gravity.
+    ) -> Array:
+        """(2, 3) force [N] and torque [N m] of air and engine about the centre of gravity, W axes, without gravity.
 
-        The arrays are overwritten by the next step.
+        The array is overwritten by the next step.
 
         Args:
             R_WB: (3, 3) attitude.
@@ -113,8 +113,8 @@ class Receiver:
             command: increment on the path, and what the path does.
             air_rotation_B: (3,) angular velocity of the air about the aircraft [rad/s].
         """
-        actuators, v_air_B, wrench = self.actuators, self._v_air_B, self._wrench
-        flow = flow_about(R_WB, v_WB, air_velocity_W, v_air_B)
+        actuators, motion, wrench_B = self.actuators, self._motion, self._wrench_B
+        flow = flow_about(R_WB, v_WB, w_WB_B, air_velocity_W, air_rotation_B, motion)
         self.airspeed_m_s, self.angle_of_attack_rad, self.sideslip_rad = flow
         velocity_W = self.inertial_velocity.step(v_WB)
         R, w, f, v, airspeed = self.own_sensors.step(R_WB, w_WB_B, specific_force_B, velocity_W, flow[0])
@@ -130,17 +130,18 @@ class Receiver:
         )
         actuators.step(surfaces_rad, thrust_n)
         self.throttle = actuators.throttle
-        aerodynamics, surfaces = self.trim.aerodynamics, actuators.surfaces_rad
-        force_B, torque_B = aerodynamics.force_and_moment(v_air_B, w_WB_B, surfaces, air_rotation_B)
-        _with_engine(R_WB, w_WB_B, force_B, torque_B, actuators.thrust_n, self._rotor_momentum, *wrench)
-        return wrench
+        motion[0, 6:9] = actuators.surfaces_rad
+        self.trim.aerodynamics.write_wrenches(motion, wrench_B)
+        _with_engine(R_WB, w_WB_B, wrench_B, actuators.thrust_n, self._rotor_momentum, self._wrench_W)
+        return self._wrench_W
 
 
 @njit(cache=True)
-def _with_engine(R_WB, w_B, force_B, torque_B, thrust, momentum, force_W, torque_W):  # type: ignore[no-untyped-def]
+def _with_engine(R_WB, w_B, wrench_B, thrust, momentum, wrench_W):  # type: ignore[no-untyped-def]
     """Write force and torque along the axes of W, thrust and the rotor's moment (Eq. (4) of `engine`) included."""
-    force_x = force_B[0] + thrust
-    torque_y, torque_z = torque_B[1] - momentum * w_B[2], torque_B[2] + momentum * w_B[1]
+    force, torque = wrench_B[0, :3], wrench_B[0, 3:]
+    force_x = force[0] + thrust
+    torque_y, torque_z = torque[1] - momentum * w_B[2], torque[2] + momentum * w_B[1]
     for i in range(3):
-        force_W[i] = R_WB[i, 0] * force_x + R_WB[i, 1] * force_B[1] + R_WB[i, 2] * force_B[2]
-        torque_W[i] = R_WB[i, 0] * torque_B[0] + R_WB[i, 1] * torque_y + R_WB[i, 2] * torque_z
+        wrench_W[0, i] = R_WB[i, 0] * force_x + R_WB[i, 1] * force[1] + R_WB[i, 2] * force[2]
+        wrench_W[1, i] = R_WB[i, 0] * torque[0] + R_WB[i, 1] * torque_y + R_WB[i, 2] * torque_z

@@ -151,7 +151,8 @@ def write_tow_loads(
         v[i, 0] = spatial[i, 3] + spatial[i, 1] * z - spatial[i, 2] * y
         v[i, 1] = spatial[i, 4] + spatial[i, 2] * x - spatial[i, 0] * z
         v[i, 2] = spatial[i, 5] + spatial[i, 0] * y - spatial[i, 1] * x
-    wrench[:] = 0.0
+        for axis in range(6):
+            wrench[i, axis] = 0.0
     _add_loads(R, v, w, air, drawn_in, k, wrench)
 
 

@@ -76,6 +76,16 @@ def test_only_the_rotation_relative_to_the_air_is_felt() -> None:
         np.testing.assert_array_equal(left, right)
 
 
+def test_motions_in_rows_make_the_wrenches_that_each_alone_makes() -> None:
+    """To the bit: flying forward, sideways and turning, in air that turns, each row on its own."""
+    motions = np.random.default_rng(7).normal(size=(4, 12)) * np.repeat([20.0, 0.3, 0.2, 0.1], 3)
+    motions[:, 0] += 180.0
+    wrenches = np.empty((4, 6))
+    MODEL.write_wrenches(motions, wrenches)
+    for motion, wrench in zip(motions, wrenches, strict=True):
+        np.testing.assert_array_equal(wrench, np.concatenate(MODEL.force_and_moment(*np.split(motion, 4))))
+
+
 def test_left_and_right_are_mirror_images_where_the_tables_are() -> None:
     """Static tables are odd in sideslip; those of the surfaces are not printed as mirror images."""
     one = force_and_moment(beta=0.14, w_B=(0.2, 0.1, -0.1))

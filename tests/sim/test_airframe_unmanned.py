@@ -42,6 +42,16 @@ def in_stability_axes(
     return np.array([-force[0], force[1], -force[2], *moment])
 
 
+def test_motions_in_rows_make_the_wrenches_that_each_alone_makes() -> None:
+    """To the bit, each row on its own."""
+    motions = np.random.default_rng(7).normal(size=(3, 12)) * np.repeat([10.0, 0.3, 0.1, 0.1], 3)
+    motions[:, 0] += V
+    wrenches = np.empty((3, 6))
+    MODEL.write_wrenches(motions, wrenches)
+    for motion, wrench in zip(motions, wrenches, strict=True):
+        np.testing.assert_array_equal(wrench, np.concatenate(MODEL.force_and_moment(*np.split(motion, 4))))
+
+
 def test_lift_drag_and_pitching_moment_are_the_sheets() -> None:
     for alpha, q, elevator in ((0.0, 0.0, 0.0), (0.08, 0.0, 0.0), (-0.03, 0.004, 0.05)):
         CD, CY, CL, Cl, Cm, Cn = in_stability_axes(alpha, 0.0, (0.0, q, 0.0), (elevator, 0.0, 0.0))

@@ -168,7 +168,7 @@ def test_a_record_goes_on_where_the_last_one_ended() -> None:
     w = np.random.default_rng(7).normal(size=(600, 3))
     whole = _imu(SHEET).record(600, w).angular_rate_rad_s
     imu = _imu(SHEET)
-    parts = [imu.record(200, w[:200]), imu.record(400, w[200:])]
+    parts = [imu.record(10, w[:10]), imu.record(190, w[10:200]), imu.record(400, w[200:])]
     assert np.array_equal(np.concatenate([p.angular_rate_rad_s for p in parts]), whole)
 
 

@@ -17,15 +17,16 @@ AIRFRAME, AIR, STEP_S = load_parameters("airframe", AirframeParameters), standar
 
 def started(trim: Trim) -> tuple[ModelFlight, np.ndarray]:
     """The model in a trim, and the commands that hold it."""
-    flight = ModelFlight(AIRFRAME, trim.aerodynamics, STEP_S)
+    flight = ModelFlight(AIRFRAME, STEP_S)
     commands = np.append(trim.surfaces_rad, trim.thrust_n / AIRFRAME.mass_kg)
     flight.start(trim.R_WB, trim.velocity_W, trim.w_WB_B, commands)
     return flight, commands
 
 
-def fly(flight: ModelFlight, commands: np.ndarray, seconds: float) -> None:
+def fly(flight: ModelFlight, trim: Trim, commands: np.ndarray, seconds: float) -> None:
     for _ in range(round(seconds / STEP_S)):
-        flight.step(flight.R_WB.T @ flight.velocity_W, commands)
+        motion = (flight.R_WB.T @ flight.velocity_W, flight.w_WB_B, flight.actuators[:3])
+        flight.step(np.concatenate(trim.aerodynamics.force_and_moment(*motion)), commands)
 
 
 @pytest.mark.parametrize("turn_rate_rad_s", [0.0, 0.025])
@@ -33,7 +34,7 @@ def test_trimmed_model_keeps_its_steady_flight(turn_rate_rad_s: float) -> None:
     """Straight, and in a turn of 25 degrees of bank, where the velocity turns with the path."""
     trim = steady_trim(AIRFRAME, 180.0, AIR, turn_rate_rad_s=turn_rate_rad_s)
     flight, commands = started(trim)
-    fly(flight, commands, 0.5)
+    fly(flight, trim, commands, 0.5)
     turned = exp(np.array([0.0, 0.0, 0.5 * turn_rate_rad_s]))
     np.testing.assert_allclose(flight.velocity_W, turned @ trim.velocity_W, atol=2e-2 if turn_rate_rad_s else 1e-6)
     np.testing.assert_allclose(flight.R_WB, turned @ trim.R_WB, atol=1e-3 if turn_rate_rad_s else 1e-9)
@@ -59,7 +60,7 @@ def test_model_flies_as_an_independent_integration_of_the_equations_of_motion() 
 
     start = np.concatenate([trim.R_WB.ravel(), trim.velocity_W, trim.w_WB_B, held])
     expected = solve_ivp(derivative, (0.0, 0.5), start, rtol=1e-9, atol=1e-10).y[:, -1]
-    fly(flight, commands, 0.5)
+    fly(flight, trim, commands, 0.5)
     rolled = np.arccos(0.5 * (np.trace(flight.R_WB @ trim.R_WB.T) - 1.0))
     assert rolled > np.radians(2.0)
     np.testing.assert_allclose(flight.R_WB.ravel(), expected[:9], atol=2e-3)  # the integration is of first order
@@ -76,7 +77,7 @@ def test_first_tick_turns_as_eulers_equations_say_with_the_rotor() -> None:
     w, inertia = np.array([0.5, 0.4, -0.3]), AIRFRAME.inertia_B
     flight.start(trim.R_WB, trim.velocity_W, w, commands)
     velocity_B = trim.R_WB.T @ trim.velocity_W
-    _, moment = trim.aerodynamics.force_and_moment(velocity_B, w, trim.surfaces_rad)
+    force, moment = trim.aerodynamics.force_and_moment(velocity_B, w, trim.surfaces_rad)
     expected = np.linalg.solve(inertia, moment + rotor_moment(AIRFRAME, w) - np.cross(w, inertia @ w))
-    flight.step(velocity_B, commands)
+    flight.step(np.concatenate([force, moment]), commands)
     np.testing.assert_allclose((flight.w_WB_B - w) / STEP_S, expected, rtol=1e-9, atol=1e-9)
