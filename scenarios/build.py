@@ -10,6 +10,7 @@ from dockair.calibration import Camera, LedRing, Mounting, NavigationSheets
 from dockair.clock import Clock
 from dockair.errors import DockairError
 from dockair.messages import Navigates
+from dockair.nav.guidance.announced_path import AnnouncedPathSettings
 from dockair.nav.guidance.approach import GuidanceSettings
 from dockair.nav.guidance.bow_wave_push import BowWavePush
 from dockair.nav.guidance.phases import PhaseLimits
@@ -202,6 +203,7 @@ def guidance_settings(scenario: Scenario) -> GuidanceSettings:
         acceleration_limit_m_s2=_commanded(control.acceleration_limit_m_s2),
         jerk_limit_m_s3=_commanded(control.jerk_limit_m_s3),
         bow_wave=BowWavePush(source_from_tip_m=(x, y, z), radius_m=bow_wave.radius_m),
+        path=AnnouncedPathSettings(airspeed_m_s=scenario.flight.airspeed_m_s),
         limits=limits,
     )
 

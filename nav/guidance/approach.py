@@ -55,7 +55,7 @@ class Guidance:
         self._miss = PredictedMiss(settings.closing, self._dt)
         self._u: Array = np.zeros(3)
         self._u_dot: Array = np.zeros(3)
-        self._path = AnnouncedPath()
+        self._path = AnnouncedPath(settings.path)
         self._turned: Array = np.zeros((2, 3))  # n x p of Eq. (2) and its rate
         self._commanded: Array = np.zeros(3)  # Eq. (2)
         self._aim: Array = np.zeros(2)

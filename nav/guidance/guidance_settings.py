@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 from typing import Literal
 
+from dockair.nav.guidance.announced_path import AnnouncedPathSettings
 from dockair.nav.guidance.bow_wave_push import BowWavePush
 from dockair.nav.guidance.closing import ClosingSettings
 from dockair.nav.guidance.drogue_motion import SwingSettings
@@ -57,12 +58,11 @@ class GuidanceSettings:
     course_gain_1_s: float = 1.2  # how fast a course without a view of the drogue is taken up
     funnel_s: float = 0.25  # from the ring to the coupling; what the drogue does after that is the probe's own doing
     levelling_s: float = 10.0  # of the stabilised axes: long beside the swing, short beside a turn
-    turn_gain_rad_m: float = 1e-3  # k_r: at 180 m/s a drift across goes within 6 s, slow beside the swing
-    turn_learning_s: float = 10.0  # T_r: the turn's error is known when the probe is in the basket and sees no drift
     predictive: PredictiveSettings = field(default_factory=PredictiveSettings)
     pid: PidSettings = field(default_factory=PidSettings)
     closing: ClosingSettings = field(default_factory=ClosingSettings)
     bow_wave: BowWavePush = field(default_factory=BowWavePush)
+    path: AnnouncedPathSettings = field(default_factory=AnnouncedPathSettings)
     limits: PhaseLimits = field(default_factory=PhaseLimits)
 
 

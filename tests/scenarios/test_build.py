@@ -74,7 +74,9 @@ def test_the_flight_starts_where_the_scenario_says_within_its_sigma():
 
 
 def test_guidance_takes_the_scenarios_figures():
-    settings = guidance_settings(load_scenario("default", {"guidance.closure_speed_m_s": 1.0, "guidance.hold_s": 7.0}))
+    overrides = {"guidance.closure_speed_m_s": 1.0, "guidance.hold_s": 7.0, "flight.airspeed_m_s": 170.0}
+    settings = guidance_settings(load_scenario("default", overrides))
+    assert settings.path.airspeed_m_s == 170.0
     assert settings.closure_speed_m_s == 1.0
     assert settings.limits.hold_s == 7.0
     assert settings.stand_off_m == 4.0
