@@ -61,7 +61,7 @@ class Guidance:
         self._aim: Array = np.zeros(2)
         self._passed: Array | None = None  # where the ring was when the tip last came to its plane, left and up
         self._closure, self._good, self._committed = 0.0, False, False
-        self._attempts, self._docked = 0, False
+        self._attempts, self._docked, self._has_seen = 0, False, False
         self._time_s = self._in_phase_s = self._steady_s = self._waiting_s = self._patient_s = 0.0
         self._unusable_s = self._doubtful_s = self._inside_s = self._pushed_in_m = 0.0
 
@@ -127,7 +127,8 @@ class Guidance:
         settings, limits = self._settings, self._settings.limits
         self._time_s += self._dt
         self._in_phase_s += self._dt
-        self._unusable_s = 0.0 if state.usable else self._unusable_s + self._dt
+        self._has_seen = self._has_seen or state.usable
+        self._unusable_s = self._unusable_s + self._dt if self._has_seen and not state.usable else 0.0
         self._doubtful_s = 0.0 if state.contact_usable else self._doubtful_s + self._dt
         steady = (
             self.phase is Phase.PRE_CONTACT
@@ -253,7 +254,9 @@ class Guidance:
         if self.phase is Phase.CONTACT:  # slows down so as to stop where it is to hold
             to_go = max(s.limits.take_in_m - self._pushed_in_m, 0.0)
             target[0] += min(s.closure_speed_m_s, s.take_in_gain_1_s * to_go)
-        elif self.phase in _RETREATING:
+        elif self.phase in _RETREATING or (
+            self.phase is Phase.PRE_CONTACT and self._unusable_s > s.limits.lost_s
+        ):  # nobody waits near a drogue that is not seen
             target[0] -= s.back_off_speed_m_s
         elif self.phase is Phase.APPROACH:  # out of view, or in the basket: on as before
             target[0] = self._u[0]

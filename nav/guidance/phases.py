@@ -46,6 +46,7 @@ class PhaseLimits:
     clear_m: float = 3.0  # procedures: pre-contact is 3-5 m behind the drogue
     lost_s: float = 0.5  # breakaway practice: track lost for 0.5 s ...
     lost_range_m: float = 2.0  # ... within 2 m
+    lost_for_good_s: float = 20.0  # assumed: what is not in view again after falling back so long will not be found
     off_axis_m: float = 1.0  # breakaway practice: 1 m off ...
     off_axis_range_m: float = 1.0  # ... within 1 m
     rim_m: float = 0.25  # radius of the ring: a tip past its plane and farther out is beside the basket
@@ -64,7 +65,7 @@ class Situation:
     radius_m: float  #: what that may be, after so much waiting
     waiting_s: float  #: time for which the approach has stood still for want of a good moment
     inside_s: float  #: time for which the tip has been past the ring's plane
-    unusable_s: float  #: time for which the relative state has been unusable
+    unusable_s: float  #: time for which the relative state has been unusable, once it has been usable
     doubtful_s: float  #: time for which the integrity monitor has not claimed that contact may be flown
     station_m: float  #: probe's tip from the stand-off point
     ahead_m: float  #: coupling ahead of the probe's tip
@@ -100,7 +101,7 @@ def _left(limits: PhaseLimits, s: Situation) -> bool:
 
 
 def _far_enough(limits: PhaseLimits, s: Situation) -> bool:
-    return s.ring_ahead_m >= limits.clear_m or s.in_phase_s >= limits.breakaway_s
+    return (s.ring_ahead_m >= limits.clear_m and s.unusable_s == 0.0) or s.in_phase_s >= limits.breakaway_s
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,6 +133,7 @@ TRANSITIONS: dict[Phase, tuple[Transition, ...]] = {
     ),
     Phase.PRE_CONTACT: (
         _SLOT_OVER,
+        Transition(Phase.CLEAR, "drogue lost", lambda limits, s: s.unusable_s > limits.lost_for_good_s),
         Transition(
             Phase.APPROACH,
             "steady",

@@ -329,3 +329,20 @@ def test_a_lull_in_gusts_that_are_too_strong_is_no_moment_to_begin_an_approach()
         begun_s.append(plant.t)
     assert begun_s[1] < 60.0
     assert begun_s[0] > begun_s[1] + 20.0
+
+
+def test_a_drogue_that_is_not_seen_is_not_waited_for_beside_it():
+    """Lost as the tip enters, the belief running away: the retreat goes on, so does falling back, then it is over."""
+    plant, guidance = Plant(offset=(4.0, 0.0, 0.0)), Guidance(SETTINGS, RATE_HZ)
+    now, blind, phases, lost_s = plant.step(ReceiverCommand()), False, [], 0.0
+    while guidance.phase is not Phase.CLEAR and plant.t < 90.0:
+        blind = blind or (guidance.phase is Phase.APPROACH and now.p_PD_B[0] < 0.5)
+        lost_s += blind / RATE_HZ
+        seen = state(now.p_PD_B + [3.0 * lost_s, -5.0 * lost_s, 0.0], usable=False) if blind else now
+        now = plant.step(guidance.step(seen))
+        plant.holds = False
+        if not phases or guidance.phase is not phases[-1]:
+            phases.append(guidance.phase)
+    assert phases == [Phase.PRE_CONTACT, Phase.APPROACH, Phase.BREAKAWAY, Phase.PRE_CONTACT, Phase.CLEAR]
+    assert guidance.phase_reason == "drogue lost"
+    assert now.p_PD_B[0] > 10.0
