@@ -18,8 +18,7 @@ from enum import Enum
 
 import numpy as np
 
-from dockair.rotations import Array
-from dockair.sim.hose.chain import cross
+from dockair.rotations import Array, cross
 from dockair.sim.truth import Truth
 
 ATTEMPTING = ("approach", "contact")  # phases in which the receiver tries

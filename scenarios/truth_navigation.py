@@ -11,7 +11,7 @@ import numpy as np
 from dockair.calibration import NavigationSheets
 from dockair.messages import CameraFrame, ImuSample, NavSolution, TankerAnnouncement
 from dockair.nav.guidance.approach import Guidance, GuidanceSettings, RelativeState
-from dockair.sim.hose.chain import cross
+from dockair.rotations import cross
 from dockair.sim.truth import Truth
 
 

@@ -11,11 +11,10 @@ does to the acceleration in between is nothing (`scene`).
 import mujoco
 from numba import njit
 
-from dockair.rotations import Array
+from dockair.rotations import Array, cross
 from dockair.sim.addresses import Addresses
 from dockair.sim.aircraft.tanker import TankerPath
 from dockair.sim.aircraft.tanker_motion import OMEGA, P, R, V
-from dockair.sim.hose.chain import cross
 from dockair.sim.hose.tow import PodMotion
 
 

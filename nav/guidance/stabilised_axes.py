@@ -20,7 +20,7 @@ import math
 import numpy as np
 from numba import njit
 
-from dockair.rotations import Array
+from dockair.rotations import Array, cross
 
 
 class StabilisedAxes:
@@ -53,7 +53,7 @@ class StabilisedAxes:
 
     def turned(self, p_N: Array) -> Array:
         """(3,) n x p of Eq. (2), or its rate for a rate."""
-        return np.cross(self._turn_N, p_N)
+        return cross(self._turn_N, p_N)
 
     def moved(self, p_B: Array, rate_B: Array) -> tuple[Array, Array]:
         """(3,) a vector and its rate of change in N, of those in B."""

@@ -38,7 +38,7 @@ from dockair.calibration import GyroSheet, Mounting
 from dockair.errors import DockairError
 from dockair.messages import ImuSample
 from dockair.nav.heading.levelling import without_yaw
-from dockair.rotations import Array, exp, skew
+from dockair.rotations import Array, cross, exp, skew
 
 __all__ = ["HeadingFilter", "HeadingFilterSettings"]
 
@@ -204,7 +204,7 @@ class HeadingFilter:
         self.is_lost = self.is_lost or dt > self._settings.longest_gap_s
         corrected_B = w_B - self.bias_B
         if np.isfinite(f_B).all():
-            lift_B = f_B - np.cross(corrected_B, self._velocity_B)
+            lift_B = f_B - cross(corrected_B, self._velocity_B)
             self._lift_N, self._lifts = self._lift_N + self._R_NB @ lift_B, self._lifts + 1
         self._lift_s += dt
         self._advance(corrected_B, dt)
@@ -217,7 +217,7 @@ class HeadingFilter:
     def _begin(self, stamp_s: float, w_B: Array, f_B: Array) -> None:
         """Roll and pitch of the first sample. Whatever they are off by, the heading is zero there: Eq. (5)."""
         for _ in range(_ROUNDS):
-            self._R_NB = _upright(f_B - np.cross(w_B, self._velocity_B))
+            self._R_NB = _upright(f_B - cross(w_B, self._velocity_B))
         self._stamp_s = stamp_s
         self._past.append((stamp_s, 0.0))
         level = np.vstack([np.eye(2), -self._to_heading[:2]])
@@ -290,4 +290,4 @@ def _upright(up_B: Array) -> Array:
     up = up_B / np.linalg.norm(up_B)
     ahead = np.array([1.0, 0.0, 0.0]) - up[0] * up
     ahead = ahead / np.linalg.norm(ahead)
-    return np.array([ahead, np.cross(up, ahead), up])
+    return np.array([ahead, cross(up, ahead), up])

@@ -102,9 +102,3 @@ def velocities_at(places: Array, spatial: Array, reference: Array) -> Array:
         v[i, 1] = spatial[i, 4] + spatial[i, 2] * x - spatial[i, 0] * z
         v[i, 2] = spatial[i, 5] + spatial[i, 0] * y - spatial[i, 1] * x
     return v
-
-
-@njit(cache=True)
-def cross(a: Array, b: Array) -> Array:
-    """(3,) a x b; numpy's own takes ten times as long for one pair of vectors."""
-    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from dockair.parameters import load_parameters
-from dockair.sim.hose.chain import DrogueParameters, HoseParameters, cross, velocities_at
+from dockair.sim.hose.chain import DrogueParameters, HoseParameters, velocities_at
 
 
 def test_velocity_of_a_point_is_that_of_the_reference_and_of_the_turning_about_it():
@@ -12,12 +12,6 @@ def test_velocity_of_a_point_is_that_of_the_reference_and_of_the_turning_about_i
     places, spatial, reference = rng.normal(size=(5, 3)), rng.normal(size=(5, 6)), rng.normal(size=3)
     expected = spatial[:, 3:] + np.cross(spatial[:, :3], places - reference)
     np.testing.assert_allclose(velocities_at(places, spatial, reference), expected, rtol=1e-12)
-
-
-def test_cross_is_the_right_handed_one():
-    np.testing.assert_array_equal(cross(np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])), [0.0, 0.0, 1.0])
-    a, b = np.random.default_rng(2).normal(size=(2, 3))
-    np.testing.assert_allclose(cross(a, b), np.cross(a, b), rtol=1e-12)
 
 
 def test_drogues_mass_centre_and_inertia_are_those_of_its_two_parts():
