@@ -35,7 +35,7 @@ from dockair.sim.addresses import Addresses
 from dockair.sim.air.atmosphere import STANDARD_GRAVITY_M_S2
 from dockair.sim.air.motion import AirState
 from dockair.sim.aircraft.tanker import TankerPath, TankerPathParameters
-from dockair.sim.hose.coupling import CouplingState, next_coupling_state, probe_in_coupling
+from dockair.sim.hose.coupling import CouplingState, next_coupling_state, probe_in_coupling, stays
 from dockair.sim.hose.fuel import Fuel
 from dockair.sim.hose.reel import Reel, reel_light
 from dockair.sim.hose.rest import hinge_angles
@@ -246,10 +246,8 @@ class World:
 
     def _decide_coupling(self) -> None:
         p = self.parameters.coupling
-        far = self._coupling is CouplingState.READY and self._seen[layout.TIP_DISTANCE] > p.capture_distance_m
-        held = self._coupling is CouplingState.LATCHED and self._tensions[2] <= p.release_force_n
-        if far or held:
-            return  # nothing to decide, and no time to lose
+        if stays(self._coupling, self._seen[layout.TIP_DISTANCE], self._tensions[2], p):
+            return
         probe = probe_in_coupling(self.truth, self._tensions[2], p)
         self._coupling = next_coupling_state(self._coupling, probe, p)
         self.data.eq_active[self._at.latch] = self._coupling is CouplingState.LATCHED

@@ -22,7 +22,7 @@ from enum import Enum
 
 import numpy as np
 
-from dockair.sim.hose.chain import cross
+from dockair.rotations import cross
 from dockair.sim.truth import Truth
 
 
@@ -64,6 +64,13 @@ class ProbeInCoupling:
     angle_rad: float  #: between the axes of probe and drogue
     closing_speed_m_s: float  #: of the tip into the coupling, along the drogue's axis
     pull_n: float  #: with which the held probe is drawn out of the coupling, along the drogue's axis
+
+
+def stays(state: CouplingState, distance_m: float, pull_n: float, parameters: CouplingParameters) -> bool:
+    """Whether distance and pull alone say that `next_coupling_state` is this one: at most ticks they do."""
+    if state is CouplingState.LATCHED:
+        return pull_n <= parameters.release_force_n
+    return state is CouplingState.READY and distance_m > parameters.capture_distance_m
 
 
 def next_coupling_state(state: CouplingState, probe: ProbeInCoupling, parameters: CouplingParameters) -> CouplingState:

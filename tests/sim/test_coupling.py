@@ -14,6 +14,7 @@ from dockair.sim.hose.coupling import (
     ProbeInCoupling,
     next_coupling_state,
     probe_in_coupling,
+    stays,
 )
 
 COUPLING = load_parameters("coupling", CouplingParameters)
@@ -39,6 +40,16 @@ READY, LATCHED, BARRED = CouplingState.READY, CouplingState.LATCHED, CouplingSta
 )
 def test_coupling_goes_from_state_to_state_as_tabled(before, probe, after):
     assert next_coupling_state(before, probe, COUPLING) is after
+    assert after is before or not stays(before, probe.distance_m, probe.pull_n, COUPLING)
+
+
+@pytest.mark.parametrize("beyond_m", [-1e-6, 1e-6])
+@pytest.mark.parametrize("pulled_n", [-1.0, 1.0])
+def test_most_ticks_are_decided_by_distance_and_pull(beyond_m, pulled_n):
+    distance_m, pull_n = COUPLING.capture_distance_m + beyond_m, COUPLING.release_force_n + pulled_n
+    assert stays(READY, distance_m, pull_n, COUPLING) is (beyond_m > 0.0)
+    assert stays(LATCHED, distance_m, pull_n, COUPLING) is (pulled_n < 0.0)
+    assert not stays(BARRED, distance_m, pull_n, COUPLING)
 
 
 def _fly_in(make_world, receiver_on_rails, *, y=0.0, z=0.0, speed=1.2, pitch_rad=0.0):
