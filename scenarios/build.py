@@ -38,7 +38,7 @@ from dockair.sim.basket import place_leds
 from dockair.sim.camera.camera import CameraNoise, NearInfraredCamera
 from dockair.sim.camera.readout import row_time_s, shortest_period_s
 from dockair.sim.camera.sheets import CameraSheets, LedParameters
-from dockair.sim.camera.sky import Weather
+from dockair.sim.camera.weather import Weather
 from dockair.sim.faults import Faults
 from dockair.sim.hose.chain import DrogueParameters, HoseParameters
 from dockair.sim.hose.coupling import CouplingParameters

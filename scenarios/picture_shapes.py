@@ -15,9 +15,11 @@ from dockair.parameters import load_parameters
 from dockair.rotations import Array, matrix_from_yaw_pitch_roll
 from dockair.scenarios.build import MountingParameters
 from dockair.sim.camera.sheets import SkyParameters
-from dockair.sim.camera.sky import Sky, Weather
+from dockair.sim.camera.sky import Sky
+from dockair.sim.camera.sky_radiance import SkyRadiance
 from dockair.sim.camera.solids import Haze, Lighting
 from dockair.sim.camera.traced import TracedSolids
+from dockair.sim.camera.weather import Weather
 from dockair.sim.outlines import TankerParameters
 from dockair.sim.skins import Skin, receiver_skins, tanker_skins
 
@@ -30,7 +32,7 @@ _WHITE, _GREYS = 0.8, 24.0  # radiance that is drawn white; grey levels, for a s
 
 def main(path: Path) -> None:
     """Write the picture: six panels, two in a row."""
-    sky = Sky(load_parameters("sky", SkyParameters), Weather(), _SUN_W, _ALTITUDE_M, _KEY)
+    sky = Sky(SkyRadiance(load_parameters("sky", SkyParameters), Weather(), _SUN_W, _ALTITUDE_M, _KEY))
     tanker, mounting = (
         tanker_skins(load_parameters("tanker", TankerParameters)),
         load_parameters("mounting", MountingParameters).mounting(),

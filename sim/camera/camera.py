@@ -36,8 +36,10 @@ from dockair.sim.camera.point_sources import PointSources
 from dockair.sim.camera.radiometry import extinction_1_m, led_wavelength_m, responses
 from dockair.sim.camera.readout import latency_s, transfer_jitter_s
 from dockair.sim.camera.sheets import CameraSheets
-from dockair.sim.camera.sky import Sky, Weather
+from dockair.sim.camera.sky import Sky
+from dockair.sim.camera.sky_radiance import SkyRadiance
 from dockair.sim.camera.sun_view import SunView
+from dockair.sim.camera.weather import Weather
 from dockair.sim.faults import CameraFault, Faults
 
 __all__ = ["CameraNoise", "NearInfraredCamera"]
@@ -97,7 +99,7 @@ class NearInfraredCamera:
         wavelength = led_wavelength_m(sheets.leds)
         self._spread = PointSpread(sheets.lens, sheets.sensor, camera, wavelength)
         self._blobs = Blobs(camera, self._spread)
-        self._sky = Sky(sheets.sky, weather, sun_direction_W, altitude_m, noise.clouds)
+        self._sky = Sky(SkyRadiance(sheets.sky, weather, sun_direction_W, altitude_m, noise.clouds))
         self._extinction_1_m = extinction_1_m(weather.visibility_m)
         self._sun: SunView | None = None
         self._glare = Glare(sheets.glare, sheets.lens, camera, sheets.light, self._response, wavelength)

@@ -10,12 +10,8 @@ from numpy.typing import NDArray
 from dockair.rotations import Array
 from dockair.sim.camera.earth import columns_below, dip_sine
 from dockair.sim.camera.layer_table import LayerTable, lay_under
-from dockair.sim.camera.sheets import SkyParameters
 from dockair.sim.camera.sky_radiance import LAYER_NODE_RAD, NODE_RAD, SkyRadiance
 from dockair.sim.camera.sky_table import DirectionTable
-from dockair.sim.camera.weather import Weather
-
-__all__ = ["Sky", "Weather"]
 
 _TILES, _LAYER_TILES = (round(2.0 / (64 * node)) for node in (NODE_RAD, LAYER_NODE_RAD))  # of the tables, a side
 _SMOOTH_TILES = _TILES // 2  # without clouds
@@ -24,25 +20,17 @@ _SMOOTH_TILES = _TILES // 2  # without clouds
 class Sky:
     """Pictures by attitude and place, and the law behind. Keeps what it has worked out; no answer depends on that."""
 
-    def __init__(
-        self, parameters: SkyParameters, weather: Weather, sun_direction_W: Array | None, altitude_m: float, key: int
-    ) -> None:
+    def __init__(self, law: SkyRadiance) -> None:
         """Set up.
 
         Args:
-            parameters: sheet.
-            weather: of the flight.
-            sun_direction_W: (3,) toward the Sun, of any length; None is overhead.
-            altitude_m: of the camera above the ground.
-            key: 64 bits of the stream "clouds".
+            law: what is shown.
         """
-        law = self._law = SkyRadiance(parameters, weather, sun_direction_W, altitude_m, key)
-        self._night = parameters.night if weather.night else None
+        self._law, weather, earth_m = law, law.weather, law.parameters.earth_radius_m
         tiles = _TILES if weather.cloud_cover > 0.0 else _SMOOTH_TILES
         self._table = DirectionTable(law.upward, tiles, smooth=tiles == _SMOOTH_TILES)
-        earth_m = parameters.earth_radius_m
-        self._top_m, self._height_m = earth_m + law.top_m, altitude_m - law.top_m  # of what is met first from above
-        self._ground_table = LayerTable(law.below, _LAYER_TILES, 1, altitude_m, earth_m)
+        self._top_m, self._height_m = earth_m + law.top_m, law.altitude_m - law.top_m  # of what is met first from above
+        self._ground_table = LayerTable(law.below, _LAYER_TILES, 1, law.altitude_m, earth_m)
         self._deck_table = LayerTable(law.over, _LAYER_TILES, 2, self._height_m, self._top_m)
 
     def fill(self, out: NDArray[np.float32], R_WC: Array, x: Array, y: Array, place_m: Array | None = None) -> None:
@@ -55,8 +43,8 @@ class Sky:
             y: (rows,) evenly spaced.
             place_m: (3,) where it has come to since the start, in axes that stay with the air; None is the start.
         """
-        if self._night is not None:
-            out[:] = self._night
+        if self._law.weather.night:
+            out[:] = self._law.parameters.night
             return
         place = np.zeros(3) if place_m is None else np.asarray(place_m, dtype=float)
         R, x, y = np.ascontiguousarray(R_WC, dtype=float), np.asarray(x, dtype=float), np.asarray(y, dtype=float)
@@ -75,11 +63,6 @@ class Sky:
     def ambient(self) -> float:
         """Mean relative radiance of all directions: what lights the Sun's lee."""
         return self._law.ambient
-
-    @property
-    def diffuse_share(self) -> float:
-        """Share of the light on a surface that faces the Sun which does not come from the Sun's direction."""
-        return self._law.diffuse_share
 
     def beam(self, directions_W: Array) -> Array:
         """Return (n,) transmittance of cloud and haze for sunlight from (n, 3) directions; 1 without either."""

@@ -61,8 +61,8 @@ class SkyRadiance:
             altitude_m: of the camera above the ground.
             key: 64 bits of the stream "clouds".
         """
-        p = self._p = parameters
-        self._weather, self._altitude_m = weather, altitude_m
+        p = self.parameters = parameters
+        self.weather, self.altitude_m = weather, altitude_m
         sun = np.array(_OVERHEAD if sun_direction_W is None else sun_direction_W, dtype=float)
         self._sun = sun / math.sqrt(float(sun @ sun))
         self._mu_sun = (max(float(self._sun[2]), 0.0) + p.cloud_aspect) / (1.0 + p.cloud_aspect)
@@ -86,16 +86,16 @@ class SkyRadiance:
     def beam(self, directions_W: Array) -> Array:
         """Return (n,) transmittance of cloud and haze for sunlight from (n, 3) directions; 1 without either."""
         d = unit(directions_W)
-        if self._weather.night:
+        if self.weather.night:
             return np.zeros(len(d))
-        mu = self._slope(d) / (1.0 + self._p.cloud_aspect)
+        mu = self._slope(d) / (1.0 + self.parameters.cloud_aspect)
         through = np.exp(-self._depth_above(d) / mu - self._haze_depth * air_mass(d[:, 2]))
         return np.where(self._surface(d[:, 2], 0.0)[0], 0.0, through)
 
     def airlight(self, direction_W: Array) -> float:
         """Return the relative radiance of endless haze toward a direction (3,): what far objects fade into."""
-        if self._weather.night:
-            return self._p.night
+        if self.weather.night:
+            return self.parameters.night
         (x, y, z), (a, b, c) = np.asarray(direction_W).tolist(), self._sun.tolist()
         cosine = (x * a + y * b + z * c) / math.sqrt(x * x + y * y + z * z)
         return float(self._haze(np.array(min(max(cosine, -1.0), 1.0))))
@@ -111,8 +111,8 @@ class SkyRadiance:
         return self._radiance(unit(directions_W), with_aureole=True)
 
     def _radiance(self, d: Array, with_aureole: bool) -> Array:
-        if self._weather.night:
-            return np.full(len(d), self._p.night)
+        if self.weather.night:
+            return np.full(len(d), self.parameters.night)
         out, here = self.upward(d, with_aureole), np.zeros(3)
         down = np.flatnonzero(self._surface(d[:, 2], self.top_m)[0])
         out[down] = self.below(d[down], here)[:, 0]
@@ -144,7 +144,7 @@ class SkyRadiance:
 
     def _cosine(self, d: Array) -> Array:
         s = self._sun
-        return np.asarray(np.clip(d[:, 0] * s[0] + d[:, 1] * s[1] + d[:, 2] * s[2], -1.0, 1.0))
+        return np.clip(d[:, 0] * s[0] + d[:, 1] * s[1] + d[:, 2] * s[2], -1.0, 1.0)
 
     def _sky(self, d: Array, cosine: Array, with_aureole: bool) -> Array:
         """Clear sky, Eq. (2), and the cloud in it, Eq. (3)."""
@@ -152,13 +152,13 @@ class SkyRadiance:
         before = np.exp(-self._clear_share * self._clear_depth * mass)
         beyond = self._source(cosine, 1.0, 1.0) * (before - np.exp(-self._clear_depth * mass))
         front = self._source(cosine, self._light_below, self._direct_below) * (1.0 - before)
-        if self._weather.cloud_cover <= 0.0:
+        if self.weather.cloud_cover <= 0.0:
             return np.asarray(front + beyond)
         depth = self._depth_above(d)
-        mu = self._slope(d) / (1.0 + self._p.cloud_aspect)
+        mu = self._slope(d) / (1.0 + self.parameters.cloud_aspect)
         light = self._droplets.diffuse(depth, mu, self._mu_sun, cosine)
         light += (
-            self._p.ground_reflectance
+            self.parameters.ground_reflectance
             * self._sine_sun
             * self._light_below
             * (1.0 - self._droplets.transmittance(depth))
@@ -169,7 +169,7 @@ class SkyRadiance:
 
     def _land(self, d: Array, cosine: Array, key_m: Array) -> Array:
         """The ground through the air under the deck's top (or under the aircraft), Eqs. (4) and (6)."""
-        p = self._p
+        p = self.parameters
         _, distance, mu = self._surface(d[:, 2], 0.0, float(key_m[2]))
         at = key_m[0] + d[:, 0] * distance, key_m[1] + d[:, 1] * distance, LAYER_NODE_RAD * distance / np.sqrt(mu)
         land = p.ground_reflectance * np.maximum(1.0 + p.ground_contrast * self._ground.at(*at), 0.0)
@@ -178,18 +178,18 @@ class SkyRadiance:
             water = np.clip(0.5 + (self._coasts.at(*at) - shore) / _COAST, 0.0, 1.0)
             land += water * (p.water_reflectance - land)
         light = land * self._sine_sun * self._light_below
-        return self._through_air(light, d[:, 2], cosine, 0.0, p.deck_top_m if self.has_deck else self._altitude_m)
+        return self._through_air(light, d[:, 2], cosine, 0.0, p.deck_top_m if self.has_deck else self.altitude_m)
 
     def _cloud_deck(self, d: Array, cosine: Array, key_m: Array) -> tuple[Array, Array]:
         """Light of the deck with the air before it, and the transmittance of both, Eqs. (4) to (6)."""
-        p = self._p
+        p = self.parameters
         _, distance, mu = self._surface(d[:, 2], p.deck_top_m, float(key_m[2]))
         at = key_m[0] + d[:, 0] * distance, key_m[1] + d[:, 1] * distance, LAYER_NODE_RAD * distance / np.sqrt(mu)
         noise = self._deck.at(*at)
         depth = optical_depth(noise, p.deck_cover, p.deck_optical_depth)
         reflectance = 1.0 - self._droplets.transmittance(depth * (1.0 + p.cloud_aspect) / (mu + p.cloud_aspect))
         facing = np.clip(self._mu_sun * (1.0 + p.cloud_aspect * noise), 0.0, 1.0)
-        light, high = reflectance * facing * self._light_below, self._altitude_m
+        light, high = reflectance * facing * self._light_below, self.altitude_m
         clear = self._clear(d[:, 2], p.deck_top_m, high)
         return self._through_air(light, d[:, 2], cosine, p.deck_top_m, high), (1.0 - reflectance) * clear
 
@@ -199,13 +199,13 @@ class SkyRadiance:
         return np.asarray(light * clear + self._source(cosine, self._light_below, self._direct_below) * (1.0 - clear))
 
     def _clear(self, sine: Array, low_m: float, high_m: float) -> Array:
-        p = self._p
+        p = self.parameters
         depth = p.aerosol_optical_depth * (math.exp(-low_m / p.aerosol_scale_m) - math.exp(-high_m / p.aerosol_scale_m))
         return np.asarray(np.exp(-depth * air_mass(sine)))
 
     def _source(self, cosine: Array, light: float, direct: float) -> Array:
         """J of Eq. (1) in air that `light` of all sunlight reaches, `direct` of that as a beam."""
-        p = self._p
+        p = self.parameters
         angle = np.arccos(cosine)
         decayed = np.exp(-p.aureole_decay_1_rad * angle) - math.exp(-0.5 * math.pi * p.aureole_decay_1_rad)
         shape = p.aureole * decayed + p.molecular * cosine * cosine
@@ -218,10 +218,10 @@ class SkyRadiance:
 
     def _shade(self) -> None:
         """Mean light under the layer above, and how much of it still is a beam; of that in haze, beam and rest."""
-        cover, depth = self._weather.cloud_cover, self._weather.cloud_optical_depth
+        cover, depth = self.weather.cloud_cover, self.weather.cloud_optical_depth
         self._light_below = 1.0 - cover + cover * float(self._droplets.transmittance(np.asarray(depth)))
         self._direct_below = (1.0 - cover + cover * math.exp(-0.5 * depth / self._mu_sun)) / self._light_below
-        self.has_deck = self._p.deck_cover > 0.0 and self._altitude_m > self._p.deck_top_m
+        self.has_deck = self.parameters.deck_cover > 0.0 and self.altitude_m > self.parameters.deck_top_m
         beam = math.exp(-self._haze_depth * float(air_mass(self._sun[2:])[0]))
         through = float(self._droplets.transmittance(np.asarray(self._haze_depth)))
         self._haze_light = beam, self._mu_sun * max(through - beam, 0.0) * self._light_below
@@ -229,34 +229,34 @@ class SkyRadiance:
     def _clear_mass(self, sine: Array) -> Array:
         """(n,) air mass of clear air, Eq. (2); a ray that would go through the ground counts as one that skims it."""
         mass, level = air_mass(sine), float(air_mass(np.zeros(1))[0])
-        r = self._p.earth_radius_m + self._altitude_m
+        r = self.parameters.earth_radius_m + self.altitude_m
         drop_m = r * sine * sine / (1.0 + np.sqrt(np.maximum(1.0 - sine * sine, 0.0)))
-        thicker = np.exp(np.minimum(drop_m, self._altitude_m) / self._p.aerosol_scale_m)
+        thicker = np.exp(np.minimum(drop_m, self.altitude_m) / self.parameters.aerosol_scale_m)
         return np.where(sine < 0.0, 2.0 * level * thicker - mass, mass)
 
     def _depth_above(self, d: Array) -> Array:
         """(n,) optical depth straight through the layer where rays (n, 3) cross it, Eq. (3)."""
-        p = self._p
-        if self._weather.cloud_cover <= 0.0:
+        p = self.parameters
+        if self.weather.cloud_cover <= 0.0:
             return np.zeros(len(d))
         slope = self._slope(d)
         reach = p.cloud_height_m / slope
         noise = self._above.at(d[:, 0] * reach, d[:, 1] * reach, NODE_RAD * reach / np.sqrt(slope))
-        return optical_depth(noise, self._weather.cloud_cover, self._weather.cloud_optical_depth)
+        return optical_depth(noise, self.weather.cloud_cover, self.weather.cloud_optical_depth)
 
     def _slope(self, d: Array) -> Array:
         """Return s + w of Eq. (3); the rays that see the layer stay above half of w below level."""
-        w = self._p.cloud_aspect
-        return np.asarray(np.maximum(d[:, 2] + w, 0.5 * w))
+        w = self.parameters.cloud_aspect
+        return np.maximum(d[:, 2] + w, 0.5 * w)
 
     def _surface(self, sine: Array, top_m: float, rise_m: float = 0.0) -> tuple[NDArray[np.bool_], Array, Array]:
         """What rays of (n,) sines do to the sphere of a height, from so much higher than the flight."""
-        return meet_sphere(sine, self._p.earth_radius_m + top_m, self._altitude_m + rise_m - top_m)
+        return meet_sphere(sine, self.parameters.earth_radius_m + top_m, self.altitude_m + rise_m - top_m)
 
     def _ambient(self) -> float:
         """Mean radiance over a Fibonacci sphere; the aureole counts as direct light."""
-        if self._weather.night:
-            return self._p.night
+        if self.weather.night:
+            return self.parameters.night
         k = np.arange(_AMBIENT_DIRECTIONS) + 0.5
         z = 1.0 - 2.0 * k / _AMBIENT_DIRECTIONS
         turn = math.pi * (1.0 + math.sqrt(5.0)) * k

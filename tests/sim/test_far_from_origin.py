@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from dockair.rotations import exp
-from dockair.sim.camera.sky import Weather
+from dockair.sim.camera.weather import Weather
 from dockair.sim.view import ThirdPersonView
 
 FAR_M = np.array([-7000.0, 3000.0, -570.0])

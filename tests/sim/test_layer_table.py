@@ -11,7 +11,9 @@ from dockair.rotations import exp, matrix_from_yaw_pitch_roll
 from dockair.sim.camera.earth import columns_below, dip_sine, meet_sphere
 from dockair.sim.camera.layer_table import LayerTable, lay_under
 from dockair.sim.camera.sheets import SkyParameters
-from dockair.sim.camera.sky import Sky, Weather
+from dockair.sim.camera.sky import Sky
+from dockair.sim.camera.sky_radiance import SkyRadiance
+from dockair.sim.camera.weather import Weather
 
 SHEET = load_parameters("sky", SkyParameters)
 ALTITUDE_M, RADIUS_M = 6000.0, 6.371e6
@@ -91,7 +93,7 @@ def test_a_deck_lies_over_the_ground_by_its_light_and_transmittance() -> None:
 
 
 def _sky(**changes: float) -> Sky:
-    return Sky(replace(SHEET, **changes), Weather(), SUN, ALTITUDE_M, 7)
+    return Sky(SkyRadiance(replace(SHEET, **changes), Weather(), SUN, ALTITUDE_M, 7))
 
 
 def _frame(sky: Sky, R: np.ndarray, place: np.ndarray | None = None) -> np.ndarray:

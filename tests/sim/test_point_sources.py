@@ -13,8 +13,10 @@ from dockair.sim.camera.mirrors import Mirrors
 from dockair.sim.camera.point_sources import PointSources, Sources
 from dockair.sim.camera.radiometry import Responses, extinction_1_m, responses
 from dockair.sim.camera.sheets import CameraSheets
-from dockair.sim.camera.sky import Sky, Weather
+from dockair.sim.camera.sky import Sky
+from dockair.sim.camera.sky_radiance import SkyRadiance
 from dockair.sim.camera.sun_view import SunView
+from dockair.sim.camera.weather import Weather
 
 SHEETS = CameraSheets.load()
 SURFACES = replace(SHEETS.surfaces, metal_share=0.9, faintest_reflection=1e-7)  # so that there is something to find
@@ -40,7 +42,7 @@ def _response(built: Any) -> Responses:
 def _sources_of(world: Any, sun: bool = True) -> PointSources:
     built, view = world.as_built, None
     if sun:
-        sky = _Overcast(SHEETS.sky, Weather(), SUN_W, 6000.0, 1)
+        sky = _Overcast(SkyRadiance(SHEETS.sky, Weather(), SUN_W, 6000.0, 1))
         view = SunView(world.model, built.camera, sky, SUN_W, SHEETS.light.sun_angular_radius_rad, 3.0)
     sheets = replace(SHEETS, surfaces=SURFACES)
     return PointSources(world.model, sheets, built, _response(built), view, EXTINCTION_1_M)

@@ -13,7 +13,9 @@ from scipy.spatial.transform import Rotation
 from dockair.errors import DockairError
 from dockair.parameters import load_parameters, read_sheet
 from dockair.sim.camera.sheets import SkyParameters
-from dockair.sim.camera.sky import Sky, Weather
+from dockair.sim.camera.sky import Sky
+from dockair.sim.camera.sky_radiance import SkyRadiance
+from dockair.sim.camera.weather import Weather
 
 SHEET = load_parameters("sky", SkyParameters)
 BARE = replace(  # nothing random is left
@@ -32,10 +34,16 @@ def _toward(elevation_deg: float, azimuth_deg: float = 0.0) -> np.ndarray:
     return np.array([math.cos(e) * math.cos(a), math.cos(e) * math.sin(a), math.sin(e)])
 
 
+def _law(
+    weather: Weather | None = None, sun: np.ndarray | None = None, sheet: SkyParameters = SHEET, key: int = 7
+) -> SkyRadiance:
+    return SkyRadiance(sheet, weather or Weather(), sun, ALTITUDE_M, key)
+
+
 def _sky(
     weather: Weather | None = None, sun: np.ndarray | None = None, sheet: SkyParameters = SHEET, key: int = 7
 ) -> Sky:
-    return Sky(sheet, weather or Weather(), sun, ALTITUDE_M, key)
+    return Sky(_law(weather, sun, sheet, key))
 
 
 def _picture(sky: Sky, R: np.ndarray | None = None, x: np.ndarray = X, y: np.ndarray = Y) -> np.ndarray:
@@ -307,7 +315,7 @@ def test_the_light_in_the_shade_is_the_mean_radiance_all_round() -> None:
 def test_cloud_before_the_sun_makes_all_light_diffuse() -> None:
     sun = _toward(40.0, 30.0)
     shares = [
-        _sky(Weather(cloud_cover=c, cloud_optical_depth=20.0), sun).diffuse_share if c else _sky(sun=sun).diffuse_share
+        _law(Weather(cloud_cover=c, cloud_optical_depth=20.0), sun).diffuse_share if c else _law(sun=sun).diffuse_share
         for c in (0.0, 1.0)
     ]
     assert 0.1 < shares[0] < 0.3

@@ -124,7 +124,7 @@ def test_the_suns_disc_has_its_radiance_through_the_aperture_and_the_fourth_powe
 
 
 def test_clouds_before_the_sun_dim_disc_and_veil_alike(make_camera: Callable[..., Made]) -> None:
-    from dockair.sim.camera.sky import Weather
+    from dockair.sim.camera.weather import Weather
 
     world, camera, sun_W = _sun_at(make_camera, (700.0, 300.0))
     corner, disc = Window(1000, 1088, 1900, 2048), Window(295, 306, 695, 706)
@@ -139,7 +139,7 @@ def test_clouds_before_the_sun_dim_disc_and_veil_alike(make_camera: Callable[...
 
 
 def test_at_night_there_is_nothing_but_the_leds(make_camera: Callable[..., Made]) -> None:
-    from dockair.sim.camera.sky import Weather
+    from dockair.sim.camera.weather import Weather
 
     world, camera = make_camera(weather=Weather(night=True))
     image = camera.expected_electrons(world.data, Window(0, 1088, 0, 2048))
@@ -149,7 +149,7 @@ def test_at_night_there_is_nothing_but_the_leds(make_camera: Callable[..., Made]
 
 def test_haze_takes_light_of_the_leds_by_koschmieders_law(make_camera: Callable[..., Made]) -> None:
     """Visibility 40 m, LEDs 8 m away: exp(-3.912 8/40) = 0.457 of their light."""
-    from dockair.sim.camera.sky import Weather
+    from dockair.sim.camera.weather import Weather
 
     def leds(weather: Weather) -> np.ndarray:
         world, camera = make_camera(weather=weather, hub=False)
