@@ -89,7 +89,7 @@ class RelativeFilter:
         self._imu_stamps, self._frame_stamps = Stamps(self._settings.leap_s), Stamps(self._settings.leap_s)
         self._nodes: list[_Node] = []
         self._head: _Node | None = None  #: at the newest sample, when no frame is newer
-        self._on: tuple[_Node, _Node] | None = None  #: the second: belief brought on far beyond the first
+        self._coasted: tuple[_Node, _Node] | None = None  #: the second: the first, coasted on for long
         self._refusals, self._felt = 0, False
         self._last: Correction | None = None
 
@@ -223,7 +223,7 @@ class RelativeFilter:
 
     def _feel(self, force_B: Array) -> None:
         """Take the first specific force for that of the formation."""
-        self._felt, self._head, self._on = True, None, None
+        self._felt, self._head, self._coasted = True, None, None
         self._start = [felt_first(belief, force_B) for belief in self._start]
         for node in self._nodes:
             node.beliefs = [felt_first(belief, force_B) for belief in node.beliefs]
@@ -256,7 +256,7 @@ class RelativeFilter:
 
     def _run_from(self, index: int) -> None:
         """Run the buffer again from a node on; the first node is given."""
-        self._head = self._on = None
+        self._head = self._coasted = None
         for i in range(max(index, 1), len(self._nodes)):
             node = self._nodes[i]
             node.beliefs = self._moved(self._nodes[i - 1], node.time_s)
@@ -285,17 +285,17 @@ class RelativeFilter:
         if not self._nodes:
             return self._start
         if self._head is not None and self._head.time_s <= time_s:
-            return self._moved_on(self._head, time_s)
+            return self._coasting(self._head, time_s)
         index = bisect_right(self._nodes, time_s, key=_time)
-        return self._moved_on(self._nodes[index - 1], time_s) if index else self._nodes[0].beliefs
+        return self._coasting(self._nodes[index - 1], time_s) if index else self._nodes[0].beliefs
 
-    def _moved_on(self, node: _Node, time_s: float) -> list[Belief]:
+    def _coasting(self, node: _Node, time_s: float) -> list[Belief]:
         """As `_moved`; where no message comes for long, the way is not gone again from its beginning every time."""
-        on = self._on
-        begin = on[1] if on is not None and on[0] is node and on[1].time_s <= time_s else node
+        kept = self._coasted
+        begin = kept[1] if kept is not None and kept[0] is node and kept[1].time_s <= time_s else node
         beliefs = self._moved(begin, time_s)
         if time_s - begin.time_s > self._settings.buffer_s:
-            self._on = node, _Node(time_s, None, beliefs)
+            self._coasted = node, _Node(time_s, None, beliefs)
         return beliefs
 
     def _moved(self, node: _Node, time_s: float) -> list[Belief]:

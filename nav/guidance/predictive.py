@@ -72,7 +72,8 @@ class Predictive:
         self._u_dot: Array = np.zeros(3)
         self._bearable = (settings.bearable_share * acceleration_limit_m_s2[1:]) ** 2
         self._asked = _AT_FIRST * self._bearable  # mean square of the drogue's acceleration, left and up
-        self._gusts: Array = np.zeros(3)  # the same over some swings more, and the weight of what has been seen
+        self._gusts: Array = np.zeros(2)  # the same over some swings more, beginning at nothing ...
+        self._gusts_seen = 0.0  # ... so that this share of it has been seen
 
     @property
     def looks_ahead_s(self) -> Array:
@@ -97,7 +98,9 @@ class Predictive:
             share = self._step_s / self._settings.bearing_s
             squares = self._ahead[2][1:] ** 2
             self._asked = self._asked + share * (squares - self._asked)
-            self._gusts += self._step_s / self._settings.gusts_s * (np.append(squares, 1.0) - self._gusts)
+            share = self._step_s / self._settings.gusts_s
+            self._gusts = self._gusts + share * (squares - self._gusts)
+            self._gusts_seen += share * (1.0 - self._gusts_seen)
 
     def given(self, velocity_m_s: Array, acceleration_m_s2: Array) -> None:
         """Take note of velocity and acceleration (3,) commanded for the next period."""
@@ -112,7 +115,7 @@ class Predictive:
     @property
     def bears_the_gusts(self) -> bool:
         """Whether the swings of the last half minute ask for no more than can be followed."""
-        return bool((self._gusts[:2] <= self._gusts[2] * self._bearable).all())
+        return bool((self._gusts <= self._gusts_seen * self._bearable).all())
 
     def error_to_come(self, aim_m: Array) -> Array:
         """(2,) off the drogue across, when what has been commanded has been flown."""
@@ -133,13 +136,11 @@ class Predictive:
         gain = s.along_gain_1_s
         place, velocity, acceleration = (v[0] for v in (self._ahead if bearable else self._motion.mean_ahead()))
         if wanted.distance_m is None:
-            speed, change = wanted.speed_m_s, 0.0
+            goal, change = velocity + wanted.speed_m_s, 0.0
         else:
             to_go = place - self._own.place_ahead_m[0] - wanted.distance_m
-            speed, change = clipped(gain * to_go, wanted.speed_m_s), gain * (velocity - u[0])
-        goal = velocity + speed
-        if wanted.distance_m is not None:
-            goal = min(goal, wanted.speed_m_s)
+            goal = min(velocity + clipped(gain * to_go, wanted.speed_m_s), wanted.speed_m_s)
+            change = gain * (velocity - u[0])
         return float(acceleration + change + s.smoothing_1_s * (goal - u[0]))
 
     def _across(self, u: Array, wanted: Wanted, bearable: bool) -> Array:
