@@ -10,6 +10,7 @@ from numba import njit
 from dockair.rotations import Array
 
 _MOST_STEPS, _MOST_HALVINGS = 30, 8
+_LEAST_CURVATURE, _MOST_CURVATURE = 0.1, 2.0  # of Eq. (3) of `belief_frame`: one noisy step is not trusted further
 _SETTLED_CHI2 = 1e-8  # of a step: a ten-thousandth of a sigma
 
 
@@ -170,7 +171,7 @@ def _spread(H: Array, C: Array) -> tuple[Array, Array]:
 
 @njit(cache=True)
 def _ended(HC: Array, L: Array, C: Array, cost: float) -> tuple[float, Array]:
-    """Eq. (3), and (6, 6) the pose's covariance."""
+    """Eq. (4), and (6, 6) the pose's covariance."""
     half, after, log_det = np.empty((6, len(L))), C[:6, :6].copy(), 0.0
     for i in range(len(L)):
         log_det += 2.0 * np.log(L[i, i])
@@ -203,7 +204,7 @@ def fitted(
     """Run Eq. (2) from a pose R, p.
 
     Returns:
-        1 if it ended, 0 if not, -1 if an LED is behind the camera at the start; then twice H, nu, y, cost, Eq. (3),
+        1 if it ended, 0 if not, -1 if an LED is behind the camera at the start; then twice H, nu, y, cost, Eq. (4),
         (6, 6) the pose's covariance: at the end, and after the first step, as if the problem were linear.
     """
     y, g = np.zeros(len(C)), np.zeros(len(C))
@@ -219,11 +220,13 @@ def fitted(
     inverse_nu = _solved(L, nu)
     first_H, first_nu, first_y, first_cost = H, nu, np.dot(C, np.dot(H.T, inverse_nu)), np.dot(nu, inverse_nu)
     first_evidence, first_C = _ended(HC, L, C, first_cost)
-    cost, settled = np.inf, 0
+    cost, settled, curvature = np.inf, 0, 1.0
+    way, way2 = np.zeros(len(C)), np.inf
     for _ in range(_MOST_STEPS):
-        towards, t, better = np.dot(H.T, _solved(L, nu)), 1.0, False
+        towards, better = np.dot(H.T, _solved(L, nu)), False
+        curvature = min(max(curvature - np.dot(towards - g, way) / way2, _LEAST_CURVATURE), _MOST_CURVATURE)
         for _halving in range(_MOST_HALVINGS):
-            g_new = g + t * (towards - g)
+            g_new = g + (towards - g) / curvature
             y_new = np.dot(C, g_new)
             turn, J = _exp(y_new[:3])
             R = np.dot(turn, R0)
@@ -232,11 +235,12 @@ def fitted(
             better = ahead and cost_new <= cost
             if better:
                 break
-            t *= 0.5
+            curvature *= 2.0
         if not better:  # no step helps: as far down as numbers reach
             settled = 1 if cost < np.inf else 0
             break
-        small = cost < np.inf and np.dot(g_new - g, y_new - y) < _SETTLED_CHI2
+        way, way2 = y_new - y, np.dot(g_new - g, y_new - y)
+        small = cost < np.inf and way2 < _SETTLED_CHI2
         y, g, r, cost = y_new, g_new, r_new, cost_new
         H = _jacobian(R, J, p0 + y[3:6], points, whiten, y[6:])
         nu = r + _times(H, y)

@@ -35,12 +35,13 @@ class FusionSettings:
     )
     formation_walk_m_s2_rts: float = 0.3  # entry of a turn: 4 m/s^2 within some seconds; costs little (docs/fusion.md)
     start_formation_sigma_m_s2: float = 0.5  # gusts and manoeuvre at the first sample
-    #: Turning of the drogue [rad/sqrt(s)] about its attitude of rest, and how fast it goes back there: 0.7 degrees rms.
+    #: Turning of the drogue [rad/sqrt(s)] about its attitude of rest, and how fast it goes back there: 0.5 degrees rms.
     #: In light gusts it turns by 0.4 degrees to the sides and 0.5 up and down, and has forgotten it after 1 s.
-    attitude_density: float = 0.015
+    attitude_density: float = 0.01
     attitude_time_s: float = 1.5
-    #: Attitude of rest against the start's: hose, trim and heading are known to 0.7 degrees, the ring's roll to 1.1.
-    rest_sigma_rad: tuple[float, float, float] = (0.02, 0.012, 0.012)
+    #: Attitude of rest against the start's: hose, trim and heading are known to 0.5 degrees, the ring's roll to 1.1.
+    #: With the turning 0.7 degrees, between light gusts (0.5) and moderate ones (0.85).
+    rest_sigma_rad: tuple[float, float, float] = (0.02, 0.009, 0.009)
     rest_walk_rad_rts: float = (
         0.0017  # 0.3 degrees in 10 s: slow wander of the receiver's heading and of the air's direction
     )
