@@ -35,7 +35,8 @@ from dockair.sim.as_built import AsBuilt
 from dockair.sim.camera.defects import Defects
 from dockair.sim.camera.electronics import OUTPUT_BITS, output_black, output_gain
 from dockair.sim.camera.exposure import ExposureControl
-from dockair.sim.camera.occlusion import Obstacles, hidden
+from dockair.sim.camera.obstacles import Obstacles
+from dockair.sim.camera.occlusion import hidden
 from dockair.sim.camera.point_spread import blur_px
 from dockair.sim.camera.radiometry import Responses, led_electrons
 from dockair.sim.camera.readout import latency_s, transfer_jitter_s

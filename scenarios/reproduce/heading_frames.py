@@ -18,7 +18,8 @@ from dockair.messages import CameraFrame
 from dockair.rotations import Array, quaternion_from_matrix
 from dockair.scenarios.reproduce.frames import Studio, studio
 from dockair.scenarios.reproduce.heading_formation import Formation
-from dockair.sim.camera.occlusion import Obstacles, first_hits
+from dockair.sim.camera.obstacles import Obstacles
+from dockair.sim.camera.occlusion import first_hits
 
 EXPOSURE_S = 500e-6
 _AHEAD_M = 8.0  # of the drogue's ring, from the lens

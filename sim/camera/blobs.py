@@ -60,20 +60,22 @@ class Blobs:
         count = len(sources.electrons)
         pixels, smear, width_px = np.empty((count, 2)), np.empty((count, 2)), np.empty(count)
         _image(sources.p_C, sources.way_C_m, sources.size_m, self._lens, pixels, smear, width_px)
-        size, electrons = sources.size_m, np.where(sources.electrons > _FAINTEST_E, sources.electrons, 0.0)
-        widest_px, wing = self._spread.widest_px, self._spread.wing
-        near = reach_window(image.shape, start, pixels, smear, electrons, width_px, widest_px, wing)
+        electrons, faintest, spread = sources.electrons, _FAINTEST_E, self._spread
+        near = reach_window(
+            image.shape, start, pixels, smear, electrons, faintest, width_px, spread.widest_px, spread.wing
+        )
         near = near[are_seen(near)]
         if dirt is not None:
+            electrons = electrons.copy()
             electrons[near] *= dirt.at(pixels[near])
-        sizes = size[near]
-        sizes[width_px[near] >= WIDE_PX] = _WIDE
+        sizes = np.empty(len(near))
+        _sizes(near, sources.size_m, width_px, sizes)
         for size_m in sorted(set(sizes.tolist())):
             of = near[sizes == size_m]
             if size_m == _WIDE:
                 add_patches(image, start, pixels[of], electrons[of], width_px[of] / _SQUARE_SIGMAS)
             else:
-                self._spread.splat(image, start, pixels[of], electrons[of], sources.p_C[of, 0], size_m, smear[of])
+                spread.splat(image, start, pixels, electrons, sources.p_C[:, 0], size_m, smear, of)
 
 
 @njit(cache=True)
@@ -87,6 +89,13 @@ def _image(p_C: Array, way_C: Array, size_m: Array, lens: Lens, pixels: Array, s
         u0, v0 = _pixel(x - dx, y - dy, z - dz, lens)
         smear[i, 0], smear[i, 1] = u1 - u0, v1 - v0
         width_px[i] = size_m[i] * lens[0] / x if x > 0.0 else 0.0
+
+
+@njit(cache=True)
+def _sizes(near: NDArray[np.int64], size_m: Array, width_px: Array, out: Array) -> None:
+    """Fill (k,) as how large some of the sources (n,) are drawn."""
+    for k in range(len(near)):
+        out[k] = _WIDE if width_px[near[k]] >= WIDE_PX else size_m[near[k]]
 
 
 @njit(cache=True)

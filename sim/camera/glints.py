@@ -25,7 +25,8 @@ from dockair.sim.camera.curved_mirrors import ellipsoid_spots, rim_spots
 from dockair.sim.camera.facets import facets_that_may_shine
 from dockair.sim.camera.lobes import ROW, SPOT, facet_rows, spot_rows
 from dockair.sim.camera.mirrors import METAL, Mirrors, Vector, finishes, vector
-from dockair.sim.camera.occlusion import Obstacles, first_hits, is_clear
+from dockair.sim.camera.obstacles import Obstacles
+from dockair.sim.camera.occlusion import first_hits, is_clear
 from dockair.sim.camera.round_mirrors import round_spots
 from dockair.sim.camera.sheets import LightParameters, SurfaceParameters
 
@@ -80,21 +81,23 @@ def starts_of_seen(
     within a sixth of a patch of the middle is the surface itself.
     """
     eye, directions, distances = vector(p_WC), np.empty((len(rows), 3)), np.empty(len(rows))
-    _aim(eye, rows, directions, distances)
-    hits = first_hits(obstacles, data, p_WC, directions, float(distances.max(initial=0.0) + 1.0))
+    hits = first_hits(obstacles, data, p_WC, directions, _aim(eye, rows, directions, distances) + 1.0)
     seen, starts = np.empty(len(rows), dtype=np.bool_), directions
     _judge(eye, rows, distances, hits, seen, starts)
     return seen, starts
 
 
 @njit(cache=True)
-def _aim(eye: Vector, rows: Array, directions: Array, distances: Array) -> None:
-    """Fill (n, 3) unit vectors and (n,) distances from the lens to patches."""
+def _aim(eye: Vector, rows: Array, directions: Array, distances: Array) -> float:
+    """Fill (n, 3) unit vectors and (n,) distances from the lens to patches; return the longest distance."""
+    longest = 0.0
     for i in range(len(rows)):
         x, y, z = rows[i, 0] - eye[0], rows[i, 1] - eye[1], rows[i, 2] - eye[2]
         distances[i] = math.sqrt(x * x + y * y + z * z)
         d = max(distances[i], _TINY_M)
         directions[i, 0], directions[i, 1], directions[i, 2] = x / d, y / d, z / d
+        longest = max(longest, distances[i])
+    return longest
 
 
 @njit(cache=True)
@@ -131,7 +134,8 @@ def glint_rows(
     balls, tubes = mirrors.balls, mirrors.tubes
     spots = np.empty((mirrors.all_wanted.size + 2, SPOT))
     n = round_spots(balls, tubes, xpos, xmat, sun, 0.0, mirrors.all_wanted, eye, spots)
-    n += ellipsoid_spots(balls, xpos, xmat, sun, 0.0, eye, spots[n:])
+    if mirrors.any_ellipsoids:
+        n += ellipsoid_spots(balls, xpos, xmat, sun, 0.0, eye, spots[n:])
     if mirrors.rim is not None:
         n += rim_spots(mirrors.rim.torus_W(data), float(METAL), mirrors.rim.skin_m, sun, 0.0, eye, spots[n:])
     rows = np.empty((_MOST, ROW))

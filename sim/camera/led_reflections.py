@@ -27,7 +27,8 @@ from dockair.sim.camera.curved_mirrors import ellipsoid_spots, rim_spots
 from dockair.sim.camera.glints import starts_of_seen
 from dockair.sim.camera.lobes import ROW, SPOT, Poses, spot_rows
 from dockair.sim.camera.mirrors import METAL, Balls, Mirrors, Tubes, Vector, finishes, vector
-from dockair.sim.camera.occlusion import Obstacles, is_clear
+from dockair.sim.camera.obstacles import Obstacles
+from dockair.sim.camera.occlusion import is_clear
 from dockair.sim.camera.round_mirrors import round_spots
 from dockair.sim.camera.sheets import SurfaceParameters
 
@@ -95,11 +96,11 @@ def led_reflection_rows(
     intensity_w_sr = np.asarray(intensity_w_sr, dtype=float)
     limit = surfaces.faintest_reflection * max(0.0, *intensity_w_sr.tolist())
     eye, near, poses = vector(p_WC), (mirrors.near_balls, mirrors.near_tubes), (data.geom_xpos, data.geom_xmat)
-    bound = _bound(near, poses, leds_W, axis, eye, finishes(surfaces), surfaces.led_side_light)
-    wanted = _wanted(bound, intensity_w_sr, limit)
+    pattern = pattern_exponent, surfaces.led_side_light
+    wanted = _wanted(near, poses, leds_W, axis, eye, finishes(surfaces), pattern[1], intensity_w_sr, limit)
     rows = _rows(data, mirrors, eye, leds_W, wanted, surfaces)
     intensity = np.empty(len(rows))
-    count = _reflect(rows, leds_W, axis, intensity_w_sr, (pattern_exponent, surfaces.led_side_light), limit, intensity)
+    count = _reflect(rows, leds_W, axis, intensity_w_sr, pattern, limit, intensity)
     return rows[:count], intensity[:count]
 
 
@@ -128,8 +129,19 @@ def _reflect(
 
 
 @njit(cache=True)
-def _wanted(bound: Array, intensity_w_sr: Array, limit: float) -> NDArray[np.bool_]:
+def _wanted(
+    mirrors: tuple[Balls, Tubes],
+    poses: Poses,
+    leds_W: Array,
+    axis: Vector,
+    eye: Vector,
+    finish: Array,
+    side: float,
+    intensity_w_sr: Array,
+    limit: float,
+) -> NDArray[np.bool_]:
     """(m, n) which pairs may be above the limit."""
+    bound = _bound(mirrors, poses, leds_W, axis, eye, finish, side)
     out = np.empty(bound.shape, dtype=np.bool_)
     for j in range(len(bound)):
         for i in range(bound.shape[1]):
@@ -217,7 +229,8 @@ def _rows(
     xpos, xmat = data.geom_xpos, data.geom_xmat
     spots = np.empty((wanted.size + 2 * len(leds_W), SPOT))
     n = round_spots(balls, tubes, xpos, xmat, leds_W, 1.0, wanted, eye, spots)
-    n += ellipsoid_spots(balls, xpos, xmat, leds_W, 1.0, eye, spots[n:])
+    if mirrors.any_ellipsoids:
+        n += ellipsoid_spots(balls, xpos, xmat, leds_W, 1.0, eye, spots[n:])
     if mirrors.rim is not None:
         n += rim_spots(mirrors.rim.torus_W(data), float(METAL), mirrors.rim.skin_m, leds_W, 1.0, eye, spots[n:])
     limits = (math.cos(surfaces.grazing_rad), 0.0, 0.0, math.inf)

@@ -97,6 +97,7 @@ class Mirrors:
     tubes: Tubes
     facets: Facets
     rim: Rim | None
+    any_ellipsoids: bool  #: whether any of the balls are no spheres
     all_wanted: NDArray[np.bool_]  #: (1, balls + tubes) True, for `round_spots`
     near_balls: Balls  #: those that the LEDs shine on from nearby
     near_tubes: Tubes
@@ -116,11 +117,13 @@ class Mirrors:
             tubes += [(i, material, *tube) for tube in _tubes(model, i)]
             facets += [(i, material, *facet) for facet in _facets(model, i)]
         near = [model.geom(i).name.startswith(_NEAR_LEDS) for i in range(model.ngeom)]
+        table = _ball_table(balls)
         return cls(
-            balls=_ball_table(balls),
+            balls=table,
             tubes=_tube_table(tubes),
             facets=_facet_table(facets),
             rim=rim,
+            any_ellipsoids=bool(np.any(np.ptp(table.axes, axis=1))),
             all_wanted=np.ones((1, len(balls) + len(tubes)), dtype=np.bool_),
             near_balls=_ball_table([ball for ball in balls if near[ball[0]]]),
             near_tubes=_tube_table([tube for tube in tubes if near[tube[0]]]),

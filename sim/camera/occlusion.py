@@ -12,13 +12,13 @@ triangle with corners a, b, c of a mesh is met at t, where
 
     o + t d = a + u (b - a) + v (c - a),    u >= 0, v >= 0, u + v <= 1                                           (4)
 
-Only geoms that are drawn hide: those in a visible group and not fully transparent.
+Solids beside a cone around all rays from one point are not looked at. Only geoms that are drawn hide: those in a
+visible group and not fully transparent.
 Not modelled: partly hidden sources (a source is a point), transparent things.
 Sources: Glassner (ed.), An Introduction to Ray Tracing, ch. 2; Moeller & Trumbore 1997 (4).
 """
 
 import math
-from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -27,36 +27,18 @@ from numpy.typing import NDArray
 
 from dockair.rotations import Array
 from dockair.sim.camera.meshes import Meshes
-from dockair.sim.camera.solids import BALL, BOX, CAPSULE, Solids
+from dockair.sim.camera.obstacles import Obstacles
+from dockair.sim.camera.solids import BALL, BOX, CAPSULE
 
 _ALONG = 1e-300  # least squared component across a tube, of a ray that does not run along it
 _ROUNDING = 1e-9  # of distances to boxes, relative and in metres
+_SPARE_M = 1e-6  # between a solid's ball and a cone of rays: far more than rounding
 _NOWHERE = (math.inf, -math.inf)
 
 Vector = tuple[float, float, float]
 Part = tuple[float, float]  # of a ray: from one distance to another; nothing where the second is less
-
-
-class Obstacles(NamedTuple):
-    """The solids of a model as rays meet them."""
-
-    geoms: NDArray[np.int64]  #: (n,) their numbers in the model
-    kinds: NDArray[np.int64]  #: (n,) as of `solids`
-    half_sizes_m: Array  #: (n, 3) as of `solids`
-    radii_m: Array  #: (n,) of a ball around each
-    meshes: Meshes
-
-    @classmethod
-    def of(cls, model: mujoco.MjModel) -> "Obstacles":
-        """Take what is drawn.
-
-        Raises:
-            DockairError: the model has a visible geom that is no solid.
-        """
-        s = Solids.of(model)
-        return cls(
-            s.geoms.astype(np.int64), s.kinds, s.half_sizes_m, np.array(model.geom_rbound[s.geoms]), Meshes.of(model)
-        )
+Cone = tuple[Vector, float, float]  # axis, cosine and sine of the half angle, less than a right one
+_ALL_AROUND: Cone = ((0.0, 0.0, 0.0), 0.0, 0.0)
 
 
 def is_clear(obstacles: Obstacles, data: mujoco.MjData, p_W: Array, direction_W: Array, distance_m: float) -> bool:
@@ -100,11 +82,20 @@ def clear_directions(obstacles: Obstacles, data: mujoco.MjData, p_W: Array, dire
 
 def first_hits(obstacles: Obstacles, data: mujoco.MjData, p_W: Array, directions: Array, reach: float) -> Array:
     """(n,) distances along unit vectors (n, 3) to the nearest surface [m]; -1 for none within `reach`."""
-    out = np.full(len(directions), reach)
-    _cast(obstacles, data.geom_xpos, data.geom_xmat, p_W, directions, out)
-    _cast_at_meshes(obstacles.meshes, data.geom_xpos, data.geom_xmat, p_W, directions, out)
-    out[out == reach] = -1.0
+    out = np.empty(len(directions))
+    _first_hits(obstacles, data.geom_xpos, data.geom_xmat, p_W, directions, reach, out)
     return out
+
+
+@njit(cache=True)
+def _first_hits(
+    obstacles: Obstacles, xpos: Array, xmat: Array, p: Array, directions: Array, reach: float, out: Array
+) -> None:
+    out[:] = reach
+    _cast(obstacles, xpos, xmat, p, directions, out)
+    for i in range(len(out)):
+        if out[i] == reach:
+            out[i] = -1.0
 
 
 @njit(cache=True)
@@ -118,19 +109,49 @@ def _clear_rays(
     out: NDArray[np.bool_],
 ) -> None:
     """Fill (n,) whether no surface is nearer to a start than its distance."""
+    nearest = np.empty(1)
     for i in range(len(starts)):
-        nearest = np.full(1, distances[i])
-        _cast(obstacles, xpos, xmat, starts[i], directions[i : i + 1], nearest)
-        _cast_at_meshes(obstacles.meshes, xpos, xmat, starts[i], directions[i : i + 1], nearest)
+        nearest[0] = distances[i]
+        if distances[i] > 0.0:
+            _cast(obstacles, xpos, xmat, starts[i], directions[i : i + 1], nearest)
         out[i] = nearest[0] >= distances[i]
+
+
+@njit(cache=True)
+def _cone_around(directions: Array) -> Cone:
+    """A cone that holds unit vectors (n, 3); all around where they stand wide apart."""
+    x, y, z = directions[:, 0].sum(), directions[:, 1].sum(), directions[:, 2].sum()
+    length = math.sqrt(x * x + y * y + z * z)
+    if length == 0.0:
+        return _ALL_AROUND
+    x, y, z, square = x / length, y / length, z / length, 0.0
+    for i in range(len(directions)):
+        a, b, c = directions[i, 0], directions[i, 1], directions[i, 2]
+        along = a * x + b * y + c * z
+        if along <= 0.0:
+            return _ALL_AROUND
+        square = max(square, (a - along * x) ** 2 + (b - along * y) ** 2 + (c - along * z) ** 2)
+    return (x, y, z), math.sqrt(max(1.0 - square, 0.0)), math.sqrt(square)
+
+
+@njit(cache=True)
+def _is_beside(p: Vector, radius: float, cone: Cone) -> bool:
+    """Whether a plane through the cone's tip parts it from a ball about p."""
+    axis, cosine, sine = cone
+    along = _dot(p, axis)
+    return cosine * math.sqrt(max(_dot(p, p) - along * along, 0.0)) - sine * along > radius + _SPARE_M
 
 
 @njit(cache=True)
 def _cast(obstacles: Obstacles, xpos: Array, xmat: Array, p: Array, directions: Array, nearest: Array) -> None:
     """Lower (n,) distances to those of the nearest surface."""
+    cone = _cone_around(directions)
+    _cast_at_meshes(obstacles.meshes, xpos, xmat, p, directions, cone, nearest)
     for k in range(len(obstacles.geoms)):
         g, radius, h = obstacles.geoms[k], obstacles.radii_m[k], obstacles.half_sizes_m[k]
         x, y, z, M = xpos[g, 0] - p[0], xpos[g, 1] - p[1], xpos[g, 2] - p[2], xmat[g]
+        if _is_beside((x, y, z), radius, cone):
+            continue
         square = x * x + y * y + z * z
         for i in range(len(nearest)):
             d = (directions[i, 0], directions[i, 1], directions[i, 2])
@@ -144,13 +165,17 @@ def _cast(obstacles: Obstacles, xpos: Array, xmat: Array, p: Array, directions: 
 
 
 @njit(cache=True)
-def _cast_at_meshes(meshes: Meshes, xpos: Array, xmat: Array, p: Array, directions: Array, nearest: Array) -> None:
-    """The same for meshes."""
+def _cast_at_meshes(
+    meshes: Meshes, xpos: Array, xmat: Array, p: Array, directions: Array, cone: Cone, nearest: Array
+) -> None:
+    """The same for meshes; the cone holds all rays."""
     for k in range(len(meshes.geoms)):
         g, radius = meshes.geoms[k], meshes.radii_m[k]
         M, m = xmat[g], meshes.centres_m[k]
         o = _into(M, (p[0] - xpos[g, 0], p[1] - xpos[g, 1], p[2] - xpos[g, 2]))
         x, y, z = m[0] - o[0], m[1] - o[1], m[2] - o[2]
+        if _is_beside((x, y, z), radius, (_into(M, cone[0]), cone[1], cone[2])):
+            continue
         square = x * x + y * y + z * z
         for i in range(len(nearest)):
             ray = _into(M, (directions[i, 0], directions[i, 1], directions[i, 2]))

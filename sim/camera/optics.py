@@ -11,17 +11,17 @@ lens in focus is coarsely sampled, and its pixels bend the centroid as real ones
 
 import math
 from dataclasses import replace
-from functools import cache
 from typing import Final
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from dockair.calibration import Camera
 from dockair.rotations import Array
 from dockair.sim.camera.point_spread import Spread, airy_px, blur_px, core, transfer
 from dockair.sim.camera.sheets import LensParameters, SensorParameters
-from dockair.sim.camera.splat import Tables, missing_levels, splat
+from dockair.sim.camera.splat import POINT, Tables, missing_levels, splat
 
 NEAREST_M: Final = 0.5  #: nearer points are as blurred as at this depth
 _STEP_PX = 0.5  # growth of the disc or of the die's image between two tabulated depths
@@ -45,6 +45,7 @@ class PointSpread:
         self._lens, self._camera = lens, camera
         self._sharp = Spread(airy=airy_px(lens, camera, wavelength_m), diffusion=sensor.diffusion_px, blur=0.0, die=0.0)
         self._edge_sigma_px = self._edge_sigma()
+        self.wing: Final = self._sharp.wing  #: A and w of the wings, [splat, eq 1]
         self._cores: dict[float, _Cores] = {}
         self._widest_px = self._cores_of(_LARGEST_M).widest_px
 
@@ -57,6 +58,7 @@ class PointSpread:
         depth_m: Array,
         size_m: float,
         smear_px: Array,
+        of: NDArray[np.int64] | None = None,
     ) -> None:
         """Add point sources to expected electrons, in place.
 
@@ -68,21 +70,14 @@ class PointSpread:
             depth_m: (n,) along the lens's axis; infinity for the Sun's.
             size_m: side of the sources, squares that face the lens; 0 for points.
             smear_px: (n, 2) way (du, dv) during the exposure.
+            of: numbers of those to add; None for all.
         """
-        side, size_m = _divided(size_m)
-        if side > 1:
-            step_px = self._camera.focal_length_px * size_m / np.maximum(depth_m, NEAREST_M)
-            pixels = (pixels[:, None] + step_px[:, None, None] * _grid(side)).reshape(-1, 2)
-            electrons, depth_m = (electrons / side**2).repeat(side**2), depth_m.repeat(side**2)
-            smear_px = smear_px.repeat(side**2, axis=0)
-        cores = self._cores_of(size_m)
-        levels = cores.levels(depth_m)
-        splat(image, start, pixels, electrons, smear_px, levels, cores.tables, self._sharp.wing)
-
-    @property
-    def wing(self) -> tuple[float, float]:
-        """A and w of the wings, [splat, eq 1]."""
-        return self._sharp.wing
+        of, (side, size_m) = np.arange(len(electrons)) if of is None else of, _divided(size_m)
+        cores, points = self._cores_of(size_m), np.empty((len(of) * side**2, POINT))
+        sources = pixels, electrons, depth_m, smear_px
+        _divide(of, side, self._camera.focal_length_px * size_m, cores.levels_m, sources, points)
+        cores.make_for(points)
+        splat(image, start, points, cores.tables, self.wing)
 
     @property
     def widest_px(self) -> int:
@@ -115,13 +110,31 @@ def _divided(size_m: float) -> tuple[int, float]:
     return side, size_m / side
 
 
-@cache
-def _grid(side: int) -> Array:
-    """(side^2, 2) places in a square grid of step 1 about 0."""
-    along, out = np.arange(side) - 0.5 * (side - 1), np.empty((side, side, 2))
-    out[..., 0], out[..., 1] = along, along[:, None]
-    out.setflags(write=False)
-    return out.reshape(-1, 2)
+@njit(cache=True)
+def _divide(
+    of: NDArray[np.int64],
+    side: int,
+    size_f: float,
+    levels_m: float,
+    sources: tuple[Array, Array, Array, Array],
+    points: Array,
+) -> None:
+    """Fill (m, POINT) of the squares into which some of the sources are cut.
+
+    `size_f` is a square's side times the focal length [m px], `levels_m` level times depth, `sources` as of `splat`.
+    """
+    pixels, electrons, depth_m, smear_px = sources
+    k = 0
+    for i in of:
+        depth = NEAREST_M if depth_m[i] < NEAREST_M else depth_m[i]
+        step_px = size_f / depth if side > 1 else 0.0
+        for row in range(side):
+            for column in range(side):
+                points[k, 0] = pixels[i, 0] + step_px * (column - 0.5 * (side - 1))
+                points[k, 1] = pixels[i, 1] + step_px * (row - 0.5 * (side - 1))
+                points[k, 2], points[k, 3] = electrons[i] / side**2, levels_m / depth
+                points[k, 4], points[k, 5] = smear_px[i, 0], smear_px[i, 1]
+                k += 1
 
 
 class _Cores:
@@ -132,7 +145,7 @@ class _Cores:
         growth = float(np.ptp(blur_px(lens, camera, np.array([0.0, nearest]))))
         growth = max(growth, camera.focal_length_px * size_m * nearest)
         inverse_depth = np.linspace(0.0, nearest, max(int(np.ceil(growth / _STEP_PX)), 2) + 1)
-        self._levels_m = 1.0 / inverse_depth[1]  # level = this / depth
+        self.levels_m = 1.0 / float(inverse_depth[1])  #: level = this / depth
         self._sharp = sharp
         self._blurs, self._dies = blur_px(lens, camera, inverse_depth), camera.focal_length_px * size_m * inverse_depth
         self._made = np.zeros(len(inverse_depth), dtype=np.bool_)
@@ -148,12 +161,10 @@ class _Cores:
         """What `splat` reads."""
         return self._pool, self._begins, self._half_widths, self._phases
 
-    def levels(self, depth_m: Array) -> Array:
-        """(n,) depths in steps of the tables; makes the cores around them."""
-        levels = self._levels_m / np.maximum(depth_m, NEAREST_M)
-        for k in missing_levels(levels, self._made):
+    def make_for(self, points: Array) -> None:
+        """Make the cores around the depths of points (n, POINT) that lack."""
+        for k in missing_levels(points, self._made):
             self._make(int(k))
-        return levels
 
     def _make(self, k: int) -> None:
         if self._made[k]:

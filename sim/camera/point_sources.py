@@ -25,7 +25,8 @@ from dockair.sim.camera.glints import glint_rows, starts_of_seen
 from dockair.sim.camera.led_reflections import led_reflection_rows
 from dockair.sim.camera.lobes import ROW
 from dockair.sim.camera.mirrors import Mirrors, Vector, vector
-from dockair.sim.camera.occlusion import Obstacles, hidden, rays_are_clear
+from dockair.sim.camera.obstacles import Obstacles
+from dockair.sim.camera.occlusion import hidden, rays_are_clear
 from dockair.sim.camera.radiometry import Responses, led_electrons
 from dockair.sim.camera.sun_view import SunView
 
@@ -74,6 +75,7 @@ class PointSources:
         self._model, self._sheets, self._as_built, self._response = model, sheets, as_built, response
         self._sun, self._extinction_1_m = sun, extinction_1_m
         self._bodies = model.body("receiver").id, model.body("drogue").id
+        self._roots = model.body_rootid[self._bodies[0]], model.body_rootid[self._bodies[1]]
         self._drogue, self._count = self._bodies[1], len(as_built.led_intensity_w_sr)
         self._mirrors, self._obstacles = Mirrors.of(model), Obstacles.of(model)
 
@@ -116,8 +118,11 @@ class PointSources:
         electrons[:count] = led_electrons(
             self._response, leds, intensity, p_C[:count], axis_W @ R_WC, 1.0, self._extinction_1_m
         )
-        _as_received(p_C, count, self._extinction_1_m, f_px, exposure_s, electrons, sizes)
-        ways = self._ways_C(data, pose, p_C, count, exposure_s)
+        (receiver, drogue), roots, ways = self._bodies, self._roots, np.empty_like(p_C)
+        twists, centres = data.cvel, data.subtree_com
+        flight, tow = (twists[receiver], centres[roots[0]]), (twists[drogue], centres[roots[1]])
+        lens = self._extinction_1_m, f_px
+        _as_received(p_C, count, lens, exposure_s, pose, flight, tow, electrons, sizes, ways)
         return Sources(p_C=p_C, electrons=electrons, size_m=sizes, way_C_m=ways, patches_W=patches)
 
     def are_seen(
@@ -126,9 +131,10 @@ class PointSources:
         """(k,) whether the lens sees these of the candidates, and their light reaches them."""
         patches, leds_W = candidates.patches_W[which], candidates.patches_W[: self._count, :3]
         seen, starts = starts_of_seen(self._obstacles, data, p_WC, patches)
-        mirrors = np.flatnonzero(seen & (which >= self._count))
-        if len(mirrors) > 0:
-            seen[mirrors] = self._are_lit(data, starts[mirrors], patches[mirrors, 9], leds_W)
+        sun = (0.0, 0.0, 0.0) if self._sun is None else vector(self._sun.direction_W)
+        rays, reach = np.empty_like(starts), np.empty(len(starts))
+        _toward_lights(which, seen, starts, patches, leds_W, self._sheets.surfaces.led_seat_m, sun, rays, reach)
+        seen &= rays_are_clear(self._obstacles, data, starts, rays, reach)
         return seen
 
     def leds_W(self, data: mujoco.MjData) -> Array:
@@ -155,23 +161,6 @@ class PointSources:
         light = self._sheets.light
         glints = glint_rows(data, self._mirrors, p_WC, sun.direction_W, surfaces, light, R_WC[:, 0])
         return reflections, intensity_w_sr, glints
-
-    def _are_lit(self, data: mujoco.MjData, starts: Array, lights: Array, leds_W: Array) -> NDArray[np.bool_]:
-        """(n,) whether the way from places (n, 3) to the Sun, or to an LED up to its seat, is clear."""
-        sun = (0.0, 0.0, 0.0) if self._sun is None else vector(self._sun.direction_W)
-        rays, reach = np.empty_like(starts), np.empty(len(starts))
-        _toward_lights(starts, lights, leds_W, self._sheets.surfaces.led_seat_m, sun, rays, reach)
-        return rays_are_clear(self._obstacles, data, starts, rays, reach)
-
-    def _ways_C(
-        self, data: mujoco.MjData, pose: tuple[Array, Array], p_C: Array, count: int, exposure_s: float
-    ) -> Array:
-        """(n, 3) Eq. (1): the LEDs, which come first, move with the drogue; what mirrors is taken to stand still."""
-        out, root, twist, receiver, drogue = np.empty_like(p_C), self._model.body_rootid, data.cvel, *self._bodies
-        com = data.subtree_com
-        flight, tow = (twist[receiver], com[root[receiver]]), (twist[drogue], com[root[drogue]])
-        _ways(p_C, pose, flight, tow, count, exposure_s, out)
-        return out
 
 
 #: Angular and linear velocity (6,) in W, and the point (3,) whose the linear one is: MuJoCo's is the tree's centre.
@@ -237,15 +226,29 @@ def _join(
 
 @njit(cache=True)
 def _toward_lights(
-    starts: Array, lights: Array, leds_W: Array, seat_m: float, sun: Vector, rays: Array, reach: Array
+    which: NDArray[np.intp],
+    seen: NDArray[np.bool_],
+    starts: Array,
+    patches: Array,
+    leds_W: Array,
+    seat_m: float,
+    sun: Vector,
+    rays: Array,
+    reach: Array,
 ) -> None:
-    """Fill (n, 3) unit vectors from places to the Sun, or to an LED, and (n,) how far the way has to be clear."""
+    """Fill (n, 3) unit vectors from places to the Sun, or to an LED, and (n,) how far the way has to be clear.
+
+    That is 0, without a vector, for LEDs themselves, which come first, and for what is not seen anyway.
+    """
     for i in range(len(starts)):
-        if lights[i] == _SUN:
+        if not seen[i] or which[i] < len(leds_W):
+            reach[i] = 0.0
+            continue
+        if patches[i, 9] == _SUN:
             rays[i, 0], rays[i, 1], rays[i, 2] = sun
             reach[i] = math.inf
             continue
-        led = leds_W[int(lights[i])]
+        led = leds_W[int(patches[i, 9])]
         x, y, z = led[0] - starts[i, 0], led[1] - starts[i, 1], led[2] - starts[i, 2]
         distance = math.sqrt(x * x + y * y + z * z)
         rays[i, 0], rays[i, 1], rays[i, 2] = x / distance, y / distance, z / distance
@@ -256,18 +259,24 @@ def _toward_lights(
 def _as_received(
     p_C: Array,
     leds: int,
-    extinction_1_m: float,
-    focal_length_px: float,
+    lens: tuple[float, float],
     exposure_s: float,
+    pose: tuple[Array, Array],
+    flight: Twist,
+    tow: Twist,
     electrons: Array,
     size_m: Array,
+    ways_C_m: Array,
 ) -> None:
     """Turn (n,) electrons per second, of what mirrors times m^2, into electrons, and round its (n,) sizes, in place.
 
     What mirrors comes after the LEDs. Its light falls with cos t/r^2 and what is left of it on its way; its sizes go
     to powers of two of a millimetre, so that few spread functions serve all. Patches under half a pixel are points;
-    those from WIDE_PX on keep their size, for they are drawn without the lens.
+    those from WIDE_PX on keep their size, for they are drawn without the lens. Also fill the ways (n, 3), `_ways`.
+    `lens` is extinction and focal length.
     """
+    extinction_1_m, focal_length_px = lens
+    _ways(p_C, pose, flight, tow, leds, exposure_s, ways_C_m)
     electrons[:leds] *= exposure_s
     for i in range(leds, len(p_C)):
         x = p_C[i, 0]

@@ -43,7 +43,7 @@ class DirectionTable:
         """
         self._function, self._tiles, self._is_smooth = function, tiles, smooth
         self._values: NDArray[np.float32] = np.zeros((tiles * _TILE, tiles * _TILE), dtype=np.float32)
-        self._is_known = np.zeros((tiles, tiles), dtype=np.bool_)
+        self._is_known, self._is_missing = np.zeros((2, tiles, tiles), dtype=np.bool_)
 
     def fill(self, out: NDArray[np.float32], R_WC: Array, x: Array, y: Array) -> None:
         """Write the value toward (1, -x_j, -y_i), C axes, into out (rows, columns); x and y are evenly spaced."""
@@ -62,10 +62,11 @@ class DirectionTable:
         cells = self._values.shape[0] - 2  # even, so that the middle is a node; the last row and column serve nothing
         stride = max(1, int((_TILE - 1) / (0.5 * cells * _STEEPEST * step)))
         R, columns = np.ascontiguousarray(R_WC, dtype=float), np.asarray(x, dtype=np.float32)
-        rows, missing = np.asarray(y, dtype=float), np.zeros_like(self._is_known)
-        if _mark(R, columns, rows, stride, cells, self._is_known, missing):
-            for row, column in np.argwhere(missing):
+        rows = np.asarray(y, dtype=float)
+        if _mark(R, columns, rows, stride, cells, self._is_known, self._is_missing):
+            for row, column in np.argwhere(self._is_missing):
                 self._compute(int(row), int(column))
+            self._is_missing[:] = False
         _sample(self._values.ravel(), cells + 2, R, columns, rows, out)
 
     def _compute(self, row: int, column: int) -> None:
@@ -92,10 +93,10 @@ def _step(x: Array) -> float:
     return abs(float(x[-1] - x[0])) / (len(x) - 1) if len(x) > 1 else 0.0
 
 
+@njit(cache=True)
 def _places_around(x: Array, per_tangent: float) -> tuple[int, Array]:
     """Number of the first of the even places that evenly spaced tangents lie between, and all of them."""
-    one, other = float(x[0]), float(x[-1])
-    low, high = min(one, other), max(one, other)
+    low, high = min(x[0], x[-1]), max(x[0], x[-1])
     first, last = math.floor(low * per_tangent), math.floor(high * per_tangent) + 1
     return first, np.arange(first, last + 1) / per_tangent
 

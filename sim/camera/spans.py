@@ -22,6 +22,7 @@ _ROUNDING = 1.0 + 1e-9  # on the bounding sphere
 #: Of the solids in the model, with places (ngeom, 3) and attitudes (ngeom, 9) of its geoms.
 Poses = tuple[NDArray[np.intp], Array, Array]
 Frame = tuple[Array, Array]  # R_WC and p_WC of the camera
+Point = tuple[float, float]  # tangents x and y
 Even = tuple[float, float, int]  # evenly spaced tangents: the first, how many there are in 1, their number
 
 
@@ -150,12 +151,12 @@ def _outline(
     if behind > 0:
         for a in range(count):
             for b in range(a):
-                _mark(sides, points[a], points[b], y, rows)
+                _mark(sides, _pair(points, a), _pair(points, b), y, rows)
         return row, stop
     for a in range(8):
         for bit in (1, 2, 4):
             if (a & bit) == 0:
-                _mark(sides, points[a], points[a | bit], y, rows)
+                _mark(sides, _pair(points, a), _pair(points, a | bit), y, rows)
     return row, stop
 
 
@@ -182,7 +183,13 @@ def _points(points: Array, corners: Array, behind: int, near: float) -> int:
 
 
 @njit(cache=True)
-def _mark(sides: Array, a: Array, b: Array, y: Array, rows: Even) -> None:
+def _pair(points: Array, k: int) -> Point:
+    """Numbers, as counting references to a part of an array takes its time."""
+    return points[k, 0], points[k, 1]
+
+
+@njit(cache=True)
+def _mark(sides: Array, a: Point, b: Point, y: Array, rows: Even) -> None:
     """Widen the rows that an edge crosses, and one more at either end."""
     left, right = min(a[0], b[0]), max(a[0], b[0])
     row, stop = _between(min(a[1], b[1]), max(a[1], b[1]), rows)

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from dockair.rotations import Array
 
+POINT = 6  #: columns: place u, v [px], electrons of the whole blob, depth [levels], smear du, dv [px]
 FAINTEST_E = 0.1  #: electrons per pixel at which the wings end
 SHORTEST_SMEAR_PX = 0.02  #: less counts as none: it adds 3e-5 px^2
 _REACH_CORES = 1.5  # the wings reach at least this many half-widths of the core, over which W exceeds (1)'s tail
@@ -35,11 +36,11 @@ Tables: TypeAlias = tuple[NDArray[np.float32], NDArray[np.int64], NDArray[np.int
 
 
 @njit(cache=True)
-def missing_levels(levels: Array, made: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Return which of the tables that `splat` reads at these depths (n,) [levels] are not made yet, each once."""
+def missing_levels(points: Array, made: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Return which of the tables that `splat` reads for these points are not made yet, each once."""
     wanted = np.zeros(made.shape[0], np.bool_)
-    for level in levels:
-        middle = _middle(level, made.shape[0])
+    for i in range(points.shape[0]):
+        middle = _middle(points[i, 3], made.shape[0])
         wanted[middle - 1 : middle + 2] = True
     return np.flatnonzero(wanted & ~made)
 
@@ -51,6 +52,7 @@ def reach_window(
     pixels: Array,
     smear: Array,
     electrons: Array,
+    faintest: float,
     width_px: Array,
     widest_px: int,
     wing: tuple[float, float],
@@ -60,9 +62,10 @@ def reach_window(
     Args:
         shape: rows and columns of the window.
         start: (row, column) of its first pixel.
-        pixels: (n, 2) as of `splat`, like the rest.
-        smear: (n, 2).
-        electrons: (n,).
+        pixels: (n, 2) true positions (u, v).
+        smear: (n, 2) ways of the middles [px].
+        electrons: (n,) of each whole blob.
+        faintest: no blob with so few electrons counts.
         width_px: (n,) sides of the sources.
         widest_px: half-width of the widest core there is.
         wing: A and w.
@@ -70,7 +73,7 @@ def reach_window(
     near, count = np.empty(pixels.shape[0], np.int64), 0
     for i in range(pixels.shape[0]):
         (u, v), E = pixels[i], electrons[i]
-        if not (E > 0.0 and math.isfinite(u) and math.isfinite(v)):
+        if not (E > faintest and math.isfinite(u) and math.isfinite(v)):
             continue
         length = math.hypot(smear[i, 0], smear[i, 1])
         reach = _reach(E, widest_px, wing) + length + _REACH_WIDTHS * width_px[i] + _SPARE_PX
@@ -84,10 +87,7 @@ def reach_window(
 def splat(
     image: NDArray[np.float32],
     start: tuple[int, int],
-    pixels: Array,
-    electrons: Array,
-    smear: Array,
-    levels: Array,
+    points: Array,
     tables: Tables,
     wing: tuple[float, float],
 ) -> None:
@@ -96,22 +96,18 @@ def splat(
     Args:
         image: (rows, columns) expected electrons of the window.
         start: (row, column) of its first pixel.
-        pixels: (n, 2) true positions (u, v) on the sensor; those that are not finite are left out.
-        electrons: (n,) of each whole blob.
-        smear: (n, 2) way of each blob's middle during the exposure [px].
-        levels: (n,) depth of each, in steps of the tables.
+        points: (n, POINT) true places on the sensor, depths in steps of the tables, ways of the middles during the
+            exposure; those with places that are not finite are left out.
         tables: at least the three levels around each depth are filled.
         wing: A and w.
     """
     half_widths = tables[2]
-    for i in range(pixels.shape[0]):
-        (u, v), E = pixels[i], electrons[i]
+    for u, v, E, level, du, dv in points:
         if not (E > 0.0 and math.isfinite(u) and math.isfinite(v)):
             continue
-        middle = _middle(levels[i], half_widths.shape[0])
+        middle = _middle(level, half_widths.shape[0])
         half = max(half_widths[middle - 1], half_widths[middle], half_widths[middle + 1])
         reach = _reach(E, half, wing)
-        du, dv = smear[i]
         length = math.hypot(du, dv)
         if _is_outside(image.shape, start, u, v, reach + length):
             continue
@@ -122,7 +118,7 @@ def splat(
         count = 2 + int(_SMEAR_STEPS * length) if length > SHORTEST_SMEAR_PX else 1
         for k in range(count):
             a = _along(k, count)
-            _add_core(image, start, u + a * du, v + a * dv, E / count, levels[i], middle, half, tables)
+            _add_core(image, start, u + a * du, v + a * dv, E / count, level, middle, half, tables)
 
 
 @njit(cache=True)

@@ -16,7 +16,8 @@ import numpy as np
 
 from dockair.calibration import Camera
 from dockair.rotations import Array
-from dockair.sim.camera.occlusion import Obstacles, clear_directions
+from dockair.sim.camera.obstacles import Obstacles
+from dockair.sim.camera.occlusion import clear_directions
 
 _RINGS = 4  # of equal area, with 6, 12, 18, 24 rays: 60 rays resolve 2 % of the disc
 _BLOCK_PX = 2

@@ -86,7 +86,7 @@ class TracedSolids:
             self._depths = np.full(out.size, far, dtype=np.float32)
         poses = s.geoms, data.geom_xpos, data.geom_xmat
         count = place(s.kinds, s.half_sizes_m, poses, (R_WC, p_WC), x, y, near, self._placed)
-        nearest, reach = self._depths[: out.size].reshape(out.shape), np.full((len(y), 2), (len(x), 0))
+        nearest, reach = self._depths[: out.size].reshape(out.shape), np.empty((len(y), 2), dtype=np.int64)
         solids = s.kinds, s.half_sizes_m, s.reflectances
         shade, sun_C = (light.ambient, light.direct), R_WC.T @ light.toward_W
         _trace(out, nearest, reach, solids, self._placed, count, x, y, sun_C, shade, near)
@@ -116,10 +116,11 @@ def _trace(
 ) -> None:
     """Draw the first `count` placed solids, without haze; `nearest` (rows, columns) holds depths so far.
 
-    `reach` (rows, 2), the first column that may have been drawn in each row and one past the last, is widened.
+    `reach` (rows, 2) is filled with the first column that may have been drawn in each row and one past the last.
     """
+    reach[:, 0], reach[:, 1] = len(x), 0
     kinds, half_sizes, reflectances = solids
-    tangents = x.astype(np.float32)
+    runs, tangents = placed.runs, x.astype(np.float32)
     for k in range(count):
         g = placed.solid[k]
         kind, h, M, c = kinds[g], half_sizes[g], placed.axes_C[k], placed.centre_C[k]
@@ -132,7 +133,7 @@ def _trace(
         half, inverse = _F(h[2] / h[0]), _single((1.0 / h[0], 1.0 / h[1], 1.0 / h[2]))
         row, stop, run = placed.rows[k]
         for i in range(row, stop):
-            left, right = placed.runs[run + i - row]
+            left, right = runs[run + i - row, 0], runs[run + i - row, 1]
             if left == right:
                 continue
             right = min(left + (right - left + _LANES - 1) // _LANES * _LANES, len(x))

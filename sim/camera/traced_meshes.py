@@ -65,9 +65,10 @@ def trace_meshes(
         near: depth of the near plane.
     """
     tangents, columns, rows = x.astype(np.float32), _even(x), _even(y)
+    triangles, places, lit = meshes.triangles, view.places, view.radiances
     for i in view.triangles[:count]:
-        corners = meshes.triangles[i, 0], meshes.triangles[i, 1], meshes.triangles[i, 2]
-        _draw_triangle(corners, view.places, view.radiances, out, nearest, reach, tangents, columns, rows, y, near)
+        corners = triangles[i, 0], triangles[i, 1], triangles[i, 2]
+        _draw_triangle(corners, places, lit, out, nearest, reach, tangents, columns, rows, y, near)
 
 
 @njit(cache=True)

@@ -9,7 +9,8 @@ import pytest
 from dockair.errors import MachineError
 from dockair.rotations import exp
 from dockair.sim import off_screen
-from dockair.sim.camera.drawn import DrawnSolids, _reach
+from dockair.sim.camera.drawn import DrawnSolids
+from dockair.sim.camera.pieces import _reach
 from dockair.sim.camera.solids import BALL, BOX, CAPSULE, CYLINDER, Haze, Lighting
 from dockair.sim.camera.traced import TracedSolids
 from dockair.sim.camera.unit_meshes import BALLS, CUBE, ENDS, SLICES, TUBES, unit_meshes
@@ -213,3 +214,27 @@ def test_a_machine_without_opengl_is_told_when_the_first_picture_is_asked_for(mo
     with pytest.raises(MachineError, match="libegl1"):
         drawn.draw(np.zeros((len(Y), len(X)), dtype=np.float32), data, AT_ORIGIN, X, Y, Haze())
     drawn.close()
+
+
+@pytest.mark.gl
+def test_a_picture_does_not_depend_on_the_one_before() -> None:
+    """Pieces change their meshes with the range, their number with the window; the second picture is as if alone."""
+    model, data = _scene(
+        {"type": GEOM.mjGEOM_BOX, "pos": [30.0, 2.0, 0.0], "size": [0.5, 0.5, 0.5]},
+        {"type": GEOM.mjGEOM_CAPSULE, "pos": [5.0, 0.0, 0.0], "size": [0.2, 0.5, 0.0], "quat": [0.9, 0.3, 0.1, 0.2]},
+        {"type": GEOM.mjGEOM_SPHERE, "pos": [7.0, -1.0, 0.5], "size": [0.4, 0.0, 0.0]},
+    )
+
+    def picture(way: DrawnSolids, lens_m: float, columns: slice) -> np.ndarray:
+        out = np.full((len(Y), len(X[columns])), SKY, dtype=np.float32)
+        way.draw(out, data, (np.eye(3), np.array([lens_m, 0.0, 0.0])), X[columns], Y, Haze())
+        return out
+
+    views = [(-40.0, slice(None)), (3.5, slice(None)), (3.5, slice(150, 260)), (-40.0, slice(150, 260))]
+    used = DrawnSolids(model, SUNLIT, BLOCKS_PER_TANGENT, (len(Y), len(X)))
+    for view in [*views, *reversed(views)]:
+        fresh = DrawnSolids(model, SUNLIT, BLOCKS_PER_TANGENT, (len(Y), len(X)))
+        expected = picture(fresh, *view)
+        fresh.close()
+        assert (expected != SKY).any() and np.array_equal(picture(used, *view), expected)
+    used.close()

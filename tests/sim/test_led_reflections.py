@@ -294,7 +294,7 @@ def test_the_bound_that_spares_faint_pairs_drops_none_that_counts(make_world, mo
     for ahead_m in (0.0, 0.4, 3.0):
         spared = _scene(make_world, ahead_m, surfaces)
         with monkeypatch.context() as patch:
-            patch.setattr(led_reflections, "_bound", lambda *_: np.full((8, 116), np.inf))
+            patch.setattr(led_reflections, "_wanted", lambda *_: np.ones((8, 116), dtype=np.bool_))
             every = _scene(make_world, ahead_m, surfaces)
         assert len(every.p_W) > 5
         assert np.array_equal(spared.p_W, every.p_W)

@@ -13,7 +13,8 @@ from dockair.rotations import exp, quaternion_from_matrix
 from dockair.sim.camera.drawn import DrawnSolids
 from dockair.sim.camera.meshes import Meshes
 from dockair.sim.camera.mirrors import Mirrors
-from dockair.sim.camera.occlusion import Obstacles, first_hits
+from dockair.sim.camera.obstacles import Obstacles
+from dockair.sim.camera.occlusion import first_hits
 from dockair.sim.camera.solids import VISIBLE_GROUPS, Haze, Lighting
 from dockair.sim.camera.tiles import triangle_tile
 from dockair.sim.camera.traced import TracedSolids

@@ -5,7 +5,14 @@ import numpy as np
 import pytest
 
 from dockair.errors import DockairError
-from dockair.sim.camera.occlusion import Obstacles, clear_directions, first_hits, hidden, is_clear
+from dockair.sim.camera.obstacles import Obstacles
+from dockair.sim.camera.occlusion import (
+    clear_directions,
+    first_hits,
+    hidden,
+    is_clear,
+    rays_are_clear,
+)
 from dockair.sim.camera.solids import VISIBLE_GROUPS
 
 EYE = np.zeros(3)
@@ -161,3 +168,43 @@ def test_rays_change_nothing_in_the_world(crowd) -> None:
     after = np.empty_like(before)
     mujoco.mj_getState(model, data, after, mujoco.mjtState.mjSTATE_INTEGRATION)
     assert np.array_equal(before, after) and np.array_equal(poses, data.geom_xpos)
+
+
+@pytest.mark.parametrize("half_angle_rad", [0.0, 0.01, 0.1, 0.5, 1.2, 1.7])
+def test_rays_of_a_bundle_meet_what_each_meets_alone(crowd, half_angle_rad: float) -> None:
+    """To the bit, of bundles from almost no width to more than half of all directions; and MuJoCo agrees."""
+    model, data = crowd
+    obstacles, met = Obstacles.of(model), 0
+    rng = np.random.default_rng(8)
+    for toward in data.geom_xpos[::3]:  # and a little beside
+        axis = toward + rng.normal(0.0, 0.5, 3)
+        axis /= np.linalg.norm(axis)
+        rays = rng.normal(size=(40, 3))
+        rays -= (rays @ axis)[:, None] * axis
+        angle = half_angle_rad * np.sqrt(rng.uniform(size=(40, 1)))
+        rays = np.cos(angle) * axis + np.sin(angle) * rays / np.linalg.norm(rays, axis=1, keepdims=True)
+        hits = first_hits(obstacles, data, EYE, rays, np.inf)
+        alone = [first_hits(obstacles, data, EYE, ray[None], np.inf)[0] for ray in rays]
+        assert np.array_equal(hits, alone)
+        np.testing.assert_allclose(hits, _mujocos_hits(model, data, EYE, rays), atol=1e-7)
+        met += int((hits >= 0.0).sum())
+    assert 100 < met < 0.9 * 40 * len(data.geom_xpos[::3])
+
+
+@pytest.mark.parametrize("beside_m", [-1e-4, 1e-4])
+def test_a_ball_that_a_bundle_just_touches_is_met_and_one_beside_it_is_not(beside_m: float) -> None:
+    """A bundle of 0.2 rad about x; the ball stands above its uppermost ray."""
+    half, radius, away = 0.2, 0.5, 6.0
+    turn = np.linspace(-np.pi, np.pi, 73)
+    rays = np.column_stack([np.full(73, np.cos(half)), np.sin(half) * np.sin(turn), np.sin(half) * np.cos(turn)])
+    up = np.array([-np.sin(half), 0.0, np.cos(half)])
+    centre = away * np.array([np.cos(half), 0.0, np.sin(half)]) + (radius + beside_m) * up
+    obstacles, data = _world({"type": _G.mjGEOM_SPHERE, "pos": centre, "size": [radius, 0.0, 0.0]})
+    hits = first_hits(obstacles, data, EYE, rays, np.inf)
+    assert (hits >= 0.0).any() == (beside_m < 0.0)
+
+
+def test_a_way_of_no_length_is_clear() -> None:
+    obstacles, data = _world(_ball(2.0))
+    starts, ways = np.zeros((3, 3)), np.array([AHEAD, AHEAD, AHEAD])
+    assert list(rays_are_clear(obstacles, data, starts, ways, np.array([-0.1, 0.0, 5.0]))) == [True, True, False]

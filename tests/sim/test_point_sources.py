@@ -111,6 +111,21 @@ def test_an_led_is_dark_in_the_batch_when_a_ray_to_it_alone_is_blocked(small_wor
     assert LEDS <= hidden < LEDS * LEDS
 
 
+def test_a_patch_is_dark_in_the_batch_when_a_box_stands_between_it_and_its_light(small_world: Any) -> None:
+    """Each reflection and glint in turn, the first of them too; the box is off the lens's line of sight."""
+    world = _placed(small_world)
+    sources, blocked = _sources_of(world), {True: 0, False: 0}
+    leds_W, patches = sources.leds_W(world.data), _seen(world, sources).patches_W[LEDS:]
+    for patch in patches:
+        of_sun = patch[9] < 0.0
+        place, way = patch[:3], SUN_W if of_sun else leds_W[int(patch[9])] - patch[:3]
+        world.put("box", place + (0.3 if of_sun else 0.5) * way, np.eye(3))
+        left = _seen(world, sources).patches_W[LEDS:]
+        assert not ((left[:, 9] == patch[9]) & (np.linalg.norm(left[:, :3] - place, axis=1) < 1e-9)).any()
+        blocked[of_sun] += 1
+    assert blocked[True] > 0 and blocked[False] > 0
+
+
 def test_the_way_in_an_exposure_is_the_difference_of_places_moved_by_hand(small_world: Any) -> None:
     """Both bodies fly and turn; LEDs move with the drogue, mirrored light stays where it is in W."""
     world = _placed(small_world)

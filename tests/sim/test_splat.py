@@ -155,3 +155,15 @@ def test_a_blob_just_outside_still_throws_its_wings_into_the_image() -> None:
     _spread().splat(image, (0, 0), np.array([[-20.0, 20.0]]), np.array([1e6]), np.array([10.0]), 0.0, np.zeros((1, 2)))
     A = airy_px(replace(LENS, f_number=8.0, focus_distance_m=FOCUS_M), CAMERA, LED_M) / np.pi**3
     assert image[20, 0] == pytest.approx(A * 1e6 / 20.0**3, rel=0.2)
+
+
+@pytest.mark.parametrize("size_m", [0.0, DIE_M, 0.012, 0.03])
+def test_some_of_many_points_are_added_as_if_there_were_no_others(size_m: float) -> None:
+    """To the bit; sources above 5 mm are cut into squares."""
+    rng, of = np.random.default_rng(12), np.array([3, 4, 11, 19])
+    many = rng.uniform(10.0, 90.0, (20, 2)), 10.0 ** rng.uniform(2.0, 6.0, 20), rng.uniform(0.3, 20.0, 20)
+    ways, (some, alone, every) = rng.normal(0.0, 2.0, (20, 2)), np.zeros((3, 100, 100), dtype=np.float32)
+    _spread().splat(some, (0, 0), *many, size_m, ways, of)
+    _spread().splat(alone, (0, 0), *(values[of] for values in many), size_m, ways[of])
+    _spread().splat(every, (0, 0), *many, size_m, ways)
+    assert some.sum() > 0.0 and np.array_equal(some, alone) and not np.array_equal(some, every)
