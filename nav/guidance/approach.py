@@ -1,11 +1,7 @@
 """Guidance: from the drogue as the navigation sees it to the phase of the docking and the command.
 
 Everything is flown in stabilised axes (`stabilised_axes`): a controller (`predictive`, or `pid` for comparison) follows
-the drogue; `closing` says whether to close; `phases` says what comes next. The closure speed c is ramped up and down,
-
-    dc/dt = +-a_c                                                                                         (1)
-
-so that the closure speed is what the coupling wants whatever the drogue does.
+the drogue; `closure` says how fast to close, and when to be called back; `phases` says what comes next.
 
 After contact the view says nothing about the way to the tanker: the way pushed in is the integral of what was
 commanded beyond the drogue's drift.
@@ -15,7 +11,7 @@ turn differ by (`announced_path`). None of this is left to the controller: to it
 the left (l), that the path is learnt to leave, and what the turn n of the axes does to the drogue's place p is taken
 off,
 
-    commanded = u + v l - n x p                                                                           (2)
+    commanded = u + v l - n x p                                                                           (1)
 
 so that the drogue's drift is the same on the way to it, on the probe and back.
 
@@ -27,7 +23,8 @@ import numpy as np
 
 from dockair.messages import ReceiverCommand, TankerAnnouncement
 from dockair.nav.guidance.announced_path import AnnouncedPath
-from dockair.nav.guidance.closing import PredictedMiss, room_to_stop_m, time_to_contact_s
+from dockair.nav.guidance.closing import PredictedMiss, time_to_contact_s
+from dockair.nav.guidance.closure import Closure
 from dockair.nav.guidance.controller import Controller, Sight, Wanted
 from dockair.nav.guidance.guidance_settings import GuidanceSettings, RelativeState
 from dockair.nav.guidance.phases import Phase, PhaseLimits, Situation, next_phase
@@ -56,13 +53,14 @@ class Guidance:
         self._u: Array = np.zeros(3)
         self._u_dot: Array = np.zeros(3)
         self._path = AnnouncedPath(settings.path)
-        self._turned: Array = np.zeros((2, 3))  # n x p of Eq. (2) and its rate
-        self._commanded: Array = np.zeros(3)  # Eq. (2)
+        self._turned: Array = np.zeros((2, 3))  # n x p of Eq. (1) and its rate
+        self._commanded: Array = np.zeros(3)  # Eq. (1)
         self._aim: Array = np.zeros(2)
         self._passed: Array | None = None  # where the ring was when the tip last came to its plane, left and up
-        self._closure, self._good, self._committed = 0.0, False, False
+        speeds = settings.closure_speed_m_s, settings.closure_acceleration_m_s2
+        self._closure = Closure(settings.closing, *speeds, self._dt)
         self._attempts, self._docked, self._has_seen = 0, False, False
-        self._time_s = self._in_phase_s = self._steady_s = self._waiting_s = self._patient_s = 0.0
+        self._time_s = self._in_phase_s = self._steady_s = self._patient_s = 0.0
         self._unusable_s = self._doubtful_s = self._inside_s = self._pushed_in_m = 0.0
 
     def announce(self, announcement: TankerAnnouncement) -> None:
@@ -81,12 +79,12 @@ class Guidance:
         if self._path.is_announced:
             self._follow_path(state, ring, rate)
         self._observe(state, ring, rate)
-        self._count(state, ring, coupling)
+        self._count(state, ring, rate, coupling)
         self._change_phase(self._situation(ring, rate, coupling))
         u_dot = self._follow(ring) if self._follows(state, ring) else self._hold_course()
         limit = np.array(self._settings.acceleration_limit_m_s2)
         change = self._dt * np.array(self._settings.jerk_limit_m_s3)
-        if self.phase in _WAITING:
+        if self._is_patient:
             limit[1:], change[1:] = self._settings.patient_share * limit[1:], self._settings.patient_share * change[1:]
         u_dot = np.clip(np.clip(u_dot, -limit, limit), self._u_dot - change, self._u_dot + change)
         self._u_dot = u_dot
@@ -98,7 +96,8 @@ class Guidance:
         """Go on with the announced path, and learn from the drogue what it leaves."""
         if state.usable:
             self._turned = np.array([self._axes.turned(ring), self._axes.turned(rate)])
-        learns = state.usable and self.phase in _FOLLOWING and not self._committed  # not from a drogue pushed about
+        pushed = self._closure.committed  # a drogue in the bow wave says nothing about the path
+        learns = state.usable and self.phase in _FOLLOWING and not pushed
         left = float((rate + self._turned[0] + self._commanded) @ self._axes.left_N)
         self._path.step(self._dt, left if learns else None)
 
@@ -118,12 +117,12 @@ class Guidance:
                 push_m_s2=self._settings.bow_wave.at(later),
             )
         )
-        if not self._committed:  # from then on only the miss at contact is kept small
+        if not self._closure.committed:  # from then on only the miss at contact is kept small
             self._miss.step(float(np.hypot(*(ring[1:] + self._aim_now()))))
         if self.phase is Phase.APPROACH:
             self._passed = ring[1:].copy() if ring[0] < self._settings.limits.come_along_m else None
 
-    def _count(self, state: RelativeState, ring: Array, coupling: Array) -> None:
+    def _count(self, state: RelativeState, ring: Array, rate: Array, coupling: Array) -> None:
         settings, limits = self._settings, self._settings.limits
         self._time_s += self._dt
         self._in_phase_s += self._dt
@@ -140,33 +139,29 @@ class Guidance:
         self._steady_s = self._steady_s + self._dt if steady else 0.0
         self._patient_s = self._patient_s + self._dt if self.phase in (Phase.PRE_CONTACT, Phase.APPROACH) else 0.0
         if self.phase is Phase.APPROACH:
-            self._close(state, float(ring[0]))
+            self._close(state, float(ring[0]), -float(rate[0]))
             self._inside_s = self._inside_s + self._dt if ring[0] <= 0.0 else 0.0
         if self.phase in _TOUCHING:
             self._pushed_in_m += (self._u[0] - self._controller.drift_m_s[0]) * self._dt
 
-    def _close(self, state: RelativeState, distance_m: float) -> None:
-        """Ramp the closure speed, Eq. (1)."""
-        s = self._settings
+    def _close(self, state: RelativeState, distance_m: float, closing_m_s: float) -> None:
+        """Say how good a moment it is to close; the longer one has been waited for, the less is asked of it."""
+        s, late = self._settings, self._late
         error = float(np.hypot(*self._controller.error_to_come(self._aim_now())))
         miss = self._miss.at_contact_m(error, distance_m, s.closure_speed_m_s)
-        radius = self._radius_m() * (s.closing.hysteresis if self._good else 1.0)
-        self._good = state.usable and state.contact_usable and miss <= radius
-        self._committed = self._closure > 0.0 and (
-            self._committed or distance_m <= room_to_stop_m(s.closing, self._closure)
+        self._closure.step(
+            distance_m,
+            closing_m_s,
+            known=state.usable and state.contact_usable,
+            miss=miss / (late * s.limits.capture_radius_m),
+            unrest=self._controller.unrest / late,
         )
-        falls_back = self._closure <= 0.0 and distance_m < s.closing.wait_at_m
-        sign = 1.0 if self._committed or (self._good and not falls_back) else -1.0
-        closure = self._closure + sign * s.closure_acceleration_m_s2 * self._dt
-        least = -s.closing.retreat_m_s if falls_back else 0.0
-        self._closure = min(max(closure, least), s.closure_speed_m_s)
-        self._waiting_s = self._waiting_s + self._dt if self._closure <= 0.0 else 0.0
 
-    def _radius_m(self) -> float:
-        """How well the drogue has to be followed now: the longer a calm moment is waited for, the less."""
+    @property
+    def _late(self) -> float:
+        """What is asked of a moment now, of what is asked at first."""
         limits = self._settings.limits
-        share = min(self._patient_s / limits.patience_s, 1.0)
-        return limits.capture_radius_m * (1.0 + (limits.late_radius - 1.0) * share)
+        return 1.0 + (limits.late_radius - 1.0) * min(self._patient_s / limits.patience_s, 1.0)
 
     def _situation(self, ring: Array, rate: Array, coupling: Array) -> Situation:
         return Situation(
@@ -174,8 +169,8 @@ class Guidance:
             in_phase_s=self._in_phase_s,
             steady_s=self._steady_s,
             spread_m=self._miss.spread_m,
-            radius_m=self._radius_m(),
-            waiting_s=self._waiting_s,
+            radius_m=self._late * self._settings.closing.hopeful * self._settings.limits.capture_radius_m,
+            waiting_s=self._closure.waiting_s,
             inside_s=self._inside_s,
             unusable_s=self._unusable_s,
             doubtful_s=self._doubtful_s,
@@ -197,13 +192,12 @@ class Guidance:
         self.phase, self.phase_reason, self._in_phase_s = transition.to, transition.reason, 0.0
         self._docked = self._docked or self.phase is Phase.HOLD
         if self.phase is Phase.APPROACH:
-            self._attempts, self._passed, self._good = self._attempts + 1, None, True
-            self._closure = self._waiting_s = self._inside_s = 0.0
-            self._committed = False
+            self._attempts, self._passed, self._inside_s = self._attempts + 1, None, 0.0
+            self._closure.begin()
         elif self.phase is Phase.CONTACT:  # what is commanded already will still be flown
-            self._pushed_in_m = self._closure * self._settings.response_s[0]
+            self._pushed_in_m = self._closure.speed_m_s * self._settings.response_s[0]
         elif self.phase in (Phase.BACK_OFF, Phase.BREAKAWAY):
-            self._closure, self._committed = 0.0, False
+            self._closure.begin()
             self._miss.forget()
             if self._passed is not None:
                 self._aim = self._settings.bow_wave.learnt(self._aim, self._passed)
@@ -225,10 +219,11 @@ class Guidance:
             distance_m = float(ring[0])
             wanted = Wanted(
                 distance_m=None,
-                speed_m_s=self._closure,
+                speed_m_s=self._closure.speed_m_s,
                 aim_m=self._aim_now(),
+                patient=self._is_patient,
                 must_follow=True,
-                to_contact_s=self._to_contact_s(distance_m) if self._committed else None,
+                to_contact_s=self._to_contact_s(distance_m) if self._closure.committed else None,
             )
         elif self.phase in _RETREATING:
             wanted = Wanted(distance_m=None, speed_m_s=-s.back_off_speed_m_s, aim_m=self._aim_now())
@@ -237,13 +232,19 @@ class Guidance:
                 distance_m=s.stand_off_m,
                 speed_m_s=s.join_up_speed_m_s,
                 aim_m=self._aim_now(),
-                patient=self.phase in _WAITING,
+                patient=self._is_patient,
             )
         return self._controller.rate(self._u, wanted)
 
+    @property
+    def _is_patient(self) -> bool:
+        """Whether a share of the limits across is enough: as long as nothing is tried."""
+        return self.phase in _WAITING or (self.phase is Phase.APPROACH and self._closure.stands_by)
+
     def _to_contact_s(self, distance_m: float) -> float:
         s = self._settings
-        return time_to_contact_s(s.closing, distance_m, self._closure, s.closure_speed_m_s, s.closure_acceleration_m_s2)
+        speeds = self._closure.speed_m_s, s.closure_speed_m_s
+        return time_to_contact_s(s.closing, distance_m, *speeds, s.closure_acceleration_m_s2)
 
     def _hold_course(self) -> Array:
         """(3,) du/dt toward the drogue's drift, plus the speed along that the phase asks for."""
@@ -263,7 +264,7 @@ class Guidance:
         return np.asarray(s.course_gain_1_s * (target - self._u))
 
     def _command(self, u_dot: Array) -> ReceiverCommand:
-        """Eq. (2) and its rate in body axes, and what the path does."""
+        """Eq. (1) and its rate in body axes, and what the path does."""
         path, axes, u = self._path, self._axes, self._u
         if path.is_announced:
             u = u + path.left_m_s * axes.left_N - self._turned[0]

@@ -1,4 +1,4 @@
-"""When to close: only while the predicted miss is inside the capture radius, as long as there is room to stop.
+"""What decides about closing: the miss predicted for contact, the room to stop, the time to contact.
 
 The miss at contact, t_go from now, is predicted from the error that the commands given will leave and from how well
 the drogue has been followed over its last swing,
@@ -9,7 +9,7 @@ and the receiver, once it closes at c, comes to rest not before
 
     d = c tau + c^2 / (2 a)                                                                               (2)
 
-Within d of the ring it is committed: stopping there would leave the probe among the rim's swings.
+Within d of the ring it cannot be called back any more (`closure`).
 """
 
 from collections import deque
@@ -20,16 +20,19 @@ import numpy as np
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClosingSettings:
-    """Constants of Eqs. (1) and (2)."""
+    """Constants of Eqs. (1) and (2), and of `closure`."""
 
     swing_s: float = 3.0  # the drogue's period at 0.33 Hz
     error_time_s: float = 0.4  # T_e: an error of the following is another one half a response and a half swing later
     deceleration_m_s2: float = 0.6  # a: with idle thrust a fighter slows by 0.8
     response_s: float = 0.45  # tau along, engine and all
-    hysteresis: float = 1.3  # of the capture radius once closing: a good moment must not flicker
-    wait_at_m: float = 2.2  # from the ring: room to gain the closure speed, and not to be called back from 1.9 m on
-    retreat_m_s: float = 0.3  # to that place, when it came to a stand nearer
-    margin_m: float = 0.2  # short of the ring, at rest: drogue and receiver move by 0.06 m rms in moderate gusts
+    hopeful: float = 1.7  # times radius and swing while running up: within a second it may become good
+    run_up_m_s: float = 0.9  # c until committed: quick enough to gain 1.2 m/s on the rest, and stopped within 0.7 m
+    recall_m: float = 2.0  # from the ring: nearer than this the speed once lost is not gained any more
+    recall_m_s2: float = 1.5  # how fast c is then taken back: idle thrust at once, whatever the lag
+    wait_at_m: float = 2.8  # from the ring: room to gain the speed of the run-up before the last moment
+    retreat_m_s: float = 0.8  # to that place: walking pace, a second try within a few swings
+    margin_m: float = 0.4  # short of the ring, at rest: half of it goes as drogue and receiver come together by gusts
 
 
 class PredictedMiss:

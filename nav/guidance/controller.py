@@ -55,6 +55,11 @@ class Controller(Protocol):
         """Whether swings like those of the last half minute can be followed at all, for an approach to be begun."""
         ...
 
+    @property
+    def unrest(self) -> float:
+        """The drogue's swing of now, of the largest with which the last metre may be begun."""
+        ...
+
     def error_to_come(self, aim_m: Array) -> Array:
         """(2,) off the drogue across, when what has been commanded has been flown."""
         ...

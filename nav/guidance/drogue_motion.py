@@ -59,6 +59,7 @@ class DrogueMotion:
 
     def __init__(self, settings: SwingSettings, step_s: float, lead_s: Array, node_s: float) -> None:
         self._lead_s = np.asarray(lead_s)
+        self._omega_rad_s = 2.0 * np.pi * np.array(settings.frequency_hz)
         self._A = np.stack([_dynamics(settings, axis) for axis in range(3)])
         self._F = np.stack([expm(A * step_s) for A in self._A])
         self._lead = np.stack([expm(A * lead) for A, lead in zip(self._A, self._lead_s, strict=True)])
@@ -94,6 +95,11 @@ class DrogueMotion:
     def drift_m_s(self) -> Array:
         """(3,) velocity without the swing."""
         return self._x[:, 1].copy()
+
+    @property
+    def swing_m_s2(self) -> Array:
+        """(3,) acceleration at the ends of the swing of now, omega hypot(omega s, s'), if no gust drove it on."""
+        return np.asarray(self._omega_rad_s * np.hypot(self._omega_rad_s * self._x[:, 2], self._x[:, 3]))
 
     def ahead(self, push_m_s2: Array, push_then_m_s2: Array) -> tuple[Array, Array, Array]:
         """(3,) place [m], velocity [m/s] and acceleration [m/s^2] after the lead time.

@@ -6,7 +6,8 @@ limits, and z = j / j_max,
 
     minimise  sum_k w_k (y_k - y_D,k)^2 + r sum_k z_k^2     with |z_k| <= 1, |y''_k| <= a_max             (1)
 
-is a convex quadratic programme; the first jerk is flown, and the next tick plans anew. Following the drogue, w = 1;
+is a convex quadratic programme, in which on the way to contact a share of both limits is kept back from later nodes,
+the more the later up to a time; the first jerk is flown, and the next tick plans anew. Following the drogue, w = 1;
 on the way to a contact that is t_r away only the miss about that moment counts, but for a little on the way, and the
 moment is when the tip is half-way from the ring to the coupling, lest it sweeps across the basket:
 
@@ -45,6 +46,10 @@ class PlanSettings:
     half_way_s: float = 0.1  # from the ring to the coupling
     contact_s: float = 0.12  # s: the way from the ring to the coupling takes 0.2 s
     on_the_way: float = 0.03  # w_0: 1 m on the way counts like 0.06 m at contact
+    #: Of both limits, from `kept_back_s` on, on the way to contact: what is planned with all of them leaves nothing for
+    #: what was not foreseen, and the first jerks may still use all.
+    kept_back: float = 0.5
+    kept_back_s: float = 0.5  # a gust unforeseen is met by jerks within this time, or not at all
     iterations: int = 40  # of Eq. (3): the jerk is then 2 % of its limit off the exact one, on average
     error_max_m: float = 0.75  # a drogue farther off is gone to, not rushed at
 
@@ -69,6 +74,8 @@ class PathPlan:
         self._free = np.column_stack([np.ones(n), self._times, 0.5 * self._times**2])
         acceleration = acts * h * jerk_limit_m_s3 / acceleration_limit_m_s2
         self._C = np.vstack([np.eye(n), acceleration])
+        kept = settings.kept_back * np.minimum(h * (k - 1) / settings.kept_back_s, 1.0)
+        self._all, self._left = np.ones(2 * n), np.tile(1.0 - kept, 2)
         self._a_max = acceleration_limit_m_s2
         self._v, self._p = np.zeros(2 * n), np.zeros(2 * n)
 
@@ -85,10 +92,9 @@ class PathPlan:
         weights = np.ones(s.nodes) if to_contact_s is None else self._weights(to_contact_s)
         price = s.calm_price_s6 * self._jerk**2 if calm else s.jerk_price_m2
         off = self._free @ x - places_m
-        share = float(
-            _first(self._place, self._C, weights, off, x[2] / self._a_max, price, self._v, self._p, s.iterations)
-        )
-        return share * self._jerk
+        limits = self._all if to_contact_s is None else self._left
+        ways = self._place, self._C, weights, off, x[2] / self._a_max, limits
+        return float(_first(*ways, price, self._v, self._p, s.iterations)) * self._jerk
 
     def _weights(self, to_contact_s: float) -> Array:
         """(N,) Eq. (2); a contact that is there already is met at the first node."""
@@ -99,7 +105,7 @@ class PathPlan:
 
 
 @njit(cache=True)
-def _first(G, C, w, off, a_0, price, v, p, iterations):  # type: ignore[no-untyped-def]
+def _first(G, C, w, off, a_0, limits, price, v, p, iterations):  # type: ignore[no-untyped-def]
     """First z of Eq. (1) by Eq. (3); v and p (2N,) go on in place."""
     n = G.shape[1]
     H = (G.T * w) @ G
@@ -114,6 +120,6 @@ def _first(G, C, w, off, a_0, price, v, p, iterations):  # type: ignore[no-untyp
         Cz = C @ z
         for i in range(2 * n):
             free = a_0 if i >= n else 0.0  # the acceleration that is there already, as a share of its limit
-            v[i] = min(max(Cz[i] + p[i] / q, -1.0 - free), 1.0 - free)
+            v[i] = min(max(Cz[i] + p[i] / q, -limits[i] - free), limits[i] - free)
             p[i] += q * (Cz[i] - v[i])
     return min(max(z[0], -1.0), 1.0)

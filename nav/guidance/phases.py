@@ -33,9 +33,9 @@ class PhaseLimits:
     station_m: float = 0.5  # assumed: astern, that is near enough to the stand-off point
     steady_along_m: float = 0.35  # assumed: twice the way that moderate gusts push receiver and drogue apart
     steady_sigma_m: float = 0.05  # assumed: a third of the 0.15 m that a contact may be off
-    capture_radius_m: float = 0.08  # assumed: of the following, half of the 0.15 m that a contact may be off
+    capture_radius_m: float = 0.10  # assumed: of the following, two thirds of the 0.15 m that a contact may be off
     patience_s: float = 60.0  # assumed: some swings' worth of gusts; who has waited so long for a calm moment ...
-    late_radius: float = 1.5  # ... closes within so many times that radius, which grows on the way there
+    late_radius: float = 1.3  # ... closes within so many times that radius and that swing, which grow on the way there
     waiting_s: float = 60.0  # assumed: gusts that pass by have passed; a retry would wait as long
     inside_s: float = 1.0  # assumed: the way from the ring to the coupling takes 0.2 s
     coupling_reached_m: float = 0.05  # assumed: the coupling takes the tip within 0.03 m, the range errs by 0.02 m

@@ -51,6 +51,11 @@ class Pid:
         """Always: it does not know."""
         return True
 
+    @property
+    def unrest(self) -> float:
+        """None: it does not tell a swing from a drift."""
+        return 0.0
+
     def error_to_come(self, aim_m: Array) -> Array:
         """(2,) off the drogue across, now: it has no better idea."""
         return np.asarray(self._place[1:] + aim_m)

@@ -70,6 +70,7 @@ class Predictive:
         self._ahead: tuple[Array, Array, Array] = (np.zeros(3), np.zeros(3), np.zeros(3))
         self._path: Array = np.zeros((plan.nodes, 3))
         self._u_dot: Array = np.zeros(3)
+        self._calm = np.array(settings.calm_share) * acceleration_limit_m_s2[1:]
         self._bearable = (settings.bearable_share * acceleration_limit_m_s2[1:]) ** 2
         self._asked = _AT_FIRST * self._bearable  # mean square of the drogue's acceleration, left and up
         self._gusts: Array = np.zeros(2)  # the same over some swings more, beginning at nothing ...
@@ -116,6 +117,11 @@ class Predictive:
     def bears_the_gusts(self) -> bool:
         """Whether the swings of the last half minute ask for no more than can be followed."""
         return bool((self._gusts <= self._gusts_seen * self._bearable).all())
+
+    @property
+    def unrest(self) -> float:
+        """The swing of now, of one that leaves the receiver room for what nobody foresees on the last metre."""
+        return float((self._motion.swing_m_s2[1:] / self._calm).max())
 
     def error_to_come(self, aim_m: Array) -> Array:
         """(2,) off the drogue across, when what has been commanded has been flown."""

@@ -201,7 +201,7 @@ def test_in_a_turn_that_is_not_quite_the_announced_one_the_probe_meets_the_drogu
             late.append(np.abs(change - command.acceleration_m_s2).max())
         if plant.latched:
             across.append(plant.tip_T[1:])
-        if guidance._committed:  # the drogue is pushed about from now on
+        if guidance._closure.committed:  # the drogue is pushed about from now on
             learnt.add(guidance._path._e)
     assert guidance.phase is Phase.DISCONNECT
     assert plant.offset_m < 0.03

@@ -101,7 +101,7 @@ def test_docks_through_every_phase_whatever_the_bias_of_the_velocity(bias, setti
     phases, take_in = fly(plant, settings=settings)
     assert phases == DOCKING
     assert 1.1 < plant.crossings[0][1] < 1.3
-    assert plant.radial_at_contact < 0.04
+    assert plant.radial_at_contact < (0.04 if settings is SETTINGS else 0.5 * settings.limits.capture_radius_m)
     assert np.abs(take_in - SETTINGS.limits.take_in_m).max() < 0.5
 
 
@@ -131,7 +131,8 @@ def test_the_longer_a_calm_moment_is_waited_for_the_less_calm_it_has_to_be():
     rms_m = float(np.sqrt(np.mean(np.sum(np.square(np.array(seen)[10 * RATE_HZ :, 1:]), axis=1))))
     begun = []
     for seconds, late_radius in ((50.0, 1.0), (10.0, 1.5), (50.0, 1.5)):
-        limits = PhaseLimits(capture_radius_m=rms_m / 1.35, patience_s=40.0, late_radius=late_radius)
+        radius_m = rms_m / 1.35 / PID.closing.hopeful  # an approach is begun when a good moment may come on the way
+        limits = PhaseLimits(capture_radius_m=radius_m, patience_s=40.0, late_radius=late_radius)
         phases, _ = fly(Plant(drogue=_swing), seconds, dataclasses.replace(PID, limits=limits))
         begun.append(Phase.APPROACH in phases)
     assert begun == [False, False, True]
@@ -282,7 +283,7 @@ def test_a_receiver_that_came_to_a_stand_close_in_falls_back_for_room_to_close()
 
     def doubted(s):
         distances.append(s.p_PD_B[0])
-        return dataclasses.replace(s, contact_usable=bool(s.p_PD_B[0] > 2.6 or plant.t > 25.0))
+        return dataclasses.replace(s, contact_usable=bool(min(distances) > 2.6 or plant.t > 25.0))
 
     limits = dataclasses.replace(SETTINGS.limits, lost_range_m=0.5)
     fly(plant, seen=doubted, settings=dataclasses.replace(SETTINGS, limits=limits))

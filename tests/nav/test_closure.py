@@ -1,0 +1,80 @@
+"""The closure speed and the last moment, on a tip that answers late."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from dockair.nav.guidance.closing import ClosingSettings
+from dockair.nav.guidance.closure import Closure
+
+SETTINGS, STEP_S, FULL_M_S, RAMP_M_S2 = ClosingSettings(), 0.01, 1.2, 0.6
+LAG_S, BRAKES_M_S2 = 0.3, 0.75
+
+
+def _flown(moment, seconds=60.0, settings=SETTINGS, start_m=4.0, blown_m_s=0.0):
+    """Distance and speed tick by tick of a tip with a first-order lag; `moment(t, distance)` says miss and unrest."""
+    closure, distance, speed, out = Closure(settings, FULL_M_S, RAMP_M_S2, STEP_S), start_m, blown_m_s, []
+    for i in range(round(seconds / STEP_S)):
+        miss, unrest = moment(i * STEP_S, distance)
+        closure.step(distance, speed, known=np.isfinite(miss), miss=miss, unrest=unrest)
+        wanted = (closure.speed_m_s + blown_m_s - speed) / LAG_S
+        speed += STEP_S * float(np.clip(wanted, -BRAKES_M_S2, BRAKES_M_S2))
+        distance -= STEP_S * speed
+        out.append((distance, speed, closure.committed))
+        if distance <= 0.0:
+            break
+    return np.array(out)
+
+
+def test_in_calm_air_it_closes_without_a_halt_and_arrives_at_full_speed():
+    path = _flown(lambda t, d: (0.5, 0.5))
+    assert path[-1, 0] <= 0.0
+    assert path[-1, 1] == pytest.approx(FULL_M_S, abs=0.1)
+    assert len(path) * STEP_S < 6.5
+
+
+@pytest.mark.parametrize(("miss", "unrest"), [(1.3, 0.5), (0.5, 1.3), (float("nan"), 0.5)])
+def test_a_moment_that_is_not_good_at_the_last_is_called_back_short_of_the_ring(miss, unrest):
+    path = _flown(lambda t, d: (0.5, 0.5) if d > 1.8 else (miss, unrest), 12.0)
+    assert not path[:, 2].any()
+    assert 0.2 < path[:, 0].min() < 1.5
+    assert path[:, 0].max() <= 4.0
+    assert path[path[:, 0].argmin() :, 0].max() > SETTINGS.wait_at_m
+
+
+def test_called_back_it_runs_up_again_and_meets_the_next_good_moment_at_speed():
+    path = _flown(lambda t, d: (0.5, 1.3 if t < 8.0 and d < 1.8 else 0.5))
+    turned = path[:, 0].argmin() if path[-1, 0] > 0.0 else path[: round(8.0 / STEP_S), 0].argmin()
+    assert path[turned, 0] > 0.2
+    assert path[-1, 0] <= 0.0
+    assert path[-1, 1] > 1.0
+
+
+def test_a_moment_that_turns_good_too_near_is_not_taken_slowly():
+    path = _flown(lambda t, d: (2.5 if d < 1.9 and t < 5.0 else 0.5, 0.5))
+    assert path[-1, 1] > 1.0
+    assert path[np.flatnonzero(path[:, 2])[0], 0] > 0.9
+
+
+def test_once_committed_nothing_calls_it_back():
+    path = _flown(lambda t, d: (0.5, 0.5) if d > 1.2 else (9.0, 9.0), 8.0)
+    assert path[-1, 0] <= 0.0
+    assert path[-1, 1] > 1.0
+
+
+def test_a_standing_receiver_waits_for_calm_and_a_running_one_for_hope():
+    standing = _flown(lambda t, d: (0.5, 1.2), 10.0)
+    assert np.ptp(standing[:, 0]) < 1e-9
+    running = _flown(lambda t, d: (0.5, 0.9 if t < 1.0 else 1.2), 3.0)
+    assert running[-1, 1] > 0.7
+
+
+def test_a_tip_that_is_blown_closer_is_called_back_earlier():
+    def late(t, d):
+        return (0.5, 0.5) if d > 1.95 else (1.3, 0.5)
+
+    near = [_flown(late, 9.0, blown_m_s=v)[:, 0].min() for v in (0.0, 0.2)]
+    assert near[1] > 0.1
+    blind = dataclasses.replace(SETTINGS, recall_m=0.0)
+    assert _flown(late, 9.0, blind)[:, 0].min() < near[0]
