@@ -37,6 +37,7 @@ from dockair.sim.air.motion import AirState
 from dockair.sim.aircraft.tanker import TankerPath, TankerPathParameters
 from dockair.sim.hose.coupling import CouplingState, next_coupling_state, probe_in_coupling, stays
 from dockair.sim.hose.fuel import Fuel
+from dockair.sim.hose.probe_push import probe_push
 from dockair.sim.hose.reel import Reel, reel_light
 from dockair.sim.hose.rest import hinge_angles
 from dockair.sim.hose.tow import Tow
@@ -240,7 +241,10 @@ class World:
             raise DivergedError("world", expected="a physics step that converges", got=f"diverged at {time_s:.3f} s")
         pull = 0.0
         if self._coupling is CouplingState.LATCHED:  # its three rows come first: it is the only equality
-            pull = float(data.efc_force[:3] @ self.truth.R_WD[:, 0])
+            held = data.efc_force[:3]
+            if data.ncon:
+                held = held - probe_push(model, data, self._at.geom_is_probe, self._at.geom_is_drogue)
+            pull = float(held @ self.truth.R_WD[:, 0])
         self._tensions = root, drogue, pull
         mujoco.mj_implicit(model, data)
 

@@ -83,6 +83,22 @@ def test_basket_leads_a_probe_that_comes_in_beside_the_centre_to_the_coupling(ma
     np.testing.assert_allclose(truth.p_DP, [COUPLING.depth_m, 0.0, 0.0], atol=0.005)
 
 
+@pytest.mark.parametrize(
+    ("y", "z", "nose_down_deg", "speed"),
+    [(0.0, 0.1, 6.0, 1.0), (0.1, 0.1, 6.0, 1.5), (0.1, -0.1, -6.0, 1.5), (0.2, 0.0, 0.0, 2.2), (0.0, -0.1, 0.0, 2.2)],
+)
+def test_a_nozzle_taken_while_it_presses_on_the_bottom_is_not_thrown_out_by_that(
+    make_world, receiver_on_rails, y, z, nose_down_deg, speed
+):
+    """Latch and bottom then strain against each other with kilonewtons, more than the release force."""
+    pitch_rad = np.deg2rad(nose_down_deg)
+    world, truth, _ = _fly_in(make_world, receiver_on_rails, y=y, z=z, speed=speed, pitch_rad=pitch_rad)
+    assert truth.latched
+    for _ in range(60):
+        truth = world.step(ReceiverCommand(velocity_m_s=np.array([speed, 0.0, 0.0])))
+        assert truth.latched
+
+
 @pytest.mark.parametrize("direction_deg", np.arange(0.0, 360.0, 45.0))
 def test_basket_leads_a_fast_probe_to_the_coupling_from_any_side(make_world, receiver_on_rails, direction_deg):
     """Just under the limit of the closing speed: the blow turns the drogue, which takes it once it is in line again."""
