@@ -9,8 +9,6 @@ STEP_S, BANDWIDTH = 1e-3, 20.0
 STOPS = np.array([0.4, 0.35, 0.5])
 RATES = np.array([1.0, 1.4, 2.0])  # asked for by 0.05, 0.07 and 0.1 rad
 CALM = np.zeros(3)
-UP, LEFT = 2, 1
-MOVES = {0: UP, 1: LEFT, 2: LEFT}  # elevator, aileron, rudder
 
 
 @pytest.fixture
@@ -21,17 +19,15 @@ def relief():
 
 def test_surfaces_that_keep_up_leave_the_reference_alone(relief):
     just_inside = 0.999 * RATES / BANDWIDTH
-    assert all((relief.step(just_inside, CALM, CALM) == 1.0).all() for _ in range(2000))
+    assert all(relief.step(just_inside, CALM, CALM) == 1.0 for _ in range(2000))
     assert relief.haste == 0.0
 
 
 @pytest.mark.parametrize("surface", range(3))
-def test_a_surface_at_its_rate_takes_back_what_it_moves_and_nothing_else(relief, surface):
+def test_any_surface_at_its_rate_takes_the_reference_back(relief, surface):
     asked = CALM.copy()
     asked[surface] = -1.001 * RATES[surface] / BANDWIDTH
-    shares = relief.step(asked, CALM, CALM)
-    assert (shares < 1.0).tolist() == [axis == MOVES[surface] for axis in range(3)]
-    assert relief.haste == pytest.approx((1.0 - shares.min()) / 0.8)
+    assert relief.step(asked, CALM, CALM) < 1.0
 
 
 @pytest.mark.parametrize("surface", range(3))
@@ -39,18 +35,17 @@ def test_a_surface_at_its_rate_takes_back_what_it_moves_and_nothing_else(relief,
 def test_a_surface_near_its_stop_takes_the_reference_back_the_model_s_too(relief, surface, sign):
     at = CALM.copy()
     at[surface] = sign * 0.899 * STOPS[surface]
-    assert (relief.step(at, at, at) == 1.0).all()
+    assert relief.step(at, at, at) == 1.0
     at[surface] = sign * 0.901 * STOPS[surface]
-    axis = MOVES[surface]
-    assert relief.step(CALM, CALM, at)[axis] < 1.0
-    again = relief.step(at, at, CALM)[axis]
-    assert again < relief.step(CALM, CALM, CALM)[axis] < 1.0
+    assert relief.step(CALM, CALM, at) < 1.0
+    again = relief.step(at, at, CALM)
+    assert again < relief.step(CALM, CALM, CALM) < 1.0
 
 
 def test_the_share_falls_as_the_equations_say(relief):
     """b = 1 - exp(-t/T) while busy; the share is 1 - 0.8 b / 0.4, and no less than 0.2."""
     asked = np.array([0.2, 0.0, 0.0])
-    shares = [relief.step(asked, CALM, CALM)[UP] for _ in range(600)]
+    shares = [relief.step(asked, CALM, CALM) for _ in range(600)]
     t = STEP_S * np.arange(1, 601)
     expected = 1.0 - 0.8 * np.minimum((1.0 - np.exp(-t / 0.5)) / 0.4, 1.0)
     np.testing.assert_allclose(shares, expected, atol=1e-9)
@@ -58,17 +53,8 @@ def test_the_share_falls_as_the_equations_say(relief):
     assert relief.haste == 1.0
 
 
-def test_both_ways_are_relieved_by_themselves_and_the_feedback_by_the_worse(relief):
-    for _ in range(100):
-        relief.step(np.array([0.2, 0.0, 0.0]), CALM, CALM)
-    for _ in range(20):
-        shares = relief.step(np.array([0.0, 0.2, 0.0]), CALM, CALM)
-    assert shares[UP] < shares[LEFT] < shares[0] == 1.0
-    assert relief.haste == pytest.approx((1.0 - shares[UP]) / 0.8)
-
-
 def test_it_comes_back_when_the_surfaces_keep_up_again(relief):
     for _ in range(600):
         relief.step(np.array([0.2, 0.0, 0.0]), CALM, CALM)
-    later = [relief.step(CALM, CALM, CALM)[UP] for _ in range(3000)]
+    later = [relief.step(CALM, CALM, CALM) for _ in range(3000)]
     assert np.all(np.diff(later) >= 0.0) and later[-1] > 0.99
