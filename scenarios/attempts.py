@@ -18,8 +18,9 @@ from enum import Enum
 
 import numpy as np
 
-from dockair.rotations import Array, cross
+from dockair.rotations import Array
 from dockair.sim.truth import Truth
+from dockair.vectors import cross
 
 ATTEMPTING = ("approach", "contact")  # phases in which the receiver tries
 

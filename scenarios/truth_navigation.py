@@ -11,8 +11,8 @@ import numpy as np
 from dockair.calibration import NavigationSheets
 from dockair.messages import CameraFrame, ImuSample, NavSolution, TankerAnnouncement
 from dockair.nav.guidance.approach import Guidance, GuidanceSettings, RelativeState
-from dockair.rotations import cross
 from dockair.sim.truth import Truth
+from dockair.vectors import cross
 
 
 class TruthNavigator:

@@ -11,11 +11,12 @@ does to the acceleration in between is nothing (`scene`).
 import mujoco
 from numba import njit
 
-from dockair.rotations import Array, cross
+from dockair.rotations import Array
 from dockair.sim.addresses import Addresses
 from dockair.sim.aircraft.tanker import TankerPath
 from dockair.sim.aircraft.tanker_motion import OMEGA, P, R, V
 from dockair.sim.hose.tow import PodMotion
+from dockair.vectors import cross
 
 
 class LedTanker:

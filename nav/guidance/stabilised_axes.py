@@ -20,7 +20,8 @@ import math
 import numpy as np
 from numba import njit
 
-from dockair.rotations import Array, cross
+from dockair.rotations import Array
+from dockair.vectors import cross
 
 
 class StabilisedAxes:

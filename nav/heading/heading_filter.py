@@ -38,7 +38,8 @@ from dockair.calibration import GyroSheet, Mounting
 from dockair.errors import DockairError
 from dockair.messages import ImuSample
 from dockair.nav.heading.levelling import without_yaw
-from dockair.rotations import Array, cross, exp, skew
+from dockair.rotations import Array, exp, skew
+from dockair.vectors import cross
 
 __all__ = ["HeadingFilter", "HeadingFilterSettings"]
 

@@ -22,8 +22,8 @@ from enum import Enum
 
 import numpy as np
 
-from dockair.rotations import cross
 from dockair.sim.truth import Truth
+from dockair.vectors import cross
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

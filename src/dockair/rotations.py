@@ -12,7 +12,6 @@ All frames are forward-left-up; aircraft tables are forward-right-down: `FLU_FRO
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
@@ -27,12 +26,6 @@ def skew(v: Array) -> Array:
     """(3, 3) matrix of v x ( . ), for v of shape (3,)."""
     x, y, z = v
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-
-
-@njit(cache=True)
-def cross(a: Array, b: Array) -> Array:
-    """(3,) a x b; numpy's own takes ten times as long for one pair of vectors."""
-    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
 
 
 def exp(phi: Array) -> Array:

@@ -8,7 +8,6 @@ from scipy.spatial.transform import Rotation
 from dockair.rotations import (
     FLU_FROM_FRD,
     Array,
-    cross,
     exp,
     log,
     matrix_from_mrp,
@@ -127,9 +126,3 @@ def test_frd_conversion_is_its_own_inverse_and_a_rotation():
     np.testing.assert_array_equal(FLU_FROM_FRD @ FLU_FROM_FRD, np.eye(3))
     assert np.linalg.det(FLU_FROM_FRD) == 1.0
     np.testing.assert_array_equal(FLU_FROM_FRD @ [1.0, 2.0, 3.0], [1.0, -2.0, -3.0])
-
-
-def test_cross_is_the_right_handed_one():
-    np.testing.assert_array_equal(cross(np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])), [0.0, 0.0, 1.0])
-    a, b = np.random.default_rng(2).normal(size=(2, 3))
-    np.testing.assert_allclose(cross(a, b), np.cross(a, b), rtol=1e-12)

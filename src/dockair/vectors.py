@@ -1,0 +1,12 @@
+"""Kernels on single vectors; apart from `rotations`, which commands that must be quick load without numba."""
+
+import numpy as np
+from numba import njit
+
+from dockair.rotations import Array
+
+
+@njit(cache=True)
+def cross(a: Array, b: Array) -> Array:
+    """(3,) a x b; numpy's own takes ten times as long for one pair of vectors."""
+    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
