@@ -30,7 +30,7 @@ Real = float | np.float32
 EXACT_BELOW_E = 4.0  #: read noise [e-] under which shot noise is drawn from the exact law
 POISSON_LIMIT = 30.0  #: electrons above which the exact law gives way to a normal number with the right skew
 _STEPS = 4  # tabled Poisson laws per electron
-_LANES = 16  # pixels that are worked on at once
+_LANES = 64  # pixels that are worked on at once
 _GUIDE = 64  # cells of the guide into each tabled law
 
 #: ln(1 + m) on [sqrt(1/2) - 1, sqrt(2) - 1] to 9e-6; highest power first.

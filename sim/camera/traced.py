@@ -36,6 +36,7 @@ _ALONG = _F(1e-30)  # least squared component across a tube, of a ray that runs 
 _LANES = 16  # rays that are taken at once
 
 Row = NDArray[np.float32]
+Where = tuple[np.uint64, np.uint64, np.uint64]
 Triple = tuple[float, float, float]
 Single = tuple[np.float32, np.float32, np.float32]
 #: Of one row, in a solid's axes and units: o; d = a + x b; w = p + x q.
@@ -140,16 +141,18 @@ def _trace(
             reach[i, 0], reach[i, 1] = min(reach[i, 0], left), max(reach[i, 1], right)
             a = (ahead[0] + y[i] * down[0], ahead[1] + y[i] * down[1], ahead[2] + y[i] * down[2])
             rays = _single(o), _single(a), _single(across), _single(_cross(o, a)), _single(q)
-            part, picture, depths = tangents[left:right], out[i, left:right], nearest[i, left:right]
-            shade = _F(reflectances[g]), _F(light[0]), _F(light[1]), _F(near)
+            shade, where = (
+                (_F(reflectances[g]), _F(light[0]), _F(light[1]), _F(near)),
+                (np.uint64(i), np.uint64(left), np.uint64(right)),
+            )
             if kind == BALL:
-                _draw_ball(rays, inverse, sun, shade, part, picture, depths)
+                _draw_ball(rays, inverse, sun, shade, tangents, out, nearest, where)
             elif kind == BOX:
-                _draw_box(rays, sun, shade, part, picture, depths)
+                _draw_box(rays, sun, shade, tangents, out, nearest, where)
             elif kind == CAPSULE:
-                _draw_capsule(rays, half, sun, shade, part, picture, depths)
+                _draw_capsule(rays, half, sun, shade, tangents, out, nearest, where)
             else:
-                _draw_cylinder(rays, half, sun, shade, part, picture, depths)
+                _draw_cylinder(rays, half, sun, shade, tangents, out, nearest, where)
 
 
 @njit(cache=True)
@@ -178,31 +181,39 @@ def _single(a: Triple) -> Single:
 
 
 @njit(cache=True, error_model="numpy")
-def _draw_ball(rays: Rays, inverse: Single, sun: Single, shade: Shade, x: Row, out: Row, nearest: Row) -> None:
-    for j in range(x.shape[0]):
+def _draw_ball(rays: Rays, inverse: Single, sun: Single, shade: Shade, x: Row, out: NDArray[np.float32], nearest: NDArray[np.float32], where: Where) -> None:
+    row, left, right = where
+    for k in range(right - left):
+        j = left + np.uint64(k)
         t, cos = _enter_ball(rays, inverse, sun, x[j])
-        out[j], nearest[j] = _lay_over(t, cos, shade, out[j], nearest[j])
+        out[row, j], nearest[row, j] = _lay_over(t, cos, shade, out[row, j], nearest[row, j])
 
 
 @njit(cache=True, error_model="numpy")
-def _draw_capsule(rays: Rays, half: np.float32, sun: Single, shade: Shade, x: Row, out: Row, nearest: Row) -> None:
-    for j in range(x.shape[0]):
+def _draw_capsule(rays: Rays, half: np.float32, sun: Single, shade: Shade, x: Row, out: NDArray[np.float32], nearest: NDArray[np.float32], where: Where) -> None:
+    row, left, right = where
+    for k in range(right - left):
+        j = left + np.uint64(k)
         t, cos = _enter_capsule(rays, half, sun, x[j])
-        out[j], nearest[j] = _lay_over(t, cos, shade, out[j], nearest[j])
+        out[row, j], nearest[row, j] = _lay_over(t, cos, shade, out[row, j], nearest[row, j])
 
 
 @njit(cache=True, error_model="numpy")
-def _draw_cylinder(rays: Rays, half: np.float32, sun: Single, shade: Shade, x: Row, out: Row, nearest: Row) -> None:
-    for j in range(x.shape[0]):
+def _draw_cylinder(rays: Rays, half: np.float32, sun: Single, shade: Shade, x: Row, out: NDArray[np.float32], nearest: NDArray[np.float32], where: Where) -> None:
+    row, left, right = where
+    for k in range(right - left):
+        j = left + np.uint64(k)
         t, cos = _enter_cylinder(rays, half, sun, x[j])
-        out[j], nearest[j] = _lay_over(t, cos, shade, out[j], nearest[j])
+        out[row, j], nearest[row, j] = _lay_over(t, cos, shade, out[row, j], nearest[row, j])
 
 
 @njit(cache=True, error_model="numpy")
-def _draw_box(rays: Rays, sun: Single, shade: Shade, x: Row, out: Row, nearest: Row) -> None:
-    for j in range(x.shape[0]):
+def _draw_box(rays: Rays, sun: Single, shade: Shade, x: Row, out: NDArray[np.float32], nearest: NDArray[np.float32], where: Where) -> None:
+    row, left, right = where
+    for k in range(right - left):
+        j = left + np.uint64(k)
         t, cos = _enter_box(rays, sun, x[j])
-        out[j], nearest[j] = _lay_over(t, cos, shade, out[j], nearest[j])
+        out[row, j], nearest[row, j] = _lay_over(t, cos, shade, out[row, j], nearest[row, j])
 
 
 @njit(cache=True, error_model="numpy", inline="always")
