@@ -103,7 +103,7 @@ def _pieces(spot: Spot, box: Box, lamp: Lamp, limits: Limits, lobe: Lobe, row: A
     for k in range(pieces):
         low = box[0] if k == 0 else middle + (k / pieces - 0.5) * long
         high = box[1] if k == pieces - 1 else middle + ((k + 1) / pieces - 0.5) * long
-        part = _lobe(spot, (low, high, box[2], box[3]), light, eye, finish, limits[0])
+        part = _lobe(spot, (low, high, box[2], box[3]), light, eye, finish, limits[0]) if pieces > 1 else lobe
         if part[0] > 0.0 and count < len(rows):
             _write(rows[count], spot, part, row[20], row[21])
             count += 1
