@@ -142,10 +142,10 @@ def _wanted(
 ) -> NDArray[np.bool_]:
     """(m, n) which pairs may be above the limit."""
     bound = _bound(mirrors, poses, leds_W, axis, eye, finish, side)
-    out = np.empty(bound.shape, dtype=np.bool_)
-    for j in range(len(bound)):
-        for i in range(bound.shape[1]):
-            out[j, i] = bound[j, i] * intensity_w_sr[j] >= limit
+    out = np.empty(bound.shape[::-1], dtype=np.bool_)
+    for i in range(len(bound)):
+        for j in range(bound.shape[1]):
+            out[j, i] = bound[i, j] * intensity_w_sr[j] >= limit
     return out
 
 
@@ -153,55 +153,52 @@ def _wanted(
 def _bound(
     mirrors: tuple[Balls, Tubes], poses: Poses, leds_W: Array, axis: Vector, eye: Vector, finish: Array, side: float
 ) -> Array:
-    """(m, balls + tubes) what A I(psi)/(I_0 d1^2) cannot exceed, Eqs. (1) and (2)."""
+    """(balls + tubes, m) what A I(psi)/(I_0 d1^2) cannot exceed, Eqs. (1) and (2).
+
+    Each solid's row is worked out without branches, all LEDs at once.
+    """
     balls, tubes = mirrors
-    bound = np.empty((len(leds_W), len(balls.geom) + len(tubes.geom)))
-    _bound_of_balls(balls, poses, leds_W, axis, finish, side, bound)
-    _bound_of_tubes(tubes, poses, leds_W, axis, eye, finish, side, bound[:, len(balls.geom) :])
+    bound, places = np.empty((len(balls.geom) + len(tubes.geom), len(leds_W))), leds_W.T.copy()
+    _bound_of_balls(balls, poses, places, axis, finish, side, bound)
+    _bound_of_tubes(tubes, poses, places, axis, eye, finish, side, bound[len(balls.geom) :])
     return bound
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _bound_of_balls(
     balls: Balls, poses: Poses, leds_W: Array, axis: Vector, finish: Array, side: float, bound: Array
 ) -> None:
-    xpos, xmat = poses
+    (xpos, xmat), (x, y, z) = poses, (leds_W[0], leds_W[1], leds_W[2])
     for i in range(len(balls.geom)):
-        g, radius = balls.geom[i], balls.axes[i].max()
+        g, radius, at_z = balls.geom[i], balls.axes[i].max(), balls.at_z[i]
         most = finish[balls.material[i], 2] * radius**2 / 4.0
-        for j in range(len(leds_W)):
-            p = _from_led(xpos[g], xmat[g], balls.at_z[i], leds_W[j])
+        centre, row = (
+            (xpos[g, 0] + at_z * xmat[g, 2], xpos[g, 1] + at_z * xmat[g, 5], xpos[g, 2] + at_z * xmat[g, 8]),
+            bound[i],
+        )
+        for j in range(len(row)):
+            p = (centre[0] - x[j], centre[1] - y[j], centre[2] - z[j])
             d = max(math.sqrt(_dot(p, p)) - radius, _CLOSEST_M)
-            bound[j, i] = (1.0 if _dot(p, axis) + radius > 0.0 else side) * most / d**2
+            row[j] = (1.0 if _dot(p, axis) + radius > 0.0 else side) * most / d**2
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _bound_of_tubes(
     tubes: Tubes, poses: Poses, leds_W: Array, axis: Vector, eye: Vector, finish: Array, side: float, bound: Array
 ) -> None:
-    xpos, xmat = poses
+    (xpos, xmat), (x, y, z) = poses, (leds_W[0], leds_W[1], leds_W[2])
     for i in range(len(tubes.geom)):
         g, radius, half = tubes.geom[i], tubes.radius[i], tubes.half_length[i]
-        z = (xmat[g, 2], xmat[g, 5], xmat[g, 8])
-        reach, most = half * abs(_dot(z, axis)) + radius, 0.5 * finish[tubes.material[i], 2] * radius
-        for j in range(len(leds_W)):
-            p = _from_led(xpos[g], xmat[g], 0.0, leds_W[j])
-            along = _dot(p, z)
+        a, row = (xmat[g, 2], xmat[g, 5], xmat[g, 8]), bound[i]
+        reach, most = half * abs(_dot(a, axis)) + radius, 0.5 * finish[tubes.material[i], 2] * radius
+        for j in range(len(row)):
+            p = (xpos[g, 0] - x[j], xpos[g, 1] - y[j], xpos[g, 2] - z[j])
+            along = _dot(p, a)
             across2 = max(_dot(p, p) - along**2, 0.0)
             d = max(math.sqrt(across2 + max(abs(along) - half, 0.0) ** 2) - radius, _CLOSEST_M)
-            sight = (eye[0] - leds_W[j, 0], eye[1] - leds_W[j, 1], eye[2] - leds_W[j, 2])
-            sin2_c = max(1.0 - _dot(sight, z) ** 2 / _dot(sight, sight), _CLOSEST_M**2)
-            bound[j, i] = (1.0 if _dot(p, axis) + reach > 0.0 else side) * most / (math.sqrt(sin2_c) * d)
-
-
-@njit(cache=True)
-def _from_led(place: Array, turn: Array, at_z: float, led_W: Array) -> Vector:
-    """From an LED to a point on the z axis of a geom at `place` (3,), turned by `turn` (9,)."""
-    return (
-        place[0] + at_z * turn[2] - led_W[0],
-        place[1] + at_z * turn[5] - led_W[1],
-        place[2] + at_z * turn[8] - led_W[2],
-    )
+            sight = (eye[0] - x[j], eye[1] - y[j], eye[2] - z[j])
+            sin2_c = max(1.0 - _dot(sight, a) ** 2 / _dot(sight, sight), _CLOSEST_M**2)
+            row[j] = (1.0 if _dot(p, axis) + reach > 0.0 else side) * most / (math.sqrt(sin2_c) * d)
 
 
 @njit(cache=True)
