@@ -198,7 +198,8 @@ def _mark(sides: Array, a: Point, b: Point, y: Array, rows: Even) -> None:
             sides[0, i], sides[1, i] = min(sides[0, i], left), max(sides[1, i], right)
         return
     slope = (b[0] - a[0]) / (b[1] - a[1])
-    for i in range(row, stop):
+    for k in range(row, stop):
+        i = np.uint64(k)
         at = min(max(a[0] + (y[i] - a[1]) * slope, left), right)
         sides[0, i], sides[1, i] = min(sides[0, i], at), max(sides[1, i], at)
 
