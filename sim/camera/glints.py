@@ -133,7 +133,7 @@ def glint_rows(
     )
     balls, tubes = mirrors.balls, mirrors.tubes
     spots = np.empty((mirrors.all_wanted.size + 2, SPOT))
-    n = round_spots(balls, tubes, xpos, xmat, sun, 0.0, mirrors.all_wanted, eye, spots)
+    n = round_spots(balls, tubes, xpos, xmat, sun, 0.0, mirrors.all_wanted, eye, finish, variance, spots)
     if mirrors.any_ellipsoids:
         n += ellipsoid_spots(balls, xpos, xmat, sun, 0.0, eye, spots[n:])
     if mirrors.rim is not None:

@@ -225,11 +225,12 @@ def _rows(
     balls, tubes = mirrors.near_balls, mirrors.near_tubes
     xpos, xmat = data.geom_xpos, data.geom_xmat
     spots = np.empty((wanted.size + 2 * len(leds_W), SPOT))
-    n = round_spots(balls, tubes, xpos, xmat, leds_W, 1.0, wanted, eye, spots)
+    finish = finishes(surfaces)
+    n = round_spots(balls, tubes, xpos, xmat, leds_W, 1.0, wanted, eye, finish, 0.0, spots)
     if mirrors.any_ellipsoids:
         n += ellipsoid_spots(balls, xpos, xmat, leds_W, 1.0, eye, spots[n:])
     if mirrors.rim is not None:
         n += rim_spots(mirrors.rim.torus_W(data), float(METAL), mirrors.rim.skin_m, leds_W, 1.0, eye, spots[n:])
     limits = (math.cos(surfaces.grazing_rad), 0.0, 0.0, math.inf)
     rows = np.empty((n, ROW))
-    return rows[: spot_rows(spots[:n], leds_W, 1.0, 0.0, eye, finishes(surfaces), limits, rows, 0)]
+    return rows[: spot_rows(spots[:n], leds_W, 1.0, 0.0, eye, finish, limits, rows, 0)]

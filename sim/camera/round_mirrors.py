@@ -10,7 +10,8 @@ along the axis the ray goes straight on: at shares l_s : l_c of the projected le
 
     z = (z_s l_c + z_c l_s)/(l_s + l_c),    Sun: z = z_c + l_c (s.a)/|s - s.a a|                                  (2)
 
-A tube that ends before that is taken at its end. Everything here is in W. Source: law of reflection.
+A tube that ends before that is taken at its end. A tube whose facets would have to lean so far along its axis that next
+to none do is left out before. Everything here is in W. Source: law of reflection.
 """
 
 import math
@@ -27,9 +28,11 @@ _SMALL = 0.01  # angles [rad] whose series end within 1e-15
 _CLOSE = 1e-8  # after a step so short the rest is its square
 _EVERYWHERE = 1e9  # [m], for surfaces without edges
 _SKIN_M = 1e-3  # a ray that starts on a surface starts this far off it
-_STEEP = 0.87  # cosine between h and a tube's axis from which h.n < 1/2 around it, the limit of `lobes`
+_STEEPEST = 1.765  # slope along a tube from which h.n < 1/2 around it, the limit of `lobes`
+_MOST_SIGMAS = 7.0  # of slopes: less than 1e-9 of the facets lean farther, `lobes` leaves out such shares
 
 Vector = tuple[float, float, float]
+Spread = tuple[float, float]  # rms slope of a finish; of the light, half the Sun's angular radius [rad]
 
 
 @njit(cache=True)
@@ -42,6 +45,8 @@ def round_spots(
     point: float,
     wanted: NDArray[np.bool_],
     eye: Vector,
+    finishes: Array,
+    variance: float,
     spots: Array,
 ) -> int:
     """Fill rows of `lobes.SPOT` columns with the mirror points; return how many.
@@ -55,86 +60,82 @@ def round_spots(
         point: 0 for directions, 1 for places.
         wanted: (m, balls + tubes) which pairs to look at.
         eye: the lens [m].
+        finishes: of `mirrors.finishes`.
+        variance: a^2/4 of [lobes, eq 3].
         spots: (at least m (balls + tubes), SPOT), written.
     """
-    count = 0
+    count, disc = 0, math.sqrt(variance)
     for j in range(len(lights)):
         toward = (lights[j, 0], lights[j, 1], lights[j, 2])
         for i in range(len(balls.geom)):
-            if wanted[j, i] and _ball_spot(balls, i, xpos, xmat, toward, point, eye, spots[count]):
-                spots[count, 21] = j
+            radius, g = balls.axes[i, 0], balls.geom[i]
+            if not (wanted[j, i] and radius == balls.axes[i, 1] == balls.axes[i, 2]):
+                continue
+            z = (xmat[g, 2], xmat[g, 5], xmat[g, 8])
+            centre = _add((xpos[g, 0], xpos[g, 1], xpos[g, 2]), balls.at_z[i], z)
+            found, n = _on_ball(centre, z, balls.side[i], radius, toward, point, eye)
+            if found:
+                p, (t1, t2), c, endless = _add(centre, radius, n), _frame(n), 1.0 / radius, (-_EVERYWHERE, _EVERYWHERE)
+                _write(spots, count, (p, n, t1, t2), (c, c), endless, balls.material[i], j)
                 count += 1
         for i in range(len(tubes.geom)):
-            if wanted[j, len(balls.geom) + i] and _tube_spot(tubes, i, xpos, xmat, toward, point, eye, spots[count]):
-                spots[count, 21] = j
+            if not wanted[j, len(balls.geom) + i]:
+                continue
+            g, radius, half, material = tubes.geom[i], tubes.radius[i], tubes.half_length[i], tubes.material[i]
+            axis, centre = (xmat[g, 2], xmat[g, 5], xmat[g, 8]), (xpos[g, 0], xpos[g, 1], xpos[g, 2])
+            to_light, to_eye, spread = _add(toward, -point, centre), _add(eye, -1.0, centre), (finishes[material, 3], disc)
+            if _is_steep(to_light, point, to_eye, axis, half + radius, spread):
+                continue
+            found, n, x = _on_tube(centre, axis, radius, half, toward, point, eye)
+            if found:
+                p, bounds = _add(_add(centre, x, axis), radius, n), (-half - x, half - x)
+                _write(spots, count, (p, n, axis, _cross(axis, n)), (0.0, 1.0 / radius), bounds, material, j)
                 count += 1
     return count
 
 
 @njit(cache=True)
-def _ball_spot(
-    balls: Balls, i: int, xpos: Array, xmat: Array, toward: Vector, point: float, eye: Vector, row: Array
-) -> bool:
-    g, axes = balls.geom[i], balls.axes[i]
-    if not axes[0] == axes[1] == axes[2]:
-        return False
-    z = (xmat[g, 2], xmat[g, 5], xmat[g, 8])
-    centre = _add((xpos[g, 0], xpos[g, 1], xpos[g, 2]), balls.at_z[i], z)
-    to_light, to_eye, side = _add(toward, -point, centre), _add(eye, -1.0, centre), balls.side[i]
+def _on_ball(
+    centre: Vector, z: Vector, side: float, radius: float, toward: Vector, point: float, eye: Vector
+) -> tuple[bool, Vector]:
+    """Whether there is a mirror point on the ball, or on its half toward z or -z, and its normal."""
+    to_light, to_eye = _add(toward, -point, centre), _add(eye, -1.0, centre)
     if side * _dot(to_light, z) < 0.0 and side * _dot(to_eye, z) < 0.0:
-        return False  # and so is the normal, which stands between them
-    found, n = _on_sphere(to_light, point, to_eye, axes[0])
-    if not found or side * _dot(n, z) < 0.0:
-        return False
-    t1, t2 = _frame(n)
-    c = 1.0 / axes[0]
-    _write(row, _add(centre, axes[0], n), n, t1, t2, (c, c), (-_EVERYWHERE, _EVERYWHERE), balls.material[i])
-    return True
+        return False, z  # for so is the normal, which stands between them
+    found, n = _on_sphere(to_light, point, to_eye, radius)
+    return found and side * _dot(n, z) >= 0.0, n
 
 
 @njit(cache=True)
-def _tube_spot(
-    tubes: Tubes, i: int, xpos: Array, xmat: Array, toward: Vector, point: float, eye: Vector, row: Array
-) -> bool:
-    g, radius, half = tubes.geom[i], tubes.radius[i], tubes.half_length[i]
-    axis, centre = (xmat[g, 2], xmat[g, 5], xmat[g, 8]), (xpos[g, 0], xpos[g, 1], xpos[g, 2])
-    if _is_steep(_add(toward, -point, centre), point, _add(eye, -1.0, centre), axis, half + radius):
-        return False
-    found, n, x = _on_tube(centre, axis, radius, half, toward, point, eye)
-    if found:
-        p, bounds = _add(_add(centre, x, axis), radius, n), (-half - x, half - x)
-        _write(row, p, n, axis, _cross(axis, n), (0.0, 1.0 / radius), bounds, tubes.material[i])
-    return found
-
-
-@njit(cache=True)
-def _is_steep(to_light: Vector, point: float, to_eye: Vector, axis: Vector, reach: float) -> bool:
-    """Whether a facet of a tube would have to stand steeper than `lobes` allows, wherever on it."""
+def _is_steep(to_light: Vector, point: float, to_eye: Vector, axis: Vector, reach: float, spread: Spread) -> bool:
+    """Whether a facet would have to lean along a tube's axis farther than any does, wherever on it."""
     s, ds = _unit(to_light)
     v, dc = _unit(to_eye)
     h, twice = _unit(_add(s, 1.0, v))
     if dc <= reach or point * ds < point * reach or twice == 0.0:
         return False
     turn = reach / (dc - reach) + (point * reach / (ds - reach) if point > 0.0 else 0.0)  # of s + v along the tube
-    return abs(_dot(h, axis)) - 2.0 * turn / twice > _STEEP
+    slope = min(_MOST_SIGMAS * (spread[0] + spread[1] / twice), _STEEPEST)
+    return abs(_dot(h, axis)) - 2.0 * turn / twice > slope / math.sqrt(1.0 + slope * slope)
 
 
 @njit(cache=True)
 def _write(
-    row: Array,
-    p: Vector,
-    n: Vector,
-    t1: Vector,
-    t2: Vector,
+    spots: Array,
+    at: int,
+    place: tuple[Vector, Vector, Vector, Vector],
     curvature: tuple[float, float],
     bounds: tuple[float, float],
     material: int,
+    light: int,
 ) -> None:
+    """Fill row `at`; `place` are point, normal and tangents."""
+    row, (p, n, t1, t2) = spots[at], place
     for k in range(3):
         row[k], row[3 + k], row[6 + k], row[9 + k] = p[k], n[k], t1[k], t2[k]
     row[12], row[13], row[14] = curvature[0], 0.0, curvature[1]
     row[15], row[16], row[17], row[18] = bounds[0], bounds[1], -_EVERYWHERE, _EVERYWHERE
-    row[19], row[20] = material, _SKIN_M
+    row[19], row[20], row[21] = material, _SKIN_M, light
 
 
 @njit(cache=True)
