@@ -47,29 +47,32 @@ def facets_that_may_shine(
         finishes: of `mirrors.finishes`.
         faintest: radiance below which none counts.
     """
-    xpos, xmat = poses
+    (xpos, xmat), planes, frame, half = poses, facets.planes, facets.frame, facets.half
     out, count = np.empty(len(facets.geom) + 1, dtype=np.int64), 0
     for g, start, stop in facets.runs:
         s = _into(xmat[g], sun[0])
         e = _into(xmat[g], (eye[0] - xpos[g, 0], eye[1] - xpos[g, 1], eye[2] - xpos[g, 2]))
-        facing, first, axis = _facing(facets.planes, start, stop, s, e, out[count:]), count, _into(xmat[g], ahead)
-        for i in out[first : first + facing]:
-            frame, half, finish = facets.frame[i], facets.half[i], finishes[facets.material[i]]
-            depth = axis[0] * (frame[0, 0] - e[0]) + axis[1] * (frame[0, 1] - e[1]) + axis[2] * (frame[0, 2] - e[2])
-            if depth < -(half[0] + half[1]) * (1.0 + facets.bend[i]):
+        facing, first, axis = _facing(planes, start, stop, s, e, out[count:]), count, _into(xmat[g], ahead)
+        for at in range(first, first + facing):
+            i = out[at]
+            px, py, pz, reach = frame[i, 0, 0], frame[i, 0, 1], frame[i, 0, 2], half[i, 0] + half[i, 1]
+            depth = axis[0] * (px - e[0]) + axis[1] * (py - e[1]) + axis[2] * (pz - e[2])
+            if depth < -reach * (1.0 + facets.bend[i]):
                 continue
-            v, d = _unit((e[0] - frame[0, 0], e[1] - frame[0, 1], e[2] - frame[0, 2]))
+            v, d = _unit((e[0] - px, e[1] - py, e[2] - pz))
             h, twice = _unit((v[0] + s[0], v[1] + s[1], v[2] + s[2]))
-            hn = frame[1, 0] * h[0] + frame[1, 1] * h[1] + frame[1, 2] * h[2]
-            vn = frame[1, 0] * v[0] + frame[1, 1] * v[1] + frame[1, 2] * v[2]
+            x, y, z = planes[0, i], planes[1, i], planes[2, i]
+            hn, vn = x * h[0] + y * h[1] + z * h[2], x * v[0] + y * v[1] + z * v[2]
             if hn < _STEEPEST:
                 continue
-            bend = facets.bend[i] + 2.0 * (half[0] + half[1]) / max(d * twice, 1e-9)
-            disc, rough = math.sqrt(sun[1]) / max(twice, 1e-9), finish[3]
+            bend = facets.bend[i] + 2.0 * reach / max(d * twice, 1e-9)
+            disc, rough = math.sqrt(sun[1]) / max(twice, 1e-9), finishes[facets.material[i], 3]
             lacking = max(math.sqrt(max(1.0 / hn**2 - 1.0, 0.0)) - bend, 0.0)
-            most = _GAIN * _reflectance(0.5 * twice, finish) / (8.0 * hn**4 * max(vn - bend, _LEAST_COS) * rough**2)
-            dimmed = most * math.exp(-0.5 * lacking**2 / (rough**2 + disc**2))
-            if lacking <= _MOST_SIGMAS * (rough + disc) and dimmed >= faintest:
+            if lacking > _MOST_SIGMAS * (rough + disc):
+                continue
+            reflectance = _reflectance(0.5 * twice, finishes[facets.material[i]])
+            most = _GAIN * reflectance / (8.0 * hn**4 * max(vn - bend, _LEAST_COS) * rough**2)
+            if most * math.exp(-0.5 * lacking**2 / (rough**2 + disc**2)) >= faintest:
                 out[count] = i
                 count += 1
     return out[:count]
