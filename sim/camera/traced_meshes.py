@@ -66,9 +66,14 @@ def trace_meshes(
     """
     tangents, columns, rows = x.astype(np.float32), _even(x), _even(y)
     triangles, places, lit = meshes.triangles, view.places, view.radiances
-    for i in view.triangles[:count]:
-        corners = triangles[i, 0], triangles[i, 1], triangles[i, 2]
-        _draw_triangle(corners, places, lit, out, nearest, reach, tangents, columns, rows, y, near)
+    for k in range(count):
+        t = view.triangles[k]
+        a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+        depths, t_x = (places[a, 0], places[b, 0], places[c, 0]), (places[a, 3], places[b, 3], places[c, 3])
+        is_cut, t_y = min(depths) < near, (places[a, 4], places[b, 4], places[c, 4])
+        if max(depths) < near or (not is_cut and (_is_missed(t_x, columns) or _is_missed(t_y, rows))):
+            continue
+        _draw_triangle((a, b, c), is_cut, places, lit, out, nearest, reach, tangents, columns, rows, y, near)
 
 
 @njit(cache=True)
@@ -86,6 +91,7 @@ def _mixed(e: tuple[Vector, Vector, Vector], a: float, b: float, c: float) -> Ve
 @njit(cache=True)
 def _draw_triangle(
     corners: tuple[int, int, int],
+    is_cut: bool,
     places: Array,
     lit: Array,
     out: NDArray[np.float32],
@@ -99,14 +105,11 @@ def _draw_triangle(
 ) -> None:
     i, j, k = corners
     a, b, c = _place(places, i), _place(places, j), _place(places, k)
-    t_x, t_y = (places[i, 3], places[j, 3], places[k, 3]), (places[i, 4], places[j, 4], places[k, 4])
-    is_cut = min(a[0], b[0], c[0]) < near
-    if max(a[0], b[0], c[0]) < near or (not is_cut and (_is_missed(t_x, x) or _is_missed(t_y, y))):
-        return
     e = _cross(c, b), _cross(a, c), _cross(b, a)
     volume = a[0] * e[0][0] + a[1] * e[0][1] + a[2] * e[0][2]  # -a.(b x c)
     if not volume > 0.0:
         return
+    t_y = (places[i, 4], places[j, 4], places[k, 4])
     low, high = _clipped(a, b, c, near) if is_cut else (min(t_y), max(t_y))
     row, stop = _within((low - y[0]) * y[1], (high - y[0]) * y[1], y[2])
     total, bright = _mixed(e, 1.0, 1.0, 1.0), _mixed(e, lit[i], lit[j], lit[k])
