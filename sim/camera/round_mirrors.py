@@ -83,8 +83,8 @@ def round_spots(
                 continue
             g, radius, half, material = tubes.geom[i], tubes.radius[i], tubes.half_length[i], tubes.material[i]
             axis, centre = (xmat[g, 2], xmat[g, 5], xmat[g, 8]), (xpos[g, 0], xpos[g, 1], xpos[g, 2])
-            to_light, to_eye, spread = _add(toward, -point, centre), _add(eye, -1.0, centre), (finishes[material, 3], disc)
-            if _is_steep(to_light, point, to_eye, axis, half + radius, spread):
+            to_light, to_eye = _add(toward, -point, centre), _add(eye, -1.0, centre)
+            if _is_steep(to_light, point, to_eye, axis, half + radius, (finishes[material, 3], disc)):
                 continue
             found, n, x = _on_tube(centre, axis, radius, half, toward, point, eye)
             if found:

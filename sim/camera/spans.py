@@ -198,10 +198,10 @@ def _mark(sides: Array, a: Point, b: Point, y: Array, rows: Even) -> None:
             sides[0, i], sides[1, i] = min(sides[0, i], left), max(sides[1, i], right)
         return
     slope = (b[0] - a[0]) / (b[1] - a[1])
-    for k in range(row, stop):
-        i = np.uint64(k)
-        at = min(max(a[0] + (y[i] - a[1]) * slope, left), right)
-        sides[0, i], sides[1, i] = min(sides[0, i], at), max(sides[1, i], at)
+    for i in range(row, stop):
+        k = np.uint64(i)  # unsigned: spares the test for indices that count from the end
+        at = min(max(a[0] + (y[k] - a[1]) * slope, left), right)
+        sides[0, k], sides[1, k] = min(sides[0, k], at), max(sides[1, k], at)
 
 
 @njit(cache=True)

@@ -36,7 +36,8 @@ _ALONG = _F(1e-30)  # least squared component across a tube, of a ray that runs 
 _LANES = 16  # rays that are taken at once
 
 Row = NDArray[np.float32]
-Where = tuple[np.uint64, np.uint64, np.uint64]
+Picture = NDArray[np.float32]  # (rows, columns)
+Where = tuple[np.uint64, np.uint64, np.uint64]  # row, first column, one past the last
 Triple = tuple[float, float, float]
 Single = tuple[np.float32, np.float32, np.float32]
 #: Of one row, in a solid's axes and units: o; d = a + x b; w = p + x q.
@@ -181,7 +182,9 @@ def _single(a: Triple) -> Single:
 
 
 @njit(cache=True, error_model="numpy")
-def _draw_ball(rays: Rays, inverse: Single, sun: Single, shade: Shade, x: Row, out: NDArray[np.float32], nearest: NDArray[np.float32], where: Where) -> None:
+def _draw_ball(
+    rays: Rays, inverse: Single, sun: Single, shade: Shade, x: Row, out: Picture, nearest: Picture, where: Where
+) -> None:
     row, left, right = where
     for k in range(right - left):
         j = left + np.uint64(k)
@@ -190,7 +193,9 @@ def _draw_ball(rays: Rays, inverse: Single, sun: Single, shade: Shade, x: Row, o
 
 
 @njit(cache=True, error_model="numpy")
-def _draw_capsule(rays: Rays, half: np.float32, sun: Single, shade: Shade, x: Row, out: NDArray[np.float32], nearest: NDArray[np.float32], where: Where) -> None:
+def _draw_capsule(
+    rays: Rays, half: np.float32, sun: Single, shade: Shade, x: Row, out: Picture, nearest: Picture, where: Where
+) -> None:
     row, left, right = where
     for k in range(right - left):
         j = left + np.uint64(k)
@@ -199,7 +204,9 @@ def _draw_capsule(rays: Rays, half: np.float32, sun: Single, shade: Shade, x: Ro
 
 
 @njit(cache=True, error_model="numpy")
-def _draw_cylinder(rays: Rays, half: np.float32, sun: Single, shade: Shade, x: Row, out: NDArray[np.float32], nearest: NDArray[np.float32], where: Where) -> None:
+def _draw_cylinder(
+    rays: Rays, half: np.float32, sun: Single, shade: Shade, x: Row, out: Picture, nearest: Picture, where: Where
+) -> None:
     row, left, right = where
     for k in range(right - left):
         j = left + np.uint64(k)
@@ -208,7 +215,7 @@ def _draw_cylinder(rays: Rays, half: np.float32, sun: Single, shade: Shade, x: R
 
 
 @njit(cache=True, error_model="numpy")
-def _draw_box(rays: Rays, sun: Single, shade: Shade, x: Row, out: NDArray[np.float32], nearest: NDArray[np.float32], where: Where) -> None:
+def _draw_box(rays: Rays, sun: Single, shade: Shade, x: Row, out: Picture, nearest: Picture, where: Where) -> None:
     row, left, right = where
     for k in range(right - left):
         j = left + np.uint64(k)
