@@ -210,6 +210,16 @@ def rolled(belief: Belief, roll_rad: float, led_place_variance_m2: float) -> Bel
     return replace(belief, R_BD=R_BD, P=P, ring=np.zeros_like(belief.ring))
 
 
+def begun_again(belief: Belief, start: Belief, p_ID: Array) -> Belief:
+    """Return what is believed of a drogue that was lost and is seen at a place (3,) again.
+
+    Of the lost belief what is the receiver's own and the LEDs' stays; the drogue's attitude and motion are the start's.
+    """
+    x = start.x.copy()
+    x[0], x[4:6] = p_ID, belief.x[4:6]
+    return replace(start, x=x, ring=belief.ring)
+
+
 def felt_first(belief: Belief, force_B: Array) -> Belief:
     """Return a belief that takes the receiver's first specific force (3,) for that of the formation [m/s^2]."""
     x = belief.x.copy()

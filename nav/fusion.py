@@ -26,7 +26,7 @@ from dockair.calibration import NavigationSheets
 from dockair.errors import DockairError
 from dockair.messages import ImuSample
 from dockair.nav import belief_motion as motion
-from dockair.nav.belief import Correction, corrected, felt_first, mixture, rolled, widened
+from dockair.nav.belief import Correction, begun_again, corrected, felt_first, mixture, rolled, widened
 from dockair.nav.belief_motion import Motion, propagated
 from dockair.nav.belief_sight import Belief, Sight
 from dockair.nav.fusion_settings import FusionSettings as FusionSettings
@@ -152,6 +152,15 @@ class RelativeFilter:
         led2 = self._settings.led_place_sigma_m**2
         beliefs = [rolled(belief, roll_rad, led2) for belief in self._beliefs(time_s)]
         self._nodes, self._head = [_Node(time_s, None, beliefs)], None
+        self._renew_head()
+
+    def begin_again(self, pose: PoseEstimate, time_s: float) -> None:
+        """Begin afresh at a time with the drogue where a converged pose has it: it had been lost."""
+        mounting = self._sheets.mounting
+        p_ID = mounting.R_BC @ pose.p_CD + mounting.p_BC - mounting.p_BI
+        lost = mixture(self._beliefs(time_s))
+        self._nodes, self._head = [_Node(time_s, None, [begun_again(lost, start, p_ID) for start in self._start])], None
+        self._coasted, self._refusals = None, 0
         self._renew_head()
 
     def state(self, time_s: float | None = None) -> FilterState:

@@ -55,6 +55,9 @@ class NavigatorSettings:
     usable_sigma_m: float = 0.10  # lateral 1 sigma above which the state may not be flown on
     turned_rad: float = np.radians(10.0)  # roll by which a belief is off that its own gate may no longer bridge
     usable_age_s: float = 0.5  # breakaway practice: a track lost for 0.5 s is lost
+    #: Time for which no frame has been used, after which the ring is looked for anywhere. By then an acceleration that
+    #: is 0.3 m/s^2 in error has moved the belief by 0.6 m, more than the ring's own size.
+    search_anew_s: float = 2.0
 
 
 class Navigator:
@@ -98,8 +101,11 @@ class Navigator:
             self._heading.step(imu, asked, centre_C)
             frame = frame if asked is None else None
         if isinstance(frame, CameraFrame):
-            seen = self._finder.find(frame, followed=self._followed(frame.time_stamp_s))
+            time_s = frame.time_stamp_s
+            seen = self._finder.find(frame, followed=self._followed(time_s), lost=self._lost(time_s))
             self._candidates_px = self._finder.candidates_px
+            if self._finder.found_anew:
+                self._begin_again(seen)
             self._status = self._use(seen) if len(seen.led_numbers) else self._nothing(self._finder.status)
         elif frame is not None:
             self._candidates_px = frame.centroids_px
@@ -114,6 +120,18 @@ class Navigator:
     def _followed(self, time_s: float) -> bool:
         """Whether the belief has been corrected lately enough to say which LED a single one is."""
         return time_s - self._used_time_s <= self._settings.usable_age_s
+
+    def _lost(self, time_s: float) -> bool:
+        """Whether the belief has followed the drogue, and not for so long that it says nothing of where it is."""
+        return time_s - self._used_time_s > self._settings.search_anew_s
+
+    def _begin_again(self, seen: LedObservation) -> None:
+        """Believe the drogue to be where LEDs that were found without the belief show it."""
+        pose = solve_pose(
+            seen.centroids_px, self._points_D[seen.led_numbers], self._sheets.camera, sigma_px=seen.sigma_px
+        )
+        if pose.status is PoseStatus.CONVERGED:
+            self._filter.begin_again(pose, seen.time_stamp_s)
 
     def _nothing(self, status: str) -> str:
         self._led_pixels_px = np.full((len(self._points_D), 2), np.nan)

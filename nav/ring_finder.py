@@ -20,6 +20,9 @@ name in at most
     rho (sum of the gates' areas)                                                                     (1)
 
 of the frames; where that is more than is allowed, nothing is named. A belief is never begun with such LEDs.
+
+A belief that has lost the drogue runs away, and where it has the LEDs nothing will be found any more. Then the ring is
+looked for anywhere, as if nothing were known; its numbers are right up to the symmetry, and the belief begins anew.
 """
 
 import math
@@ -81,6 +84,7 @@ class RingFinder:
         self._turned_rad, self._few_settings, self._misplaced_m = turned_rad, few_settings or FewSettings(), misplaced_m
         self._coded = code_of(sheets.ring, CodeSettings()).says_something
         self._few = False  #: whether the newest frame's LEDs were named one by one
+        self.found_anew = False  #: whether the newest frame's ring was found without the belief
         self._tracker = RingTracker(
             sheets.camera, 1.0 / sheets.camera_rate_hz, track_settings,
             ring_radius_m=0.5 * sheets.ring.diameter_m, lever_C=sheets.mounting.R_BC.T @ sheets.mounting.p_BC,
@@ -89,12 +93,13 @@ class RingFinder:
         self.status = "no frame yet"  #: what became of the newest frame
         self.candidates_px: Array = np.empty((0, 2))  #: (n, 2) blobs of the newest frame
 
-    def find(self, frame: CameraFrame, *, followed: bool = False) -> LedObservation:
+    def find(self, frame: CameraFrame, *, followed: bool = False, lost: bool = False) -> LedObservation:
         """Return the LEDs that a frame shows, by name; none when there is no ring, and `status` says why.
 
         Args:
             frame: what the camera sent.
             followed: whether the belief follows the drogue, so that it may name LEDs too few for a ring.
+            lost: whether the belief has not for long, so that the ring may be anywhere.
         """
         blobs = detect(frame.pixels, self._detect_settings, frame.window, gain_dn_per_electron=frame.gain)
         self.candidates_px = blobs.centroids_px
@@ -102,6 +107,10 @@ class RingFinder:
             self._tracker.predict(*self._turn_C(self._frame_time_s, frame.time_stamp_s))
         self._frame_time_s = frame.time_stamp_s
         found, expected_px = self._found(blobs, frame.time_stamp_s)
+        self.found_anew = False
+        if lost and found.status is IdentificationStatus.NOT_FOUND:
+            found = self._identified(blobs)
+            self.found_anew = found.status is IdentificationStatus.FOUND
         self._tracker.update(found)
         self.status = f"ring {found.status.value}"
         if found.status is not IdentificationStatus.FOUND:

@@ -56,6 +56,7 @@ class Guidance:
         self._turned: Array = np.zeros((2, 3))  # n x p of Eq. (1) and its rate
         self._commanded: Array = np.zeros(3)  # Eq. (1)
         self._aim: Array = np.zeros(2)
+        self._reckoned: Array = np.zeros(3)  # where the ring is, or, out of view, should be if it only drifted
         self._passed: Array | None = None  # where the ring was when the tip last came to its plane, left and up
         speeds = settings.closure_speed_m_s, settings.closure_acceleration_m_s2
         self._closure = Closure(settings.closing, *speeds, self._dt)
@@ -78,6 +79,10 @@ class Guidance:
         coupling = self._axes.R_NB @ state.p_PK_B
         if self._path.is_announced:
             self._follow_path(state, ring, rate)
+        if state.usable:
+            self._reckoned = ring
+        else:
+            self._reckoned = self._reckoned + (self._controller.drift_m_s - self._u) * self._dt
         self._observe(state, ring, rate)
         self._count(state, ring, rate, coupling)
         self._change_phase(self._situation(ring, rate, coupling))
@@ -259,9 +264,17 @@ class Guidance:
             self.phase is Phase.PRE_CONTACT and self._unusable_s > s.limits.lost_s
         ):  # nobody waits near a drogue that is not seen
             target[0] -= s.back_off_speed_m_s
+            target[1:] += self._way_astern()
         elif self.phase is Phase.APPROACH:  # out of view, or in the basket: on as before
             target[0] = self._u[0]
         return np.asarray(s.course_gain_1_s * (target - self._u))
+
+    def _way_astern(self) -> Array:
+        """(2,) velocity to get astern of a drogue that is out of view, where it will come into view again."""
+        s = self._settings
+        if self._unusable_s == 0.0 or self._reckoned[0] <= s.limits.off_axis_range_m:
+            return np.zeros(2)
+        return np.clip(s.reckoned_gain_1_s * self._reckoned[1:], -s.back_off_speed_m_s, s.back_off_speed_m_s)
 
     def _command(self, u_dot: Array) -> ReceiverCommand:
         """Eq. (1) and its rate in body axes, and what the path does."""

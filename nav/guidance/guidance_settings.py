@@ -59,6 +59,7 @@ class GuidanceSettings:
     closure_acceleration_m_s2: float = 0.6  # how fast the closure speed is asked for
     take_in_gain_1_s: float = 0.35  # speed into the refuelling range per metre to go; a third of the next: no overshoot
     course_gain_1_s: float = 1.2  # how fast a course without a view of the drogue is taken up
+    reckoned_gain_1_s: float = 0.5  # back astern of a drogue that went out of view: half of its place off in 1.4 s
     funnel_s: float = 0.25  # from the ring to the coupling; what the drogue does after that is the probe's own doing
     levelling_s: float = 10.0  # of the stabilised axes: long beside the swing, short beside a turn
     predictive: PredictiveSettings = field(default_factory=PredictiveSettings)

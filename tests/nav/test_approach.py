@@ -335,6 +335,21 @@ def test_a_lull_in_gusts_that_are_too_strong_is_no_moment_to_begin_an_approach()
     assert begun_s[0] > begun_s[1] + 20.0
 
 
+def test_a_drogue_that_went_out_of_view_beside_the_probe_is_got_astern_of():
+    """Blind from 2 m ahead and 0.9 m to the left on: it comes back onto the line by what it commanded."""
+    plant, guidance = Plant(offset=(2.0, 0.9, -0.5)), Guidance(SETTINGS, RATE_HZ)
+    now = plant.step(ReceiverCommand())
+    for _ in range(10):  # seen for a moment
+        now = plant.step(guidance.step(now))
+    beside_m = np.hypot(*now.p_PD_B[1:])
+    guidance.phase = Phase.BACK_OFF
+    while plant.t < 8.0:
+        now = plant.step(guidance.step(state(np.array([3.0, 50.0, 50.0]), usable=False)))
+    assert beside_m > 0.9
+    assert np.hypot(*now.p_PD_B[1:]) < 0.15
+    assert now.p_PD_B[0] > 6.0
+
+
 def test_a_drogue_that_is_not_seen_is_not_waited_for_beside_it():
     """Lost as the tip enters, the belief running away: the retreat goes on, so does falling back, then it is over."""
     plant, guidance = Plant(offset=(4.0, 0.0, 0.0)), Guidance(SETTINGS, RATE_HZ)

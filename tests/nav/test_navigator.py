@@ -292,6 +292,25 @@ def test_a_drogue_that_is_struck_is_followed_on(render):
     assert statuses[-10:] == ["pose used"] * 10
 
 
+@pytest.mark.parametrize("search_anew_s", [2.0, np.inf])
+def test_a_drogue_that_was_lost_is_found_wherever_it_comes_into_view_again(render, search_anew_s):
+    def path(time_s):
+        if time_s < 0.5:  # the belief goes on with this velocity
+            return still(time_s) + [0.0, 2.0 * time_s, 0.0]
+        return np.array([6.0, 20.0 if time_s < 3.5 else -1.1, 0.5])
+
+    sky = Sky(render, path)
+    sky.navigator = Navigator(sky.sheets, NavigatorSettings(search_anew_s=search_anew_s))
+    assert sky.run(0.5).valid
+    assert not sky.run(3.0).valid
+    solution = sky.run(1.0)
+    assert solution.valid == np.isfinite(search_anew_s)
+    if solution.valid:
+        error = solution.p_PD_B - path(4.0)
+        assert abs(error[0]) < 0.05 and np.abs(error[1:]).max() < 0.005
+        assert names_are_true(sky, solution)
+
+
 def test_a_window_that_does_not_show_where_the_belief_has_the_ring_is_given_up(render):
     """The track is led astray by hand: without this rule it would be given five frames."""
     sky = Sky(render, still)
