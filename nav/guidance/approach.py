@@ -58,6 +58,7 @@ class Guidance:
         self._aim: Array = np.zeros(2)
         self._reckoned: Array = np.zeros(3)  # where the ring is, or, out of view, should be if it only drifted
         self._passed: Array | None = None  # where the ring was when the tip last came to its plane, left and up
+        self._entered_m = 0.0  # how far off when the tip last came past it
         speeds = settings.closure_speed_m_s, settings.closure_acceleration_m_s2
         self._closure = Closure(settings.closing, *speeds, self._dt)
         self._attempts, self._docked, self._has_seen = 0, False, False
@@ -146,6 +147,10 @@ class Guidance:
         if self.phase is Phase.APPROACH:
             self._close(state, float(ring[0]), -float(rate[0]))
             self._inside_s = self._inside_s + self._dt if ring[0] <= 0.0 else 0.0
+        if ring[0] > 0.0:
+            self._entered_m = 0.0
+        elif self._entered_m == 0.0:
+            self._entered_m = float(np.hypot(ring[1], ring[2]))
         if self.phase in _TOUCHING:
             self._pushed_in_m += (self._u[0] - self._controller.drift_m_s[0]) * self._dt
 
@@ -183,6 +188,7 @@ class Guidance:
             ahead_m=float(coupling[0]),
             ring_ahead_m=float(ring[0]),
             lateral_m=float(np.hypot(ring[1], ring[2])),
+            entered_m=self._entered_m,
             closing_m_s=-float(rate[0]),
             pushed_in_m=self._pushed_in_m,
             attempts=self._attempts,

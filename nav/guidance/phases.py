@@ -49,7 +49,7 @@ class PhaseLimits:
     lost_for_good_s: float = 20.0  # assumed: what is not in view again after falling back so long will not be found
     off_axis_m: float = 1.0  # breakaway practice: 1 m off ...
     off_axis_range_m: float = 1.0  # ... within 1 m
-    rim_m: float = 0.25  # radius of the ring: a tip past its plane and farther out is beside the basket
+    rim_m: float = 0.25  # radius of the ring: a tip that came past its plane farther out is beside the basket
     closure_limit_m_s: float = 2.6  # 5 kt, service limit
     breakaway_s: float = 10.0  # assumed: backing off at 1 m/s clears any attempt in this time
 
@@ -71,6 +71,7 @@ class Situation:
     ahead_m: float  #: coupling ahead of the probe's tip
     ring_ahead_m: float  #: ring centre ahead of the probe's tip
     lateral_m: float  #: ring centre off the probe's line
+    entered_m: float  #: the same where the tip came past the ring's plane, 0 before it
     closing_m_s: float  #: rate at which `ring_ahead_m` shrinks
     pushed_in_m: float  #: way flown toward the tanker since the coupling was reached
     attempts: int  #: approaches begun
@@ -93,7 +94,8 @@ def _off_axis(limits: PhaseLimits, s: Situation) -> bool:
 
 
 def _beside(limits: PhaseLimits, s: Situation) -> bool:
-    return s.ring_ahead_m < 0.0 and s.lateral_m > limits.rim_m
+    """Past the plane inside the rim is in the basket, whatever a belief says that the blow on it has unsettled."""
+    return s.entered_m > limits.rim_m
 
 
 def _left(limits: PhaseLimits, s: Situation) -> bool:
