@@ -7,8 +7,9 @@ and the receiver's bow wave b drive:
     m' = d,   d' = noise;     s'' = -omega^2 s - 2 zeta omega s' + g + b;     g' = -g/T + noise           (1)
     y_D = m + s
 
-A Kalman filter follows (m, d, s, s', g) from p and its rate; its gains, which depend on nothing that is seen, are
-worked out beforehand until they stay the same. Its prediction over the response time is what a command given now can
+A Kalman filter follows (m, d, s, s', g) from p and its rate, which is late where the drogue accelerates, since nobody
+measures that: seen is y_D' - tau_v y_D''. Its gains, which depend on nothing that is seen, are worked out beforehand
+until they stay the same. Its prediction over the response time is what a command given now can
 still meet.
 
 Not modelled: coupling of the axes, another frequency for another length of hose or airspeed. Over a response time of
@@ -27,7 +28,7 @@ from scipy.linalg import expm, solve_continuous_lyapunov, solve_discrete_are
 from dockair.rotations import Array
 
 _STATES, _GUST_INPUT = 5, 3
-_H = np.array([[1.0, 0.0, 1.0, 0.0, 0.0], [0.0, 1.0, 0.0, 1.0, 0.0]])
+_PLACE, _RATE = np.array([1.0, 0.0, 1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0, 1.0, 0.0])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,6 +46,9 @@ class SwingSettings:
         0.02  # of the place: what the tip does besides its commands is in it, and must not be chased
     )
     rate_sigma_m_s: float = 0.10  # of its rate, likewise; the camera itself knows it to 0.025 m/s
+    #: tau_v: of the drogue's acceleration, the error of the fusion's rate was found to be -0.018 to -0.044 s in three
+    #: flights by camera in moderate gusts: half a frame, its way here, and what the fusion's own filter needs.
+    rate_lag_s: float = 0.032
 
 
 class DrogueMotion:
@@ -65,6 +69,8 @@ class DrogueMotion:
         self._lead = np.stack([expm(A * lead) for A, lead in zip(self._A, self._lead_s, strict=True)])
         self._K = np.stack([_gains(settings, axis, step_s) for axis in range(3)], axis=1)
         self._ticks = 0
+        self._seen_rate = np.stack([_rate_row(settings, A) for A in self._A])
+        self._rate_lag_s = settings.rate_lag_s
         self._pushed = np.stack([_held(A, step_s) for A in self._A])
         self._F_node = np.stack([expm(A * node_s) for A in self._A])
         self._pushed_node = np.stack([_held(A, node_s) for A in self._A])
@@ -88,7 +94,8 @@ class DrogueMotion:
         gains = self._K[min(self._ticks, len(self._K) - 1)]
         if place_m is None or velocity_m_s is None:
             place_m = velocity_m_s = push_m_s2  # of the right shape, and not looked at
-        _advance(self._x, self._F, self._pushed, push_m_s2, gains, seen, place_m, velocity_m_s)
+        rate = self._seen_rate, self._rate_lag_s
+        _advance(self._x, self._F, self._pushed, push_m_s2, gains, *rate, seen, place_m, velocity_m_s)
         self._ticks += seen
 
     @property
@@ -135,8 +142,8 @@ class DrogueMotion:
 
 
 @njit(cache=True)
-def _advance(x, F, pushed, push, K, seen, place, velocity):  # type: ignore[no-untyped-def]
-    """A step of the filter in place: x (3, 5), F (3, 5, 5), pushed (3, 5), K (3, 5, 2)."""
+def _advance(x, F, pushed, push, K, seen_rate, lag_s, seen, place, velocity):  # type: ignore[no-untyped-def]
+    """A step of the filter in place: x (3, 5), F (3, 5, 5), pushed (3, 5), K (3, 5, 2), seen_rate (3, 5)."""
     n = x.shape[1]
     later = np.empty(n)
     for axis in range(3):
@@ -146,7 +153,9 @@ def _advance(x, F, pushed, push, K, seen, place, velocity):  # type: ignore[no-u
                 later[i] += F[axis, i, j] * x[axis, j]
         off, off_rate = 0.0, 0.0
         if seen:
-            off, off_rate = place[axis] - later[0] - later[2], velocity[axis] - later[1] - later[3]
+            off, off_rate = place[axis] - later[0] - later[2], velocity[axis] + lag_s * push[axis]
+            for j in range(n):
+                off_rate -= seen_rate[axis, j] * later[j]
         for i in range(n):
             x[axis, i] = later[i] + K[axis, i, 0] * off + K[axis, i, 1] * off_rate
 
@@ -202,6 +211,11 @@ def _dynamics(settings: SwingSettings, axis: int) -> Array:
     return A
 
 
+def _rate_row(settings: SwingSettings, A: Array) -> Array:
+    """(5,) what is seen of the rate, b apart: late by tau_v."""
+    return np.asarray(_RATE - settings.rate_lag_s * (_RATE @ A))
+
+
 def _held(A: Array, step_s: float) -> Array:
     """(5,) what an acceleration of one, held for a step, adds to the state."""
     augmented = np.zeros((_STATES + 1, _STATES + 1))
@@ -213,6 +227,7 @@ def _held(A: Array, step_s: float) -> Array:
 def _gains(settings: SwingSettings, axis: int, step_s: float) -> Array:
     """(n, 5, 2) gains of the Kalman filter tick by tick, the last for good; the step's noise by Van Loan's matrix."""
     A = _dynamics(settings, axis)
+    H = np.stack([_PLACE, _rate_row(settings, A)])
     drive = np.diag([0.0, settings.drift_density**2, 0.0, 0.0, settings.gust_density[axis] ** 2])
     loan = expm(np.block([[-A, drive], [np.zeros_like(A), A.T]]) * step_s)
     F = loan[_STATES:, _STATES:].T
@@ -221,8 +236,8 @@ def _gains(settings: SwingSettings, axis: int, step_s: float) -> Array:
     P[2:, 2:] = solve_continuous_lyapunov(A[2:, 2:], -drive[2:, 2:])  # any moment of the swing
     P[0, 0], P[1, 1] = P[2, 2], settings.drift_sigma_m_s**2
     for _ in range(round(settings.learning_s / step_s)):
-        gains.append(P @ _H.T @ np.linalg.inv(_H @ P @ _H.T + R))
-        P = F @ (P - gains[-1] @ _H @ P) @ F.T + Q
-    P = solve_discrete_are(F.T, _H.T, 0.5 * (Q + Q.T), R)
-    gains.append(P @ _H.T @ np.linalg.inv(_H @ P @ _H.T + R))
+        gains.append(P @ H.T @ np.linalg.inv(H @ P @ H.T + R))
+        P = F @ (P - gains[-1] @ H @ P) @ F.T + Q
+    P = solve_discrete_are(F.T, H.T, 0.5 * (Q + Q.T), R)
+    gains.append(P @ H.T @ np.linalg.inv(H @ P @ H.T + R))
     return np.array(gains)

@@ -160,8 +160,8 @@ class FlightControl:
             self._start(command)
         write_states(*flown)
         self._aerodynamics.write_wrenches(self._motions, self._wrenches)
-        share = relief.step(surfaces_command, surfaces_rad, model.actuators) if self._engaged else 1.0
-        self.reference.step(self._seen[1], command, float(self._x_m[ATTITUDE.start]), share)
+        shares = relief.step(surfaces_command, surfaces_rad, model.actuators) if self._engaged else np.ones(3)
+        self.reference.step(self._seen[1], command, float(self._x_m[ATTITUDE.start]), shares)
         haste, felt = relief.haste, (specific_force_B, airspeed_m_s)
         K = row.K if haste == 0.0 else (1.0 - haste) * row.K + haste * row.K_busy
         gains = (row.C, K, row.K_followed, row.K_command, row.gust_from_residual)

@@ -1,8 +1,8 @@
 """Takes the reference back when a surface meets its rate limit or comes near its stop, before lag feeds on haste.
 
 A surface at its rate limit answers late; a loop that then asks for more drives it to the next stop, and an airframe
-that is not stable by itself departs. b is the part of the time, over T, for which some surface has been asked for more
-than its rate:
+that is not stable by itself departs. b of the elevator, and of ailerons and rudder together, is the part of the time,
+over T, for which one of them has been asked for more than its rate:
 
     b' = (busy - b) / T,     busy = 1 where a |command - surface| > rate limit or |command| > c stop      (1)
     share = 1 - (1 - least) h                                                                             (2)
@@ -10,7 +10,9 @@ than its rate:
 
 a is the actuators' bandwidth; both the aircraft's surfaces and those of the model flight that it follows count, for the
 model says early what the aircraft will be asked for. The reference's limits of acceleration are multiplied by the
-share, and the feedback goes over to gains that ask for less by h (`flight_control`).
+elevator's share, to the left by the smaller of both: a receiver whose rudder is late can still be led up and down, but
+one that rolls behind a late elevator departs. The feedback, which couples all surfaces, goes over to gains that ask for
+less by the larger h (`flight_control`).
 Not modelled: a cause other than haste; surfaces that are busy with gusts alone take the reference back, too.
 Source: the idea of relieving a rate-limited loop is common practice against pilot-induced oscillations [Duda 1998,
 Flight control system design considering rate saturation, Aerospace Science and Technology 2(4)]; this form is our own.
@@ -58,22 +60,41 @@ class RateRelief:
         largest = [float(rate) / bandwidth_rad_s for rate in rate_limits_rad_s]
         self._limits = np.array([largest, [parameters.stop_share * float(stop) for stop in stops_rad]])
         self._keep = math.exp(-step_s / parameters.time_s)
-        self._busy = 0.0
-        self.haste = 0.0  #: Eq. (3)
+        self._busy = 0.0, 0.0  # elevator, ailerons and rudder
+        self.haste = 0.0  #: the larger of Eq. (3)
+        self._shares = np.ones(3)
 
-    def step(self, commands_rad: Array, surfaces_rad: Array, modelled_rad: Array) -> float:
-        """Return the share after a tick: commands to the surfaces (3,), where these and the model's (3,) were."""
-        busy = _is_busy(commands_rad, surfaces_rad, modelled_rad, self._limits)
-        self._busy = self._keep * self._busy + (1.0 - self._keep if busy else 0.0)
-        self.haste = min(self._busy / self._parameters.busy_share, 1.0)
-        return 1.0 - (1.0 - self._parameters.least) * self.haste
+    def step(self, commands_rad: Array, surfaces_rad: Array, modelled_rad: Array) -> Array:
+        """Return the shares (3,) forward, left, up after a tick, overwritten by the next.
+
+        Args:
+            commands_rad: (3,) to the surfaces.
+            surfaces_rad: (3,) where they were.
+            modelled_rad: (3,) where the model's were.
+        """
+        p, shares = self._parameters, self._shares
+        at = commands_rad, surfaces_rad, modelled_rad
+        self._busy, self.haste = _relieve(*at, self._limits, self._keep, self._busy, p.busy_share, p.least, shares)
+        return shares
 
 
 @njit(cache=True)
-def _is_busy(commands, surfaces, modelled, limits):  # type: ignore[no-untyped-def]
+def _relieve(commands, surfaces, modelled, limits, keep, busy, busy_share, least, shares):  # type: ignore[no-untyped-def]
+    """Eqs. (1) to (3) over one tick: the shares in place; return b of both, and the larger h."""
+    up, left = keep * busy[0], keep * busy[1]
+    if _is_busy(commands, surfaces, modelled, limits, 0):
+        up += 1.0 - keep
+    if _is_busy(commands, surfaces, modelled, limits, 1) or _is_busy(commands, surfaces, modelled, limits, 2):
+        left += 1.0 - keep
+    haste_up = min(up / busy_share, 1.0)
+    haste = max(min(left / busy_share, 1.0), haste_up)
+    shares[:] = 1.0 - (1.0 - least) * haste_up
+    shares[1] = 1.0 - (1.0 - least) * haste
+    return (up, left), haste
+
+
+@njit(cache=True)
+def _is_busy(commands, surfaces, modelled, limits, i):  # type: ignore[no-untyped-def]
     """Eq. (1)'s condition."""
-    for i in range(3):
-        near_stop = max(abs(commands[i]), abs(modelled[i])) > limits[1, i]
-        if near_stop or abs(commands[i] - surfaces[i]) > limits[0, i]:
-            return True
-    return False
+    near_stop = max(abs(commands[i]), abs(modelled[i])) > limits[1, i]
+    return near_stop or abs(commands[i] - surfaces[i]) > limits[0, i]

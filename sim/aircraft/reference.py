@@ -21,6 +21,8 @@ from numba import njit
 from dockair.messages import ReceiverCommand
 from dockair.rotations import Array
 
+_WHOLE = np.ones(3)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ReferenceLimits:
@@ -53,17 +55,17 @@ class Reference:
         self._smooth[0] = R_WB @ (u * _shortening(u, self._constants[3, 2]))
         self.chain[0] = velocity_W
 
-    def step(self, R_WB: Array, command: ReceiverCommand, bank_rad: float = 0.0, share: float = 1.0) -> Array:
+    def step(self, R_WB: Array, command: ReceiverCommand, bank_rad: float = 0.0, shares: Array = _WHOLE) -> Array:
         """(4, 3) the chain, advanced by one tick.
 
         Args:
             R_WB: (3, 3) axes of the command.
             command: u and a.
             bank_rad: phi, the bank with which the reference is being flown, beyond that of the path.
-            share: what is left of the limits of acceleration.
+            shares: (3,) what is left of the limits of acceleration, axes of W.
         """
         u, a = command.velocity_m_s, command.acceleration_m_s2
-        _advance(self.chain, self._smooth, R_WB, u, a, bank_rad, share, self._constants, self._step_s)
+        _advance(self.chain, self._smooth, R_WB, u, a, bank_rad, shares, self._constants, self._step_s)
         return self.chain
 
 
@@ -78,7 +80,7 @@ def _advance(chain, smooth, R, u_B, a_B, bank, left, constants, step):  # type: 
     """Eqs. (1) and (2) over one tick, in place."""
     w, zeta, share = constants[3, 0], constants[3, 1], _shortening(u_B, constants[3, 2])
     for i in range(3):
-        k, a_max, jerk_max = constants[0, i], left * constants[1, i], constants[2, i]
+        k, a_max, jerk_max = constants[0, i], left[i] * constants[1, i], constants[2, i]
         if i == 1:
             a_max *= min(max((constants[4, 1] - abs(bank)) / (constants[4, 1] - constants[4, 0]), 0.0), 1.0)
         u = share * (R[i, 0] * u_B[0] + R[i, 1] * u_B[1] + R[i, 2] * u_B[2])

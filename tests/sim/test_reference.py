@@ -70,10 +70,10 @@ def test_reference_takes_back_the_acceleration_to_the_side_as_the_bank_grows(sha
     np.testing.assert_allclose(chain[1, 1:], limits.acceleration_m_s2[1:] * [left, 1.0], rtol=0.02, atol=1e-12)
 
 
-def test_a_share_takes_back_the_acceleration_on_every_axis() -> None:
-    limits = PARAMETERS.reference_limits
+def test_shares_take_back_the_acceleration_axis_by_axis() -> None:
+    limits, shares = PARAMETERS.reference_limits, np.array([1.0, 0.25, 0.5])
     reference, command = Reference(limits, 1e-3), ReceiverCommand(acceleration_m_s2=np.array([20.0, 20.0, 20.0]))
     reference.start(np.zeros(3), np.eye(3), command)
     for _ in range(1500):
-        chain = reference.step(np.eye(3), command, 0.0, 0.25)
-    np.testing.assert_allclose(chain[1], 0.25 * limits.acceleration_m_s2, rtol=0.02)
+        chain = reference.step(np.eye(3), command, 0.0, shares)
+    np.testing.assert_allclose(chain[1], shares * limits.acceleration_m_s2, rtol=0.02)
