@@ -40,7 +40,7 @@ class Guidance(Table):
 
     controller: Literal["predictive", "pid"] = "predictive"
     attempts_max: int = Field(default=3, ge=1, le=20)  #: 1: no retry
-    capture_radius_m: float = Field(default=0.10, gt=0.0, le=1.0)  #: predicted miss inside which it closes, at first
+    capture_radius_m: float = Field(default=0.12, gt=0.0, le=1.0)  #: predicted miss inside which it closes, at first
     closure_speed_m_s: float = Field(default=1.2, ge=0.3, le=2.6)  #: 2.6 m/s (5 kt) is the service limit
     hold_s: float = Field(default=5.0, ge=0.0, le=300.0)
     take_in_m: float = Field(default=1.5, ge=0.0, le=6.0)  #: hose pushed in before holding

@@ -83,7 +83,7 @@ class Guidance:
         if state.usable:
             self._reckoned = ring
         else:
-            self._reckoned = self._reckoned + (self._controller.drift_m_s - self._u) * self._dt
+            self._reckoned = self._reckoned + (self._unseen_drift() - self._u) * self._dt
         self._observe(state, ring, rate)
         self._count(state, ring, rate, coupling)
         self._change_phase(self._situation(ring, rate, coupling))
@@ -249,8 +249,8 @@ class Guidance:
 
     @property
     def _is_patient(self) -> bool:
-        """Whether a share of the limits across is enough: as long as nothing is tried."""
-        return self.phase in _WAITING or (self.phase is Phase.APPROACH and self._closure.stands_by)
+        """Whether a share of the limits across is enough: as long as it can be called back."""
+        return self.phase in _WAITING or (self.phase is Phase.APPROACH and not self._closure.committed)
 
     def _to_contact_s(self, distance_m: float) -> float:
         s = self._settings
@@ -260,20 +260,25 @@ class Guidance:
     def _hold_course(self) -> Array:
         """(3,) du/dt toward the drogue's drift, plus the speed along that the phase asks for."""
         s = self._settings
-        target = self._controller.drift_m_s
+        target = self._unseen_drift() if self._unusable_s > 0.0 else self._controller.drift_m_s
         if self._path.is_announced and self.phase in _TOUCHING:  # the drogue has come along
             target += self._axes.turned(np.array([self._pushed_in_m, 0.0, 0.0]))
         if self.phase is Phase.CONTACT:  # slows down so as to stop where it is to hold
             to_go = max(s.limits.take_in_m - self._pushed_in_m, 0.0)
             target[0] += min(s.closure_speed_m_s, s.take_in_gain_1_s * to_go)
         elif self.phase in _RETREATING or (
-            self.phase is Phase.PRE_CONTACT and self._unusable_s > s.limits.lost_s
+            self.phase in _WAITING and self._unusable_s > s.limits.lost_s
         ):  # nobody waits near a drogue that is not seen
             target[0] -= s.back_off_speed_m_s
             target[1:] += self._way_astern()
         elif self.phase is Phase.APPROACH:  # out of view, or in the basket: on as before
             target[0] = self._u[0]
         return np.asarray(s.course_gain_1_s * (target - self._u))
+
+    def _unseen_drift(self) -> Array:
+        """(3,) the drogue's drift, where nobody sees that it is not so large: what was learnt may be half a swing."""
+        most = self._settings.unseen_drift_m_s
+        return np.clip(self._controller.drift_m_s, -most, most)
 
     def _way_astern(self) -> Array:
         """(2,) velocity to get astern of a drogue that is out of view, where it will come into view again."""

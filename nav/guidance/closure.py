@@ -35,7 +35,6 @@ class Closure:
         """Stand still, for another approach or none."""
         self.speed_m_s = self.waiting_s = 0.0  #: c; for so long it has not closed
         self.committed = self._recalled = False
-        self.stands_by = False  #: far enough from the ring to run up, and does not
 
     def step(self, distance_m: float, closing_m_s: float, *, known: bool, miss: float, unrest: float) -> None:
         """Advance by one control tick.
@@ -59,7 +58,6 @@ class Closure:
         falls_back = self._recalled or (not closes and distance_m < s.wait_at_m)
         goes = self.committed or (hopeful and not falls_back)
         self._ramp(goes, falls_back)
-        self.stands_by = self.speed_m_s <= 0.0 and distance_m >= s.wait_at_m
         self.waiting_s = self.waiting_s + self._step_s if self.speed_m_s <= 0.0 else 0.0
 
     def _ramp(self, goes: bool, falls_back: bool) -> None:

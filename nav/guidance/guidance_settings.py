@@ -54,11 +54,14 @@ class GuidanceSettings:
     response_s: tuple[float, float, float] = (0.28, 0.10, 0.10)  # tau: delay of the tip, computing included
     acceleration_limit_m_s2: tuple[float, float, float] = (0.75, 1.9, 1.9)  # less than the flight control's
     jerk_limit_m_s3: tuple[float, float, float] = (3.8, 6.6, 7.6)  # likewise
-    patient_share: float = 0.6  # of both limits across before an approach: what needs more is no calm moment
+    #: Of both limits across, until committed. With all of them a receiver that runs up by camera met gusts with its
+    #: surfaces at their rates, and was thrown a metre aside; what needs more than this share is no calm moment.
+    patient_share: float = 0.6
     velocity_limit_m_s: float = 3.5
     closure_acceleration_m_s2: float = 0.6  # how fast the closure speed is asked for
     take_in_gain_1_s: float = 0.35  # speed into the refuelling range per metre to go; a third of the next: no overshoot
     course_gain_1_s: float = 1.2  # how fast a course without a view of the drogue is taken up
+    unseen_drift_m_s: float = 0.5  # 2.5 sigma of an inertial velocity; a drogue keeps place behind its tanker
     reckoned_gain_1_s: float = 0.5  # back astern of a drogue that went out of view: half of its place off in 1.4 s
     funnel_s: float = 0.25  # from the ring to the coupling; what the drogue does after that is the probe's own doing
     levelling_s: float = 10.0  # of the stabilised axes: long beside the swing, short beside a turn

@@ -33,10 +33,10 @@ class PhaseLimits:
     station_m: float = 0.5  # assumed: astern, that is near enough to the stand-off point
     steady_along_m: float = 0.35  # assumed: twice the way that moderate gusts push receiver and drogue apart
     steady_sigma_m: float = 0.05  # assumed: a third of the 0.15 m that a contact may be off
-    capture_radius_m: float = 0.10  # assumed: of the following, two thirds of the 0.15 m that a contact may be off
-    patience_s: float = 60.0  # assumed: some swings' worth of gusts; who has waited so long for a calm moment ...
-    late_radius: float = 1.3  # ... closes within so many times that radius and that swing, which grow on the way there
-    waiting_s: float = 60.0  # assumed: gusts that pass by have passed; a retry would wait as long
+    capture_radius_m: float = 0.12  # assumed: of the following; less than the 0.15 m that a contact may be off
+    patience_s: float = 120.0  # assumed: some swings' worth of gusts; who has waited so long for a calm moment ...
+    late_radius: float = 1.6  # ... closes within so many times that radius and that swing, which grow on the way there
+    waiting_s: float = 120.0  # assumed: gusts that pass by have passed; a retry would wait as long
     inside_s: float = 1.0  # assumed: the way from the ring to the coupling takes 0.2 s
     coupling_reached_m: float = 0.05  # assumed: the coupling takes the tip within 0.03 m, the range errs by 0.02 m
     come_along_m: float = 0.2  # assumed: a drogue farther from the tip than this is not held by it
@@ -127,15 +127,18 @@ _AWAY = (
 )
 _SLOT_OVER = Transition(Phase.CLEAR, "time slot over", lambda limits, s: s.time_s >= limits.slot_s)
 
+_LOST_FOR_GOOD = Transition(Phase.CLEAR, "drogue lost", lambda limits, s: s.unusable_s > limits.lost_for_good_s)
+
 #: The first condition that holds decides.
 TRANSITIONS: dict[Phase, tuple[Transition, ...]] = {
     Phase.JOIN_UP: (
         _SLOT_OVER,
+        _LOST_FOR_GOOD,
         Transition(Phase.PRE_CONTACT, "at the stand-off point", lambda limits, s: s.station_m <= limits.station_m),
     ),
     Phase.PRE_CONTACT: (
         _SLOT_OVER,
-        Transition(Phase.CLEAR, "drogue lost", lambda limits, s: s.unusable_s > limits.lost_for_good_s),
+        _LOST_FOR_GOOD,
         Transition(
             Phase.APPROACH,
             "steady",

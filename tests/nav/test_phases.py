@@ -39,6 +39,7 @@ HELD = {"ahead_m": 0.0, "ring_ahead_m": -0.3, "closing_m_s": 0.0}
     [
         ("join_up", {}, None),
         ("join_up", {"station_m": 0.4}, "pre_contact"),
+        ("join_up", {"unusable_s": 20.1}, "clear"),
         ("pre_contact", {}, None),
         ("pre_contact", {"steady_s": 3.0}, "approach"),
         ("pre_contact", {"unusable_s": 19.9}, None),
@@ -56,8 +57,8 @@ HELD = {"ahead_m": 0.0, "ring_ahead_m": -0.3, "closing_m_s": 0.0}
         ("approach", {"entered_m": 0.3, "ring_ahead_m": -0.01}, "breakaway"),
         ("approach", {"entered_m": 0.2, "lateral_m": 0.3, "ring_ahead_m": -0.1}, None),
         ("approach", {"closing_m_s": 2.7}, "breakaway"),
-        ("approach", {"waiting_s": 59.9}, None),
-        ("approach", {"waiting_s": 60.1}, "back_off"),
+        ("approach", {"waiting_s": 119.9}, None),
+        ("approach", {"waiting_s": 120.1}, "back_off"),
         ("approach", {"inside_s": 1.01}, "back_off"),
         ("approach", {"ahead_m": 0.04}, "contact"),
         ("contact", HELD, None),
