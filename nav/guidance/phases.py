@@ -66,6 +66,7 @@ class Situation:
     waiting_s: float  #: time for which the approach has stood still for want of a good moment
     inside_s: float  #: time for which the tip has been past the ring's plane
     unusable_s: float  #: time for which the relative state has been unusable, once it has been usable
+    blind_s: float  #: time for which it has been unusable beyond that for which it has been usable
     doubtful_s: float  #: time for which the integrity monitor has not claimed that contact may be flown
     station_m: float  #: probe's tip from the stand-off point
     ahead_m: float  #: coupling ahead of the probe's tip
@@ -127,7 +128,7 @@ _AWAY = (
 )
 _SLOT_OVER = Transition(Phase.CLEAR, "time slot over", lambda limits, s: s.time_s >= limits.slot_s)
 
-_LOST_FOR_GOOD = Transition(Phase.CLEAR, "drogue lost", lambda limits, s: s.unusable_s > limits.lost_for_good_s)
+_LOST_FOR_GOOD = Transition(Phase.CLEAR, "drogue lost", lambda limits, s: s.blind_s > limits.lost_for_good_s)
 
 #: The first condition that holds decides.
 TRANSITIONS: dict[Phase, tuple[Transition, ...]] = {
