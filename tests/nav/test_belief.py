@@ -264,6 +264,22 @@ def test_places_of_the_leds_are_told_from_tilt_once_the_ring_turns():
     assert 0.5 * low < np.sum(says) < high
 
 
+def test_a_larger_ring_is_considered_and_not_learnt():
+    """Frames that show a ring 1 % larger, with the range known: places are learnt, their common scale is not."""
+    d = 2e-4 * np.random.default_rng(11).normal(size=(8, 2)) + 0.01 * LEDS[:, 1:]
+    P = covariance({0: np.deg2rad(0.1) ** 2, 3: 1e-10})
+    P[range(RING.start, RING.stop), range(RING.start, RING.stop)] = 9e-8
+    p_CD, R_CD = np.array([4.0, 0.1, 0.1]), matrix_from_yaw_pitch_roll(0.0, 0.2, 0.0)
+    b = replace(belief(P), R_BD=MOUNTING.R_BC @ R_CD)
+    b.x[0] = MOUNTING.p_BC - MOUNTING.p_BI + MOUNTING.R_BC @ p_CD
+    pose = solve_pose(pixels_of(R_CD, p_CD, LEDS + np.c_[np.zeros(8), d]), LEDS, CAMERA, sigma_px=0.05)
+    for _ in range(50):
+        b = corrected([b], pose, SIGHT, OPEN, Taking(ring=0.3)).beliefs[0]
+    assert abs(b.ring @ SIGHT.larger) < 1e-12
+    assert np.linalg.norm(b.ring) > 1e-4
+    assert SIGHT.larger @ b.P[RING, RING] @ SIGHT.larger == pytest.approx(9e-8, rel=1e-6)
+
+
 def test_leds_are_expected_where_they_are_believed_to_be_on_the_ring():
     b = replace(belief(np.zeros((ERRORS, ERRORS)), MOUNTING.R_BC), ring=1e-3 * np.arange(16.0))
     ring = LEDS.copy()
