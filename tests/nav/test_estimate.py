@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.stats import chi2
 
@@ -369,6 +369,9 @@ COORDINATES = st.one_of(st.floats(-1e6, 1e6), st.sampled_from([np.nan, np.inf, -
     st.sampled_from([PoseOptions(), PoseOptions(residuals="pixels"), PoseOptions(huber_sigma=1.0, weight="isotropic")]),
     st.lists(st.integers(0, 9), min_size=10, max_size=10),
 )
+@example(
+    [(0.0, 0.0)] * 3, "lm", LENS, "attitude", PoseOptions(huber_sigma=1.0, weight="isotropic"), [5, 0, 4] + [0] * 7
+)  # one pixel, three LEDs: a place 2500 km away, known to 600 000 km
 def test_any_pixels_give_a_status_and_nan_covariance_unless_converged(pixels, method, camera, start, options, leds):
     """LEDs come twice, lie on a line, are too few; pixels are far out of the frame or none; starts are anywhere."""
     points = np.vstack([RING, [[0.0, 0.0, 0.0], [0.1, 0.2, 0.3]]])[leds[: len(pixels)]]
