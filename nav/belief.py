@@ -103,8 +103,9 @@ def _fitted(
 ) -> list[tuple[Belief, float]]:
     """Return the beliefs after a frame, and their chi2, lines of sight and belief fitted together."""
     seen, M = sight.shown(belief, lines)
+    ring = taking.ring * sight.but_size  # only range tells a larger ring
     return [
-        (_updated(belief, after.H @ M, after, _ring_gain(sight, taking), _weight(belief, after, taking)), after.chi2)
+        (_updated(belief, after.H @ M, after, ring, _weight(belief, after, taking)), after.chi2)
         for after in explanations(seen, lines, poses)
     ]
 
@@ -122,13 +123,8 @@ def _weight(belief: Belief, after: Explanation | PosePosterior, taking: Taking) 
     return taking.memory * belief.log_weight + taking.share * after.log_evidence
 
 
-def _ring_gain(sight: Sight, taking: Taking) -> Array:
-    """(16, 16) what is taken of the gain of the LEDs' places: nothing of a larger ring, which range looks like."""
-    return taking.ring * (np.eye(len(sight.larger)) - np.outer(sight.larger, sight.larger))
-
-
 def _updated(belief: Belief, H: Array, after: Explanation, ring: Array, log_weight: float) -> Belief:
-    """Return a belief after a frame, Eq. (1); H is per error of the belief."""
+    """Return a belief after a frame, Eq. (1); H is per error of the belief, ring (16, 16) what is taken of its gain."""
     HP = H @ belief.P
     K = np.linalg.solve(HP @ H.T + np.eye(len(H)), HP).T
     K[CALIBRATION] = 0.0

@@ -77,10 +77,13 @@ class Sight:
     mounting: Mounting
     points_D: Array  #: (8, 3) LEDs of the ring [m]
     larger: Array = field(init=False)  #: (16,) places of LEDs in a ring that is larger, of length one
+    but_size: Array = field(init=False)  #: (16, 16) takes that away from places of LEDs
 
     def __post_init__(self) -> None:
         radii = self.points_D[:, 1:].ravel()
-        object.__setattr__(self, "larger", radii / np.linalg.norm(radii))
+        larger = radii / np.linalg.norm(radii)
+        object.__setattr__(self, "larger", larger)
+        object.__setattr__(self, "but_size", np.eye(len(larger)) - np.outer(larger, larger))
 
     def apparent(self, belief: Belief, *, solved: bool = False) -> Apparent:
         """Return the pose that a frame would show, with how it depends on the errors of a belief.
