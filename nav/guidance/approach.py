@@ -262,7 +262,7 @@ class Guidance:
     def _hold_course(self) -> Array:
         """(3,) du/dt toward the drogue's drift, plus the speed along that the phase asks for."""
         s = self._settings
-        target = self._unseen_drift() if self._unusable_s > 0.0 else self._controller.drift_m_s
+        target = self._controller.drift_m_s
         if self._path.is_announced and self.phase in _TOUCHING:  # the drogue has come along
             target += self._axes.turned(np.array([self._pushed_in_m, 0.0, 0.0]))
         if self.phase is Phase.CONTACT:  # slows down so as to stop where it is to hold
@@ -271,8 +271,9 @@ class Guidance:
         elif self.phase in _RETREATING or (
             self.phase in _WAITING and self._unusable_s > s.limits.lost_s
         ):  # nobody waits near a drogue that is not seen
+            if self._unusable_s > 0.0 and self.phase not in _TOUCHING:
+                target = self._unseen_drift() + self._way_astern()
             target[0] -= s.back_off_speed_m_s
-            target[1:] += self._way_astern()
         elif self.phase is Phase.APPROACH:  # out of view, or in the basket: on as before
             target[0] = self._u[0]
         return np.asarray(s.course_gain_1_s * (target - self._u))
@@ -283,11 +284,12 @@ class Guidance:
         return np.clip(self._controller.drift_m_s, -most, most)
 
     def _way_astern(self) -> Array:
-        """(2,) velocity to get astern of a drogue that is out of view, where it will come into view again."""
-        s = self._settings
-        if self._unusable_s == 0.0 or self._reckoned[0] <= s.limits.off_axis_range_m:
-            return np.zeros(2)
-        return np.clip(s.reckoned_gain_1_s * self._reckoned[1:], -s.back_off_speed_m_s, s.back_off_speed_m_s)
+        """(3,) velocity across to get astern of a drogue that is out of view, where it will come into view again."""
+        s, across = self._settings, np.zeros(3)
+        if self._reckoned[0] > s.limits.off_axis_range_m:
+            most = s.back_off_speed_m_s
+            across[1:] = np.clip(s.reckoned_gain_1_s * self._reckoned[1:], -most, most)
+        return across
 
     def _command(self, u_dot: Array) -> ReceiverCommand:
         """Eq. (1) and its rate in body axes, and what the path does."""

@@ -350,6 +350,45 @@ def test_a_drogue_that_went_out_of_view_beside_the_probe_is_got_astern_of():
     assert now.p_PD_B[0] > 6.0
 
 
+def test_a_glimpse_of_the_drogue_does_not_count_as_found():
+    """Seen for a second in every ten while joining up: blind for 20 s more than seen, it leaves."""
+    plant, guidance = Plant(offset=(12.0, 2.0, 0.0)), Guidance(SETTINGS, RATE_HZ)
+    now = plant.step(ReceiverCommand())
+    while guidance.phase is not Phase.CLEAR and plant.t < 60.0:
+        glimpsed = plant.t % 10.0 < 1.0
+        now = plant.step(guidance.step(now if glimpsed else state(now.p_PD_B, usable=False)))
+    assert guidance.phase_reason == "drogue lost"
+    assert 20.0 < plant.t < 35.0
+
+
+def test_a_belief_that_a_blow_unsettles_does_not_end_an_entry_inside_the_rim():
+    """Past the ring's plane the drogue is said to be 0.3 m aside for a tenth of a second."""
+    plant, guidance, ticks, phases = Plant(), Guidance(SETTINGS, RATE_HZ), 0, set()
+    now = plant.step(ReceiverCommand())
+    while plant.t < 60.0 and guidance.phase is not Phase.HOLD:
+        struck = now.p_PD_B[0] < -0.05 and ticks < RATE_HZ // 10
+        ticks += struck
+        now = plant.step(guidance.step(state(now.p_PD_B + [0.0, 0.3, 0.0]) if struck else now))
+        phases.add(guidance.phase)
+    assert ticks == RATE_HZ // 10
+    assert guidance.phase is Phase.HOLD and Phase.BREAKAWAY not in phases
+
+
+def test_until_committed_a_share_of_the_limits_across_is_enough():
+    """The drogue hops aside by 1.5 m while the receiver runs up."""
+    plant, guidance, most = Plant(), Guidance(SETTINGS, RATE_HZ), 0.0
+    limits, now = np.array(SETTINGS.acceleration_limit_m_s2)[1:], plant.step(ReceiverCommand())
+    while plant.t < 10.0:
+        command = guidance.step(now)
+        if guidance.phase is Phase.APPROACH:
+            assert not guidance._closure.committed
+            most = max(most, float((np.abs(command.acceleration_m_s2[1:]) / limits).max()))
+            if guidance._closure.speed_m_s > 0.5:
+                plant.drogue = lambda _: np.array([0.0, 1.5, 0.0])
+        now = plant.step(command)
+    assert 0.9 * SETTINGS.patient_share < most < SETTINGS.patient_share + 1e-9
+
+
 def test_a_drogue_that_is_not_seen_is_not_waited_for_beside_it():
     """Lost as the tip enters, the belief running away: the retreat goes on, so does falling back, then it is over."""
     plant, guidance = Plant(offset=(4.0, 0.0, 0.0)), Guidance(SETTINGS, RATE_HZ)
