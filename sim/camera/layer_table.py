@@ -37,7 +37,8 @@ _KEYS_PER_DEPTH = 3.0
 _FROM, _UNTIL = 0.05, 0.45  # way from a key, in keys' distances, over which the next one's tiles are made
 _LOOK_AGAIN = 16  # frames from one look at what the next key lacks to another
 
-Geometry = tuple[float, float, float, float, float, float]  # e, 2 h - h^2/r, h', 1/a, D_x, D_y
+Pairs = NDArray[np.uint64]  # light and transmittance of a node, four bytes each, as one
+Geometry = tuple[float, float, float, float, float, float]  # e, 2 h - h^2/r, h', 1/2a, D_x, D_y
 View = tuple[Array, Array, Array, Interval]  # R_WC, tangents x and y, columns that see the layer
 
 
@@ -126,7 +127,7 @@ class LayerTable:
         height, a = self._height_m + float(place_m[2]), self._radius_m
         twice = 2.0 * height - height * height / (a + height)
         aside = place_m - key
-        return twice / (a + height), twice, self._height_m + float(key[2]), 1.0 / a, float(aside[0]), float(aside[1])
+        return twice / (a + height), twice, self._height_m + float(key[2]), 0.5 / a, float(aside[0]), float(aside[1])
 
 
 def _step(x: Array) -> float:
@@ -140,6 +141,7 @@ def lay_under(
     """Write the radiance of ground, or of a deck (light, transmittance) before it, into the columns that see it."""
     tangents, n = x.astype(np.float32), len(x)
     corner, down, right = np.empty(n, np.int32), np.empty(n, np.float32), np.empty(n, np.float32)
+    around, deck_pairs = np.empty((4, n), np.uint64), deck.values.view(np.uint64)
     for i in range(len(y)):
         left, stop = below[i]
         if left == stop:
@@ -150,7 +152,7 @@ def lay_under(
         _read(ground, places, row)
         if has_deck:
             _place(R, part, y[i], deck, places)
-            _read_over(deck, places, row)
+            _read_over(deck_pairs, places, around, row)
 
 
 @njit(cache=True, error_model="numpy", inline="always")
@@ -158,23 +160,22 @@ def _toward(
     dx: np.float32, dy: np.float32, dz: np.float32, g: tuple[np.float32, ...]
 ) -> tuple[np.float32, np.float32, np.float32]:
     """Eqs. (1) and (2)."""
-    e, twice, key_height, a, aside_x, aside_y = g
+    e, twice, key_height, half_curvature, aside_x, aside_y = g
     square, zero = dz * dz - (dx * dx + dy * dy + dz * dz) * e, np.float32(0.0)
     k = twice / (np.sqrt(square if square > zero else zero) - (dz if dz < zero else zero))
     ox, oy = k * dx + aside_x, k * dy + aside_y
-    level = ox * ox + oy * oy
-    sag = level * a  # times half, and the next term of the root's series; a is the sphere's inverse radius
-    return ox, oy, -key_height - np.float32(0.5) * sag * (np.float32(1.0) + np.float32(0.25) * sag * a)
+    sag = (ox * ox + oy * oy) * half_curvature
+    return ox, oy, -key_height - sag * (np.float32(1.0) + sag * half_curvature)
 
 
 @njit(cache=True, error_model="numpy", inline="always")
 def _node(x: np.float32, y: np.float32, z: np.float32, half: np.float32) -> tuple[np.float32, np.float32]:
-    """Fractional row and column of a direction of any length, as of `sky_table`."""
+    """Fractional row and column of a direction of any length, as of `sky_table`; of one that points down, z < 0."""
     zero = np.float32(0.0)
-    scale = half / (abs(x) + abs(y) + abs(z))
+    scale = half / (abs(x) + abs(y) - z)
     p_y, p_z = y * scale, z * scale
-    q_y, q_z = half - abs(p_z), half - abs(p_y)
-    q_y, q_z = (q_y if p_y >= zero else -q_y), (q_z if p_z >= zero else -q_z)
+    q_y, q_z = half + p_z, abs(p_y) - half
+    q_y = q_y if p_y >= zero else -q_y
     return half - (q_z if x < zero else p_z), half - (q_y if x < zero else p_y)
 
 
@@ -225,23 +226,30 @@ def _read(
         out[j] = a + down[j] * (b - a)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _read_over(
-    nodes: Nodes,
+    pairs: Pairs,
     places: tuple[NDArray[np.int32], NDArray[np.float32], NDArray[np.float32]],
+    around: Pairs,
     out: NDArray[np.float32],
 ) -> None:
-    """Light of the layer, and what it lets through of what is in `out`."""
-    values, (corner, down, right) = nodes.values, places
+    """Light of the layer, and what it lets through of what is in `out`.
+
+    A node's two values are fetched as one, first for all blocks: the compiler then reckons several blocks at once.
+    """
+    corner, down, right = places
     for j in range(len(out)):
-        k, s, t = np.uint32(2) * np.uint32(corner[j]), right[j], down[j]
-        one, two, three = k + np.uint32(1), k + np.uint32(2), k + np.uint32(3)
-        m = k + np.uint32(2 * _SIDE)
-        a = values[k] + s * (values[two] - values[k])
-        c = values[one] + s * (values[three] - values[one])
-        b = values[m] + s * (values[m + np.uint32(2)] - values[m])
-        d = values[m + np.uint32(1)] + s * (values[m + np.uint32(3)] - values[m + np.uint32(1)])
-        out[j] = a + t * (b - a) + (c + t * (d - c)) * out[j]
+        k = np.uint64(np.uint32(corner[j]))
+        below = k + np.uint64(_SIDE)
+        around[0, j], around[1, j] = pairs[k], pairs[k + np.uint64(1)]
+        around[2, j], around[3, j] = pairs[below], pairs[below + np.uint64(1)]
+    values = around.view(np.float32)
+    a, b, c, d = values[0], values[1], values[2], values[3]
+    for j in range(len(out)):
+        light, clear, s, t = 2 * j, 2 * j + 1, right[j], down[j]
+        up, up_clear = a[light] + s * (b[light] - a[light]), a[clear] + s * (b[clear] - a[clear])
+        low, low_clear = c[light] + s * (d[light] - c[light]), c[clear] + s * (d[clear] - c[clear])
+        out[j] = up + t * (low - up) + (up_clear + t * (low_clear - up_clear)) * out[j]
 
 
 @njit(cache=True)
