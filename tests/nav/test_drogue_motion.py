@@ -79,7 +79,7 @@ def test_prediction_is_as_good_as_its_own_covariance_says():
     settings, rng, ticks = SwingSettings(), np.random.default_rng(2), 60_000
     place, rate = np.array([1.0, 0.0, 1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0, 1.0, 0.0])
     H = [np.stack([place, rate - settings.rate_lag_s * (rate @ _dynamics(settings, axis))]) for axis in range(3)]
-    R = np.diag([settings.position_sigma_m, settings.rate_sigma_m_s]) ** 2
+    sigmas = np.array([(settings.position_sigma_m, sigma) for sigma in settings.rate_sigma_m_s])  # (3, 2)
     lead, F, densities, expected = np.round(LEAD_S / STEP_S).astype(int), [], np.zeros((3, 5)), []
     densities[:, 1], densities[:, 4] = settings.drift_density, settings.gust_density
     for axis in range(3):
@@ -87,7 +87,7 @@ def test_prediction_is_as_good_as_its_own_covariance_says():
         Q, P = np.diag(densities[axis] ** 2) * STEP_S, np.eye(5)
         for _ in range(6000):
             P = F[-1] @ P @ F[-1].T + Q
-            P = P - P @ H[axis].T @ np.linalg.solve(H[axis] @ P @ H[axis].T + R, H[axis] @ P)
+            P = P - P @ H[axis].T @ np.linalg.solve(H[axis] @ P @ H[axis].T + np.diag(sigmas[axis] ** 2), H[axis] @ P)
         for _ in range(lead[axis]):
             P = F[-1] @ P @ F[-1].T + Q
         expected.append(place @ P @ place)
@@ -95,7 +95,7 @@ def test_prediction_is_as_good_as_its_own_covariance_says():
     for _ in range(ticks):
         kick = np.sqrt(STEP_S) * densities * rng.standard_normal((3, 5))
         x = np.stack([F[i] @ x[i] for i in range(3)]) + kick
-        seen = np.stack([H[i] @ x[i] for i in range(3)]) + rng.standard_normal((3, 2)) * np.sqrt(np.diag(R))
+        seen = np.stack([H[i] @ x[i] for i in range(3)]) + rng.standard_normal((3, 2)) * sigmas
         motion.step(seen[:, 0], seen[:, 1], CALM)
         true.append(x @ place)
         predicted.append(motion.ahead(CALM, CALM)[0])
