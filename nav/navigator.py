@@ -33,7 +33,8 @@ from dockair.nav.track import TrackSettings
 from dockair.rotations import Array
 
 _EVEN_LEDS = 5  # four are seldom more than an accident
-_POSE_LEDS = 4  # fewer are no pose without a belief
+_POSE_LEDS = 4  # fewer are no pose without a belief ...
+_LEAST_POSE_LEDS = 3  # ... and these are one with its attitude
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -142,9 +143,11 @@ class Navigator:
         time_s, named = seen.time_stamp_s, seen.led_numbers
         self._led_pixels_px = np.full((len(self._points_D), 2), np.nan)
         self._led_pixels_px[named] = seen.centroids_px
-        if len(named) < _POSE_LEDS:
-            return self._use_few(seen)
         R_CD, p_CD, covariance = self._filter.predicted_pose(time_s)
+        attitude = self._attitude_known(len(named), time_s, R_CD, covariance)
+        few = len(named) < _POSE_LEDS
+        if few and (attitude is None or len(named) < _LEAST_POSE_LEDS or self._settings.fusion.coupling != "tight"):
+            return self._use_few(seen)  # a loose filter would take the attitude for new
         misplaced_px = self._sheets.camera.focal_length_px * self._settings.led_position_sigma_m / p_CD[0]
         pose = solve_pose(
             seen.centroids_px,
@@ -152,12 +155,11 @@ class Navigator:
             self._sheets.camera,
             sigma_px=np.hypot(seen.sigma_px, misplaced_px),
             initial=(R_CD, p_CD),
+            prior=attitude if few else None,
         )
         if pose.status is not PoseStatus.CONVERGED:
             return f"pose {pose.status.value}"
-        checked = check_integrity(
-            pose, self._attitude_known(len(named), time_s, R_CD, covariance), self._settings.integrity
-        )
+        checked = check_integrity(pose, attitude, self._settings.integrity)
         if checked.status is IntegrityStatus.INCONSISTENT:
             return f"pose {checked.status.value}"
         if checked.led is not None:

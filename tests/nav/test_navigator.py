@@ -391,9 +391,10 @@ def test_one_to_three_leds_keep_a_belief_and_begin_none(render, count):
     for _ in range(50):
         solution = step_on_leds(sky, range(count))
         statuses.add(solution.status)
-    assert "LEDs used" in statuses and solution.valid
+    assert ("pose used" if count == 3 else "LEDs used") in statuses and solution.valid
     assert np.abs(solution.p_PD_B - still(0.0))[1:].max() < (0.05 if count == 1 else 0.02)
-    assert Doubt.AGE in sky.navigator.contact_claim().doubts  # a claim needs a pose that can be tested
+    doubts = sky.navigator.contact_claim().doubts  # a claim needs a pose: three LEDs and the attitude believed
+    assert (Doubt.AGE in doubts) == (count < 3)
 
 
 def test_single_leds_of_a_frame_get_their_names_from_the_belief(render):
@@ -427,6 +428,19 @@ def test_four_leds_are_enough_for_contact_with_the_attitude_that_frames_before_s
     alone, with_attitude = (with_four_leds(render, leds).navigator.contact_claim() for leds in (0, 6))
     assert alone.doubts == (Doubt.RANGE,) and alone.levels.range_m > 0.15
     assert with_attitude.usable and with_attitude.levels.range_m < 0.5 * alone.levels.range_m
+
+
+def test_three_leds_claim_contact_with_the_attitude_alone_and_not_with_one_that_is_bent_away(render):
+    """With half of the ring dark the probe hides one more on the last metre. LED 4 is then 4 px off."""
+    by_attitude, alone = with_four_leds(render, 6), with_four_leds(render, 0)
+    for sky in (by_attitude, alone):
+        sky.hidden = {0, 1, 2, 3, 6}
+        sky.run(0.5)
+    assert by_attitude.step().status == "pose used" and by_attitude.navigator.contact_claim().usable
+    assert Doubt.AGE in alone.navigator.contact_claim().doubts
+    by_attitude.bent_px[4] = 4.0, 0.0
+    by_attitude.run(0.5)
+    assert not by_attitude.navigator.contact_claim().usable
 
 
 def test_with_the_attitude_one_of_four_leds_that_is_bent_away_is_seen(render):
