@@ -26,6 +26,7 @@ from dockair.nav.guidance.announced_path import AnnouncedPath
 from dockair.nav.guidance.closing import PredictedMiss, time_to_contact_s
 from dockair.nav.guidance.closure import Closure
 from dockair.nav.guidance.controller import Controller, Sight, Wanted
+from dockair.nav.guidance.dead_reckoning import DeadReckoning
 from dockair.nav.guidance.guidance_settings import GuidanceSettings, RelativeState
 from dockair.nav.guidance.phases import Phase, PhaseLimits, Situation, next_phase
 from dockair.nav.guidance.pid import Pid
@@ -56,7 +57,7 @@ class Guidance:
         self._turned: Array = np.zeros((2, 3))  # n x p of Eq. (1) and its rate
         self._commanded: Array = np.zeros(3)  # Eq. (1)
         self._aim: Array = np.zeros(2)
-        self._reckoned: Array = np.zeros(3)  # where the ring is, or, out of view, should be if it only drifted
+        self._reckoning = DeadReckoning(settings, self._dt)
         self._passed: Array | None = None  # where the ring was when the tip last came to its plane, left and up
         self._entered_m = 0.0  # how far off when the tip last came past it
         speeds = settings.closure_speed_m_s, settings.closure_acceleration_m_s2
@@ -80,10 +81,7 @@ class Guidance:
         coupling = self._axes.R_NB @ state.p_PK_B
         if self._path.is_announced:
             self._follow_path(state, ring, rate)
-        if state.usable:
-            self._reckoned = ring
-        else:
-            self._reckoned = self._reckoned + (self._unseen_drift() - self._u) * self._dt
+        self._reckoning.step(ring if state.usable else None, self._controller.drift_m_s, self._u)
         self._observe(state, ring, rate)
         self._count(state, ring, rate, coupling)
         self._change_phase(self._situation(ring, rate, coupling))
@@ -272,24 +270,11 @@ class Guidance:
             self.phase in _WAITING and self._unusable_s > s.limits.lost_s
         ):  # nobody waits near a drogue that is not seen
             if self._unusable_s > 0.0 and self.phase not in _TOUCHING:
-                target = self._unseen_drift() + self._way_astern()
+                target = self._reckoning.believed(target) + self._reckoning.astern_m_s()
             target[0] -= s.back_off_speed_m_s
         elif self.phase is Phase.APPROACH:  # out of view, or in the basket: on as before
             target[0] = self._u[0]
         return np.asarray(s.course_gain_1_s * (target - self._u))
-
-    def _unseen_drift(self) -> Array:
-        """(3,) the drogue's drift, where nobody sees that it is not so large: what was learnt may be half a swing."""
-        most = self._settings.unseen_drift_m_s
-        return np.clip(self._controller.drift_m_s, -most, most)
-
-    def _way_astern(self) -> Array:
-        """(3,) velocity across to get astern of a drogue that is out of view, where it will come into view again."""
-        s, across = self._settings, np.zeros(3)
-        if self._reckoned[0] > s.limits.off_axis_range_m:
-            most = s.back_off_speed_m_s
-            across[1:] = np.clip(s.reckoned_gain_1_s * self._reckoned[1:], -most, most)
-        return across
 
     def _command(self, u_dot: Array) -> ReceiverCommand:
         """Eq. (1) and its rate in body axes, and what the path does."""

@@ -1,0 +1,52 @@
+"""Where a drogue that is out of view should be, and the way back to where it will come into view again.
+
+Its last place, the drift and the receiver's own velocity u say where it is while nobody sees it:
+
+    p' = d - u,     |d| on each axis no more than a drogue behind its tanker may seem to drift                (1)
+
+Not modelled: its swing, which is over the longer it is not seen.
+"""
+
+import numpy as np
+
+from dockair.nav.guidance.guidance_settings import GuidanceSettings
+from dockair.rotations import Array
+
+
+class DeadReckoning:
+    """Eq. (1), one control tick at a time.
+
+    Args:
+        settings: of the guidance.
+        step_s: control period.
+    """
+
+    def __init__(self, settings: GuidanceSettings, step_s: float) -> None:
+        self._settings, self._step_s = settings, step_s
+        self._place_m: Array = np.zeros(3)
+
+    def step(self, ring_m: Array | None, drift_m_s: Array, u_m_s: Array) -> None:
+        """Advance by one control tick.
+
+        Args:
+            ring_m: (3,) where the ring is seen, None out of view.
+            drift_m_s: (3,) d, as learnt while it was in view.
+            u_m_s: (3,) u.
+        """
+        if ring_m is not None:
+            self._place_m = ring_m
+        else:
+            self._place_m = self._place_m + (self.believed(drift_m_s) - u_m_s) * self._step_s
+
+    def believed(self, drift_m_s: Array) -> Array:
+        """(3,) of a drift that was learnt, what may be believed out of view: it may be half a swing."""
+        most = self._settings.unseen_drift_m_s
+        return np.clip(drift_m_s, -most, most)
+
+    def astern_m_s(self) -> Array:
+        """(3,) velocity across to get astern of the drogue; none beside it."""
+        s, across = self._settings, np.zeros(3)
+        if self._place_m[0] > s.limits.off_axis_range_m:
+            most = s.back_off_speed_m_s
+            across[1:] = np.clip(s.reckoned_gain_1_s * self._place_m[1:], -most, most)
+        return across
