@@ -103,9 +103,10 @@ class Navigator:
             frame = frame if asked is None else None
         if isinstance(frame, CameraFrame):
             time_s = frame.time_stamp_s
-            seen = self._finder.find(frame, followed=self._followed(time_s), lost=self._lost(time_s))
+            lost = self._lost(time_s)
+            seen = self._finder.find(frame, followed=self._followed(time_s), lost=lost)
             self._candidates_px = self._finder.candidates_px
-            if self._finder.found_anew:
+            if lost and len(seen.led_numbers):
                 self._begin_again(seen)
             self._status = self._use(seen) if len(seen.led_numbers) else self._nothing(self._finder.status)
         elif frame is not None:
@@ -127,7 +128,7 @@ class Navigator:
         return time_s - self._used_time_s > self._settings.search_anew_s
 
     def _begin_again(self, seen: LedObservation) -> None:
-        """Believe the drogue to be where LEDs that were found without the belief show it."""
+        """Believe the drogue to be where LEDs show it, whatever was believed while it was lost."""
         pose = solve_pose(
             seen.centroids_px, self._points_D[seen.led_numbers], self._sheets.camera, sigma_px=seen.sigma_px
         )

@@ -84,7 +84,6 @@ class RingFinder:
         self._turned_rad, self._few_settings, self._misplaced_m = turned_rad, few_settings or FewSettings(), misplaced_m
         self._coded = code_of(sheets.ring, CodeSettings()).says_something
         self._few = False  #: whether the newest frame's LEDs were named one by one
-        self.found_anew = False  #: whether the newest frame's ring was found without the belief
         self._tracker = RingTracker(
             sheets.camera, 1.0 / sheets.camera_rate_hz, track_settings,
             ring_radius_m=0.5 * sheets.ring.diameter_m, lever_C=sheets.mounting.R_BC.T @ sheets.mounting.p_BC,
@@ -107,10 +106,8 @@ class RingFinder:
             self._tracker.predict(*self._turn_C(self._frame_time_s, frame.time_stamp_s))
         self._frame_time_s = frame.time_stamp_s
         found, expected_px = self._found(blobs, frame.time_stamp_s)
-        self.found_anew = False
         if lost and found.status is IdentificationStatus.NOT_FOUND:
             found = self._identified(blobs)
-            self.found_anew = found.status is IdentificationStatus.FOUND
         self._tracker.update(found)
         self.status = f"ring {found.status.value}"
         if found.status is not IdentificationStatus.FOUND:

@@ -81,8 +81,9 @@ class Guidance:
         coupling = self._axes.R_NB @ state.p_PK_B
         if self._path.is_announced:
             self._follow_path(state, ring, rate)
-        self._reckoning.step(ring if state.usable else None, self._controller.drift_m_s, self._u)
         self._observe(state, ring, rate)
+        middle = self._controller.middle_m if state.usable else None
+        self._reckoning.step(middle, self._controller.drift_m_s, self._u)
         self._count(state, ring, rate, coupling)
         self._change_phase(self._situation(ring, rate, coupling))
         u_dot = self._follow(ring) if self._follows(state, ring) else self._hold_course()

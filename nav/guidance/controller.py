@@ -51,6 +51,11 @@ class Controller(Protocol):
         ...
 
     @property
+    def middle_m(self) -> Array:
+        """(3,) from the probe's tip to the middle of the drogue's swing."""
+        ...
+
+    @property
     def bears_the_gusts(self) -> bool:
         """Whether swings like those of the last half minute can be followed at all, for an approach to be begun."""
         ...

@@ -1,10 +1,12 @@
 """Where a drogue that is out of view should be, and the way back to where it will come into view again.
 
-Its last place, the drift and the receiver's own velocity u say where it is while nobody sees it:
+The middle of its swing p, the drift d and the receiver's own velocity u say where it is while nobody sees it:
 
     p' = d - u,     |d| on each axis no more than a drogue behind its tanker may seem to drift                (1)
 
-Not modelled: its swing, which is over the longer it is not seen.
+Its last place does not: a drogue that goes out of view has been pushed aside or is at the end of a swing.
+
+Not modelled: the swing, which is over the longer it is not seen.
 """
 
 import numpy as np
@@ -25,16 +27,16 @@ class DeadReckoning:
         self._settings, self._step_s = settings, step_s
         self._place_m: Array = np.zeros(3)
 
-    def step(self, ring_m: Array | None, drift_m_s: Array, u_m_s: Array) -> None:
+    def step(self, middle_m: Array | None, drift_m_s: Array, u_m_s: Array) -> None:
         """Advance by one control tick.
 
         Args:
-            ring_m: (3,) where the ring is seen, None out of view.
+            middle_m: (3,) p of a drogue that is seen, None out of view.
             drift_m_s: (3,) d, as learnt while it was in view.
             u_m_s: (3,) u.
         """
-        if ring_m is not None:
-            self._place_m = ring_m
+        if middle_m is not None:
+            self._place_m = middle_m
         else:
             self._place_m = self._place_m + (self.believed(drift_m_s) - u_m_s) * self._step_s
 

@@ -105,6 +105,11 @@ class DrogueMotion:
         return self._x[:, 1].copy()
 
     @property
+    def middle_m(self) -> Array:
+        """(3,) m: the place without the swing."""
+        return self._x[:, 0].copy()
+
+    @property
     def swing_m_s2(self) -> Array:
         """(3,) acceleration at the ends of the swing of now, omega hypot(omega s, s'), if no gust drove it on."""
         return np.asarray(self._omega_rad_s * np.hypot(self._omega_rad_s * self._x[:, 2], self._x[:, 3]))

@@ -47,6 +47,11 @@ class Pid:
         return self._integral.copy()
 
     @property
+    def middle_m(self) -> Array:
+        """(3,) from the tip to where the drogue was seen last: it does not tell a swing from a place."""
+        return self._place.copy()
+
+    @property
     def bears_the_gusts(self) -> bool:
         """Always: it does not know."""
         return True

@@ -114,6 +114,11 @@ class Predictive:
         return self._motion.drift_m_s
 
     @property
+    def middle_m(self) -> Array:
+        """(3,) from the tip to the middle of the drogue's swing."""
+        return np.asarray(self._motion.middle_m - self._own.place_m)
+
+    @property
     def bears_the_gusts(self) -> bool:
         """Whether the swings of the last half minute ask for no more than can be followed."""
         return bool((self._gusts <= self._gusts_seen * self._bearable).all())

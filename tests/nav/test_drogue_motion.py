@@ -171,3 +171,11 @@ def test_the_mean_path_is_the_drift_alone():
         motion.step(np.array([4.0, 0.2 * k * STEP_S, 0.0]), np.array([0.0, 0.2, 0.0]), np.zeros(3))
     expected = 0.2 * (2999 * STEP_S + LEAD_S[1] + 0.1 * np.arange(1, 6))
     assert np.allclose(motion.mean_path(5)[:, 1], expected, atol=5e-3)
+
+
+def test_the_middle_of_the_swing_is_told_from_the_place():
+    """A swing of 0.4 m across about 1.0 m: within half a minute the middle is known to a third of it."""
+    omega = 2 * np.pi * np.array(SwingSettings().frequency_hz)
+    for seconds in np.arange(30.0, 34.0, 0.4):  # at any moment of the swing
+        _, motion = follow(lambda t: 1.0 + 0.4 * np.sin(omega * t), lambda t: 0.4 * omega * np.cos(omega * t), seconds)
+        assert np.abs(motion.middle_m - 1.0)[1:].max() < 0.4 / 3.0

@@ -311,6 +311,21 @@ def test_a_drogue_that_was_lost_is_found_wherever_it_comes_into_view_again(rende
         assert names_are_true(sky, solution)
 
 
+def test_a_lost_drogue_that_is_believed_behind_the_camera_is_found(render):
+    """Backing off at 4 m/s when it went out of view, so that the belief passes the lens: no LED of it has a place."""
+
+    def path(time_s):
+        if time_s < 0.5:
+            return still(time_s) - [4.0 * time_s, 0.0, 0.0]
+        return np.array([6.0, 20.0 if time_s < 4.5 else -1.1, 0.5])
+
+    sky = Sky(render, path)
+    assert sky.run(0.5).valid
+    sky.run(4.0)
+    assert np.isnan(sky.navigator._filter.predicted_led_pixels(sky.navigator._time_s)[0]).all()
+    assert sky.run(0.5).valid
+
+
 def test_a_window_that_does_not_show_where_the_belief_has_the_ring_is_given_up(render):
     """The track is led astray by hand: without this rule it would be given five frames."""
     sky = Sky(render, still)
