@@ -152,7 +152,7 @@ class Guidance:
         elif self._entered_m == 0.0:
             self._entered_m = float(np.hypot(ring[1], ring[2]))
         if self.phase in _TOUCHING:
-            self._pushed_in_m += (self._u[0] - self._controller.drift_m_s[0]) * self._dt
+            self._pushed_in_m += (self._u[0] - self._controller.steady_drift_m_s[0]) * self._dt
 
     def _close(self, state: RelativeState, distance_m: float, closing_m_s: float) -> None:
         """Say how good a moment it is to close; the longer one has been waited for, the less is asked of it."""
@@ -262,6 +262,8 @@ class Guidance:
         """(3,) du/dt toward the drogue's drift, plus the speed along that the phase asks for."""
         s = self._settings
         target = self._controller.drift_m_s
+        if self.phase in _TOUCHING:
+            target[0] = self._controller.steady_drift_m_s[0]
         if self._path.is_announced and self.phase in _TOUCHING:  # the drogue has come along
             target += self._axes.turned(np.array([self._pushed_in_m, 0.0, 0.0]))
         if self.phase is Phase.CONTACT:  # slows down so as to stop where it is to hold

@@ -51,6 +51,11 @@ class Controller(Protocol):
         ...
 
     @property
+    def steady_drift_m_s(self) -> Array:
+        """(3,) the same where nothing new is learnt for seconds, with the drogue on the probe: no surge of the reel."""
+        ...
+
+    @property
     def middle_m(self) -> Array:
         """(3,) from the probe's tip to the middle of the drogue's swing."""
         ...

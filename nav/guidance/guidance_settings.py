@@ -28,6 +28,7 @@ class PredictiveSettings:
     excess_max: float = 1.5  # of that: three times what is bearable is severe turbulence
     bearing_s: float = 4.0  # over which that mean is taken: a swing and a half
     gusts_s: float = 30.0  # over which it is taken before an approach: a lull in severe turbulence is over too soon
+    steady_s: float = 6.0  # over which the drift is taken that is held on the probe: longer than a surge of the reel
     plan: PlanSettings = field(default_factory=PlanSettings)
     swing: SwingSettings = field(default_factory=SwingSettings)
 

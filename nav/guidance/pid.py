@@ -47,6 +47,11 @@ class Pid:
         return self._integral.copy()
 
     @property
+    def steady_drift_m_s(self) -> Array:
+        """(3,) the same: the integrals are slow."""
+        return self.drift_m_s
+
+    @property
     def middle_m(self) -> Array:
         """(3,) from the tip to where the drogue was seen last: it does not tell a swing from a place."""
         return self._place.copy()

@@ -75,6 +75,8 @@ class Predictive:
         self._asked = _AT_FIRST * self._bearable  # mean square of the drogue's acceleration, left and up
         self._gusts: Array = np.zeros(2)  # the same over some swings more, beginning at nothing ...
         self._gusts_seen = 0.0  # ... so that this share of it has been seen
+        self._drift: Array = np.zeros(3)  # likewise
+        self._drift_seen = 0.0
 
     @property
     def looks_ahead_s(self) -> Array:
@@ -102,6 +104,9 @@ class Predictive:
             share = self._step_s / self._settings.gusts_s
             self._gusts = self._gusts + share * (squares - self._gusts)
             self._gusts_seen += share * (1.0 - self._gusts_seen)
+            share = self._step_s / self._settings.steady_s
+            self._drift = self._drift + share * (self._motion.drift_m_s - self._drift)
+            self._drift_seen += share * (1.0 - self._drift_seen)
 
     def given(self, velocity_m_s: Array, acceleration_m_s2: Array) -> None:
         """Take note of velocity and acceleration (3,) commanded for the next period."""
@@ -112,6 +117,11 @@ class Predictive:
     def drift_m_s(self) -> Array:
         """(3,) velocity that keeps company with the drogue, its swing apart."""
         return self._motion.drift_m_s
+
+    @property
+    def steady_drift_m_s(self) -> Array:
+        """(3,) its mean over the last seconds: what lasts is the bias of the receiver's inertial velocity."""
+        return np.asarray(self._drift / max(self._drift_seen, np.finfo(float).tiny))
 
     @property
     def middle_m(self) -> Array:

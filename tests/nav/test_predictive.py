@@ -1,0 +1,57 @@
+"""What the predictive controller says of the drogue where it is not looked at."""
+
+import numpy as np
+
+from dockair.nav.guidance.controller import Sight
+from dockair.nav.guidance.guidance_settings import GuidanceSettings
+from dockair.nav.guidance.predictive import Predictive
+
+SETTINGS, STEP_S = GuidanceSettings(), 0.01
+
+
+def shown(place, rate, seconds):
+    """A controller that was shown a drogue on a path, itself at rest."""
+    limits = np.array(SETTINGS.acceleration_limit_m_s2), np.array(SETTINGS.jerk_limit_m_s3)
+    settings = SETTINGS.predictive
+    controller = Predictive(settings, np.array(SETTINGS.response_s), *limits, STEP_S, SETTINGS.patient_share)
+    for k in range(round(seconds / STEP_S)):
+        push = np.zeros((len(controller.looks_ahead_s), 3))
+        controller.observe(Sight(place_m=place(k * STEP_S), rate_m_s=rate(k * STEP_S), push_m_s2=push))
+        controller.given(np.zeros(3), np.zeros(3))
+    return controller
+
+
+def test_a_surge_of_the_reel_is_not_held_on_the_probe():
+    """0.1 m/s forward for 15 s, then 0.9 m/s for the last second and a half: most of it is not held."""
+
+    def rate(t):
+        return np.array([0.1 if t < 15.0 else 0.9, 0.0, 0.0])
+
+    def place(t):
+        return np.array([4.0 + 0.1 * t + 0.8 * max(t - 15.0, 0.0), 0.0, 0.0])
+
+    controller = shown(place, rate, 16.5)
+    assert controller.drift_m_s[0] > 0.3
+    held = controller.steady_drift_m_s
+    assert 0.1 < held[0] < 0.2
+    for _ in range(500):
+        controller.observe(None)
+    np.testing.assert_array_equal(controller.steady_drift_m_s, held)
+
+
+def test_a_bias_of_the_velocity_is_held_after_some_seconds():
+    drift = np.array([0.2, -0.3, 0.3])
+    controller = shown(lambda t: np.array([4.0, 0.0, 0.0]) + drift * t, lambda _: drift, 9.0)
+    np.testing.assert_allclose(controller.steady_drift_m_s, drift, atol=0.1)
+
+
+def test_the_middle_of_the_swing_is_seen_from_the_tip():
+    """A drogue 4 m ahead and 1 m left swings by 0.3 m: out of view it is sought in the middle."""
+    omega = 2.0 * np.pi * np.array(SETTINGS.predictive.swing.frequency_hz[1])
+    across = np.array([0.0, 1.0, 0.0])
+    controller = shown(
+        lambda t: np.array([4.0, 1.0, 0.0]) + 0.3 * np.sin(omega * t) * across,
+        lambda t: 0.3 * omega * np.cos(omega * t) * across,
+        30.0,
+    )
+    np.testing.assert_allclose(controller.middle_m, (4.0, 1.0, 0.0), atol=0.1)
