@@ -75,7 +75,7 @@ class Predictive:
         self._asked = _AT_FIRST * self._bearable  # mean square of the drogue's acceleration, left and up
         self._gusts: Array = np.zeros(2)  # the same over some swings more, beginning at nothing ...
         self._gusts_seen = 0.0  # ... so that this share of it has been seen
-        self._drift: Array = np.zeros(3)  # likewise
+        self._drift: Array = np.zeros(3)  # mean of the drift, beginning at nothing likewise
         self._drift_seen = 0.0
 
     @property
