@@ -187,6 +187,10 @@ class RelativeFilter:
         bias = newest.beliefs[0].bias if newest is not None else np.zeros(3)
         return np.asarray(self._record.rate_B(time_s) - bias) if np.isfinite(self.imu_time_s) else np.zeros(3)
 
+    def mean_force_B(self, start_s: float, end_s: float) -> Array:
+        """(3,) mean specific force after `start_s` up to `end_s` [m/s^2]; NaN where none was felt."""
+        return self._record.mean_force_B(start_s, end_s)
+
     def predicted_pose(self, time_s: float) -> tuple[Array, Array, Array]:
         """R_CD (3, 3), p_CD (3,) [m] that a frame would show, and their covariance (6, 6) of (phi, delta) in C."""
         seen = self._sight.apparent(mixture(self._beliefs(time_s)))

@@ -113,6 +113,11 @@ class ImuRecord:
         first, stop = np.searchsorted(self.times_s, (start_s, end_s), side="right")
         return np.asarray(self.rates_B[first:stop].mean(axis=0)) if stop > first else self.rate_B(end_s)
 
+    def mean_force_B(self, start_s: float, end_s: float) -> Array:
+        """(3,) mean specific force of the samples after `start_s` up to `end_s`; NaN when there is none."""
+        first, stop = np.searchsorted(self.times_s, (start_s, end_s), side="right")
+        return np.asarray(self.forces_B[first:stop].mean(axis=0)) if stop > first else np.full(3, np.nan)
+
     def _make_room(self) -> None:
         kept = self._end - self._first
         room = max(_FIRST_ROOM, 2 * kept)

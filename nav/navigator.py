@@ -29,6 +29,7 @@ from dockair.nav.pose.estimate import PoseStatus, solve_pose
 from dockair.nav.pose.measurement import lines_of_sight_from_pixels
 from dockair.nav.pose.prior import AttitudePrior
 from dockair.nav.ring_finder import FewSettings, RingFinder
+from dockair.nav.tip_motion import TipMotion
 from dockair.nav.track import TrackSettings
 from dockair.rotations import Array
 
@@ -48,6 +49,7 @@ class NavigatorSettings:
     contact: ContactLimits = field(default_factory=ContactLimits)
     fusion: FusionSettings = field(default_factory=FusionSettings)
     guidance: GuidanceSettings = field(default_factory=GuidanceSettings)
+    levelling_s: float = 60.0  # of the tip's motion: gusts of 1 m/s are then taken for 0.02 m/s^2 of gravity
     heading: OwnHeadingSettings | None = None  # none: docking needs no heading, and each of its frames shows no LEDs
     led_position_sigma_m: float = 3e-4  # as-built tolerance of an LED's place on the ring; 0.3 px at 3 m
     #: LEDs from which on a frame is tested by itself. Of four any three fit: the range could be off by 0.3 m unseen,
@@ -76,11 +78,14 @@ class Navigator:
             sheets, self._filter, self._settings.detect, self._settings.track, self._settings.turned_rad,
             self._settings.few, self._settings.led_position_sigma_m,
         )  # fmt: skip
+        mounting = sheets.mounting
+        self._tip = TipMotion(mounting.p_BP - mounting.p_BI, self._settings.levelling_s)
         self._guidance = Guidance(self._settings.guidance, sheets.control_rate_hz)
         self._heading = None if self._settings.heading is None else OwnHeading(sheets, self._settings.heading)
         self._points_D = sheets.ring.positions_D
         self._time_s = 0.0
         self._used_time_s = self._posed_time_s = float("nan")
+        self._felt_time_s = 0.0
         self._integrity: Integrity | None = None
         self._status = self._finder.status
         self._candidates_px: Array = np.empty((0, 2))
@@ -212,6 +217,7 @@ class Navigator:
         valid = known and sigma_lateral_m <= self._settings.usable_sigma_m and aged_s <= self._settings.usable_age_s
         claim = self.contact_claim()
         contact_usable = valid and claim is not None and claim.usable
+        w_WB_B = self._filter.rate_B(self._time_s)
         command = self._guidance.step(
             RelativeState(
                 usable=valid,
@@ -219,7 +225,8 @@ class Navigator:
                 p_PD_B=state.p_PD_B,
                 rate_PD_B=state.rate_PD_B,
                 p_PK_B=state.p_PD_B + self._sheets.coupling_depth_m * state.R_BD[:, 0],
-                w_WB_B=self._filter.rate_B(self._time_s),
+                w_WB_B=w_WB_B,
+                dv_WP_B=self._felt_change(w_WB_B),
                 sigma_lateral_m=sigma_lateral_m,
             )
         )
@@ -244,6 +251,12 @@ class Navigator:
             heading_rad=heading_rad,
             heading_sigma_rad=sigma_rad,
         )
+
+    def _felt_change(self, w_WB_B: Array) -> Array:
+        """(3,) of the tip's velocity since the last control tick."""
+        before_s, self._felt_time_s = self._felt_time_s, self._time_s
+        force_B = self._filter.mean_force_B(before_s, self._time_s)
+        return self._tip.change_m_s(force_B, w_WB_B, self._time_s - before_s)
 
     def _heading_now(self) -> tuple[float, float, float]:
         """Exposure to ask for, heading and its sigma; the LEDs' frames are not given away while the probe goes in."""

@@ -12,6 +12,7 @@ import numpy as np
 from dockair.calibration import NavigationSheets
 from dockair.messages import CameraFrame, ImuSample, NavSolution, TankerAnnouncement
 from dockair.nav.guidance.approach import Guidance, GuidanceSettings, RelativeState
+from dockair.rotations import Array
 from dockair.sim.truth import Truth
 from dockair.vectors import cross
 
@@ -27,6 +28,7 @@ class TruthNavigator:
         for array in self._always:
             array.setflags(write=False)
         self.truth: Truth | None = None
+        self._v_WP: Array | None = None  # of the last tick
 
     def announce(self, announcement: TankerAnnouncement) -> None:
         """Take note of what the tanker is about to do."""
@@ -47,8 +49,10 @@ class TruthNavigator:
             rate_PD_B=rate_PD_B,
             p_PK_B=p_PD_B + R_BD[:, 0] * self._sheets.coupling_depth_m,
             w_WB_B=w_WB_B,
+            dv_WP_B=np.full(3, np.nan) if self._v_WP is None else (truth.v_WP - self._v_WP).dot(R_WB),
             sigma_lateral_m=0.0,
         )
+        self._v_WP = truth.v_WP
         command, (led_pixels_px, candidates_px, covariance) = self._guidance.step(state), self._always
         return NavSolution(
             time_stamp_s=truth.time_s,

@@ -108,9 +108,10 @@ class Guidance:
 
     def _observe(self, state: RelativeState, ring: Array, rate: Array) -> None:
         """Show the drogue to the controller, and its distance from the probe's line to the prediction of the miss."""
+        change = np.full(3, np.nan) if self._path.is_announced else self._axes.R_NB @ state.dv_WP_B
         touches = self.phase in _TOUCHING or (self.phase is Phase.APPROACH and ring[0] <= 0.0)
         if not state.usable or touches:  # a drogue that is pushed about by the probe would lead it astray
-            self._controller.observe(None)
+            self._controller.observe(None, change)
             return
         times = self._controller.looks_ahead_s
         later = np.tile(ring, (len(times), 1))
@@ -120,7 +121,8 @@ class Guidance:
                 place_m=ring,
                 rate_m_s=rate,
                 push_m_s2=self._settings.bow_wave.at(later),
-            )
+            ),
+            change,
         )
         if not self._closure.committed:  # from then on only the miss at contact is kept small
             self._miss.step(float(np.hypot(*(ring[1:] + self._aim_now()))))

@@ -32,8 +32,13 @@ class Wanted:
 class Controller(Protocol):
     """Follows the drogue."""
 
-    def observe(self, sight: Sight | None) -> None:
-        """Take note of the drogue, once a control tick; None when it is not seen."""
+    def observe(self, sight: Sight | None, change_m_s: Array) -> None:
+        """Take note of what is seen and felt, once a control tick.
+
+        Args:
+            sight: the drogue, None when it is not seen.
+            change_m_s: (3,) of the tip's velocity since the last tick, stabilised axes; NaN where it was not felt.
+        """
         ...
 
     def given(self, velocity_m_s: Array, acceleration_m_s2: Array) -> None:

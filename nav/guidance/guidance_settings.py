@@ -29,6 +29,10 @@ class PredictiveSettings:
     bearing_s: float = 4.0  # over which that mean is taken: a swing and a half
     gusts_s: float = 30.0  # over which it is taken before an approach: a lull in severe turbulence is over too soon
     steady_s: float = 6.0  # over which the drift is taken that is held on the probe: longer than a surge of the reel
+    #: T_e of `own_path`: in moderate gusts the tip, astern, went on by 0.41, 0.36, 0.30 m in half a second for each m/s
+    #: that it strayed at.
+    straying_s: tuple[float, float, float] = (0.9, 0.6, 0.45)
+    forgotten_s: float = 4.0  # T_f: longer than the swing
     plan: PlanSettings = field(default_factory=PlanSettings)
     swing: SwingSettings = field(default_factory=SwingSettings)
 
@@ -84,4 +88,5 @@ class RelativeState:
     rate_PD_B: Array  #: (3,) d/dt of p_PD_B [m/s]
     p_PK_B: Array  #: (3,) coupling from the probe's tip [m]
     w_WB_B: Array  #: (3,) the body's angular velocity [rad/s]
+    dv_WP_B: Array  #: (3,) what the tip's velocity is felt to have changed by since the last tick [m/s]; NaN: not felt
     sigma_lateral_m: float  #: standard deviation of p_PD_B across the probe's line

@@ -1,13 +1,22 @@
-"""Where the receiver's own commands have brought it, and where those already given still will.
+"""Where the receiver has come by its own commands and by what it felt besides, and where it will come.
 
-The tip answers a command that comes with its rate a response time later, axis by axis:
+The tip answers a command that comes with its rate a response time later, axis by axis; what its accelerometers and
+gyros feel otherwise, it strays by. With dv the felt change of the tip's velocity from tick to tick,
 
-    v(t) = u(t - tau),      y_r(t) = integral of v                                                       (1)
+    v(t) = u(t - tau),      f <- (f + dv - (v_k - v_k-1)) / (1 + dt/T_f)                                  (1)
+    e <- (e + f_k - f_k-1) / (1 + dt/T_f),      y_r' = v + e                                              (2)
 
-y_r is a scale of the receiver's own, which drifts against any other with the bias of its inertial velocity.
+Twice forgotten, gravity that is not quite taken off adds nothing to e. Flight control brings back a velocity that a
+gust has changed, not the place: e dies away,
 
-Not modelled: a gain other than one and whatever else the response is besides a delay. What the tip does differently
-shows as motion of the drogue on this scale, and is followed as such.
+    e(t) = e exp(-t/T_e),      y_r(t) - y_r - way commanded = T_e (1 - exp(-t/T_e)) e                     (3)
+
+y_r is a scale of the receiver's own, which drifts against any other with the bias of its inertial velocity. On it the
+drogue's motion is its own: what the receiver did is taken off, so that a filter which follows the drogue closely does
+not chase the receiver's answer to its own commands.
+
+Not modelled: how e goes on in the gust that made it. Where nothing is felt, e is forgotten, and what the tip does
+besides its commands shows as motion of the drogue.
 """
 
 import numpy as np
@@ -16,14 +25,34 @@ from dockair.rotations import Array
 
 
 class OwnPath:
-    """Eq. (1), axes forward, left, up."""
+    """Eqs. (1) to (3), axes forward, left, up.
 
-    def __init__(self, response_s: Array, step_s: float) -> None:
-        self._step_s = step_s
-        self._ticks = np.maximum(np.round(np.asarray(response_s) / step_s).astype(int), 1)
+    Args:
+        response_s: (3,) tau.
+        step_s: control period.
+        straying_s: (3,) T_e.
+        forgotten_s: T_f.
+    """
+
+    def __init__(self, response_s: Array, step_s: float, straying_s: Array, forgotten_s: float) -> None:
+        self._step_s, self._straying_s, self._kept = step_s, straying_s, 1.0 / (1.0 + step_s / forgotten_s)
+        self._response_s = np.asarray(response_s)
+        self._ticks = np.maximum(np.round(self._response_s / step_s).astype(int), 1)
         self._length = int(self._ticks.max()) + 1
         self._axes, self._newest = np.arange(3), 0
         self._places, self._velocities = np.zeros((self._length, 3)), np.zeros((self._length, 3))  # rings
+        self._before: Array = np.zeros(3)  # v_k-1
+        self._felt: Array = np.zeros(3)  # f
+        self._straying: Array = np.zeros(3)  # e
+        self._strayed: Array = np.zeros(3)  # its integral
+
+    def feel(self, change_m_s: Array) -> None:
+        """Take note of dv (3,) since the last period, NaN where it was not felt."""
+        v, felt = self._commanded_m_s, self._felt
+        besides = change_m_s - (v - self._before) if np.isfinite(change_m_s).all() else 0.0
+        self._before, self._felt = v, self._kept * (felt + besides)
+        self._straying = self._kept * (self._straying + self._felt - felt)
+        self._strayed = self._strayed + self._straying * self._step_s
 
     def step(self, velocity_m_s: Array) -> None:
         """Take note of the velocity (3,) commanded for the next period."""
@@ -34,14 +63,28 @@ class OwnPath:
     @property
     def place_m(self) -> Array:
         """(3,) y_r now."""
-        return np.asarray(self._places[self._newest - self._ticks, self._axes])
+        return np.asarray(self._places[self._newest - self._ticks, self._axes] + self._strayed)
 
     @property
     def velocity_m_s(self) -> Array:
-        """(3,) v now."""
-        return np.asarray(self._velocities[self._newest - self._ticks, self._axes])
+        """(3,) y_r' now."""
+        return np.asarray(self._commanded_m_s + self._straying)
 
     @property
     def place_ahead_m(self) -> Array:
         """(3,) y_r after the response time of each axis, by the commands given so far."""
-        return np.array(self._places[self._newest])
+        return self.places_m(self._response_s)
+
+    @property
+    def straying_ahead_m_s(self) -> Array:
+        """(3,) e after the response time of each axis."""
+        return np.asarray(self._straying * np.exp(-self._response_s / self._straying_s))
+
+    def places_m(self, time_s: Array) -> Array:
+        """(..., 3) y_r in times (..., 3) to come, no shorter than the response times, by the commands given so far."""
+        way = self._straying_s * (1.0 - np.exp(-time_s / self._straying_s)) * self._straying
+        return np.asarray(self._places[self._newest] + self._strayed + way)
+
+    @property
+    def _commanded_m_s(self) -> Array:
+        return np.asarray(self._velocities[self._newest - self._ticks, self._axes])

@@ -27,8 +27,8 @@ class Pid:
         self._rate: Array = np.zeros(3)
         self._seen = False
 
-    def observe(self, sight: Sight | None) -> None:
-        """Take note of the drogue, once a control tick; None when it is not seen."""
+    def observe(self, sight: Sight | None, change_m_s: Array) -> None:
+        """Take note of the drogue, once a control tick; None when it is not seen. What is felt it does not use."""
         self._seen = sight is not None
         if sight is not None:
             self._place, self._rate = sight.place_m, sight.rate_m_s

@@ -58,7 +58,7 @@ class Predictive:
     ) -> None:
         self._settings, self._step_s, self._seen = settings, step_s, False
         plan = settings.plan
-        self._own = OwnPath(response_s, step_s)
+        self._own = OwnPath(response_s, step_s, np.array(settings.straying_s), settings.forgotten_s)
         self._motion = DrogueMotion(settings.swing, step_s, response_s, plan.node_s)
         self._plans, self._patient_plans = (
             [PathPlan(plan, share * acceleration_limit_m_s2[i], share * jerk_limit_m_s3[i]) for i in _ACROSS]
@@ -67,6 +67,7 @@ class Predictive:
         self._response_s = float(response_s[_ACROSS[0]])
         nodes = self._response_s + plan.node_s * np.arange(plan.nodes + 1)
         self._times: Array = np.append(0.0, nodes)
+        self._node_times = response_s + plan.node_s * np.arange(1, plan.nodes + 1)[:, np.newaxis]  # (nodes, 3)
         self._ahead: tuple[Array, Array, Array] = (np.zeros(3), np.zeros(3), np.zeros(3))
         self._path: Array = np.zeros((plan.nodes, 3))
         self._u_dot: Array = np.zeros(3)
@@ -83,8 +84,9 @@ class Predictive:
         """(n,) now, after the response time and at the nodes of the plan."""
         return self._times
 
-    def observe(self, sight: Sight | None) -> None:
-        """Take note of the drogue, once a control tick; None when it is not seen."""
+    def observe(self, sight: Sight | None, change_m_s: Array) -> None:
+        """Take note of the drogue, None when it is not seen, and of the tip's velocity, once a control tick."""
+        self._own.feel(change_m_s)
         if sight is None:
             push: Array = np.zeros((len(self._times), 3))
             self._motion.step(None, None, push[0])
@@ -156,6 +158,7 @@ class Predictive:
         s = self._settings
         gain = s.along_gain_1_s
         place, velocity, acceleration = (v[0] for v in (self._ahead if bearable else self._motion.mean_ahead()))
+        velocity = velocity - self._own.straying_ahead_m_s[0]
         if wanted.distance_m is None:
             goal, change = velocity + wanted.speed_m_s, 0.0
         else:
@@ -168,12 +171,12 @@ class Predictive:
         """(2,) next acceleration of the plans, left and up."""
         s = self._settings
         path = self._path if bearable else self._motion.mean_path(s.plan.nodes)
-        off = self._own.place_ahead_m
+        path = path - self._own.places_m(self._node_times)
         to_contact_s = None if wanted.to_contact_s is None else wanted.to_contact_s - self._response_s
         out = np.empty(2)
         plans = self._patient_plans if wanted.patient else self._plans
         for row, (axis, plan) in enumerate(zip(_ACROSS, plans, strict=True)):
-            places = path[:, axis] + wanted.aim_m[row] - off[axis]
+            places = path[:, axis] + wanted.aim_m[row]
             places -= places[0] - clipped(places[0], s.plan.error_max_m)
             x = np.array([0.0, u[axis], self._u_dot[axis]])
             out[row] = self._u_dot[axis] + plan.jerk_m_s3(x, places, to_contact_s, calm=not bearable) * self._step_s

@@ -183,6 +183,7 @@ class TurningPlant:
             rate_PD_B=(self.p_PD_B - before) / dt,
             p_PK_B=self.p_PD_B + [self.DEPTH_M, 0.0, 0.0],
             w_WB_B=log(R_before.T @ self.R_WB) / dt,
+            dv_WP_B=np.full(3, np.nan),
             sigma_lateral_m=0.0,
         )
 
@@ -221,6 +222,7 @@ def test_a_descent_is_flown_as_announced():
         rate_PD_B=np.zeros(3),
         p_PK_B=np.array([4.3, 0.0, 0.0]),
         w_WB_B=np.zeros(3),
+        dv_WP_B=np.full(3, np.nan),
         sigma_lateral_m=0.01,
     )
     for _ in range(50):

@@ -74,6 +74,7 @@ def state(p_PD_B, rate_PD_B=(0.0, 0.0, 0.0), **changes):
         rate_PD_B=np.array(rate_PD_B, dtype=float),
         p_PK_B=p_PD_B + [DEPTH_M, 0.0, 0.0],
         w_WB_B=np.zeros(3),
+        dv_WP_B=np.full(3, np.nan),
         sigma_lateral_m=0.0,
     )
     return dataclasses.replace(plain, **changes)

@@ -79,7 +79,7 @@ def test_prediction_is_as_good_as_its_own_covariance_says():
     settings, rng, ticks = SwingSettings(), np.random.default_rng(2), 60_000
     place, rate = np.array([1.0, 0.0, 1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0, 1.0, 0.0])
     H = [np.stack([place, rate - settings.rate_lag_s * (rate @ _dynamics(settings, axis))]) for axis in range(3)]
-    sigmas = np.array([(settings.position_sigma_m, sigma) for sigma in settings.rate_sigma_m_s])  # (3, 2)
+    sigmas = np.array([pair for pair in zip(settings.position_sigma_m, settings.rate_sigma_m_s, strict=True)])  # (3, 2)
     lead, F, densities, expected = np.round(LEAD_S / STEP_S).astype(int), [], np.zeros((3, 5)), []
     densities[:, 1], densities[:, 4] = settings.drift_density, settings.gust_density
     for axis in range(3):
@@ -109,12 +109,13 @@ def test_prediction_is_as_good_as_its_own_covariance_says():
 def test_a_push_that_is_known_is_part_of_what_is_seen_late():
     """A drogue pushed steadily from rest, its rate told tau_v late: the filter knows, one without tau_v does not."""
     push, n = np.array([0.0, 1.0, -1.0]), 40
+    late = replace(SwingSettings(), position_sigma_m=(0.02,) * 3, rate_sigma_m_s=(0.1,) * 3, rate_lag_s=0.032)
     places, rates = [], []
-    for settings in (SwingSettings(), replace(SwingSettings(), rate_lag_s=0.0)):
+    for settings in (late, replace(late, rate_lag_s=0.0)):
         motion, t = DrogueMotion(settings, STEP_S, LEAD_S, 0.1), 0.0
         for k in range(1, n + 1):
             t = k * STEP_S
-            motion.step(0.5 * push * t * t, push * (t - SwingSettings().rate_lag_s), push)
+            motion.step(0.5 * push * t * t, push * (t - late.rate_lag_s), push)
         places.append(motion._x[:, 0] + motion._x[:, 2] - 0.5 * push * t * t)
         rates.append(motion._x[:, 1] + motion._x[:, 3] - push * t)
     assert np.abs(rates[0]).max() < 0.5 * np.abs(rates[1]).max()

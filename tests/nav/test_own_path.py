@@ -4,11 +4,11 @@ import numpy as np
 
 from dockair.nav.guidance.own_path import OwnPath
 
-RESPONSE_S = np.array([0.4, 0.17, 0.14])
+RESPONSE_S, STRAYING_S = np.array([0.4, 0.17, 0.14]), np.array([0.9, 0.6, 0.45])
 
 
 def test_each_axis_flies_its_commands_a_response_time_later():
-    path, u = OwnPath(RESPONSE_S, 0.01), np.random.default_rng(1).normal(size=(300, 3))
+    path, u = OwnPath(RESPONSE_S, 0.01, STRAYING_S, 4.0), np.random.default_rng(1).normal(size=(300, 3))
     sums = np.vstack([np.zeros(3), np.cumsum(u, axis=0) * 0.01])
     for k in range(300):
         path.step(u[k])
@@ -16,3 +16,53 @@ def test_each_axis_flies_its_commands_a_response_time_later():
         np.testing.assert_allclose(path.place_m, [sums[n, i] for i, n in enumerate(late)], atol=1e-12)
         np.testing.assert_allclose(path.velocity_m_s, [u[n - 1, i] if n else 0.0 for i, n in enumerate(late)])
         np.testing.assert_allclose(path.place_ahead_m, sums[k + 1], atol=1e-12)
+
+
+def test_what_is_felt_besides_the_commands_is_part_of_the_way():
+    """A gust takes the tip to 0.3 m/s left at once, besides a command of 0.5 m/s: place and rate are those flown."""
+    path, left, flown = OwnPath(RESPONSE_S, 0.01, STRAYING_S, 1e6), np.array([0.0, 1.0, 0.0]), 0.0
+    before = 0.0
+    for k in range(100):
+        commanded = 0.5 if k >= 17 else 0.0  # felt a response time after it was given
+        v = commanded + (0.3 if k >= 50 else 0.0)
+        path.feel((v - before) * left)
+        before, flown = v, flown + 0.01 * (v - commanded)
+        path.step(0.5 * left)
+    np.testing.assert_allclose(path.velocity_m_s, 0.8 * left, atol=1e-6)
+    np.testing.assert_allclose(path.place_m, (0.5 * 0.01 * 83 + flown) * left, atol=0.006)  # a tick of the command
+
+
+def test_it_goes_on_to_stray_until_that_has_died_away():
+    path, strayed = OwnPath(RESPONSE_S, 0.01, STRAYING_S, 1e6), np.array([0.1, -0.2, 0.3])
+    path.feel(strayed)
+    here = path.place_m
+    for time_s in (RESPONSE_S, np.full(3, 0.8), np.full(3, 20.0)):
+        way = strayed * STRAYING_S * (1.0 - np.exp(-time_s / STRAYING_S))
+        np.testing.assert_allclose(path.places_m(time_s) - here, way, atol=1e-12)
+    np.testing.assert_allclose(path.place_ahead_m, path.places_m(RESPONSE_S))
+    np.testing.assert_allclose(path.straying_ahead_m_s, strayed * np.exp(-RESPONSE_S / STRAYING_S))
+
+
+def test_gravity_that_is_not_quite_taken_off_is_forgotten():
+    """0.05 m/s^2 from now on: felt as 0.07 m/s at most, within half a minute as nothing."""
+    path, most = OwnPath(RESPONSE_S, 0.01, STRAYING_S, 4.0), 0.0
+    for _ in range(3000):
+        path.feel(np.full(3, 0.0005))
+        path.step(np.zeros(3))
+        most = max(most, float(path.velocity_m_s.max()))
+    assert 0.06 < most < 0.08  # a T_f / e
+    assert np.abs(path.velocity_m_s).max() < 0.002
+
+
+def test_where_nothing_is_felt_any_more_the_commands_are_the_way_by_and_by():
+    path = OwnPath(RESPONSE_S, 0.01, STRAYING_S, 4.0)
+    path.feel(np.ones(3))
+    straying = path.velocity_m_s
+    for _ in range(100):
+        path.feel(np.full(3, np.nan))
+        path.step(np.zeros(3))
+    assert (np.abs(path.velocity_m_s) < straying).all()
+    for _ in range(3000):
+        path.feel(np.full(3, np.nan))
+        path.step(np.zeros(3))
+    assert np.abs(path.velocity_m_s).max() < 0.01

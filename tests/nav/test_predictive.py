@@ -6,7 +6,7 @@ from dockair.nav.guidance.controller import Sight
 from dockair.nav.guidance.guidance_settings import GuidanceSettings
 from dockair.nav.guidance.predictive import Predictive
 
-SETTINGS, STEP_S = GuidanceSettings(), 0.01
+SETTINGS, STEP_S, NOT_FELT = GuidanceSettings(), 0.01, np.full(3, np.nan)
 
 
 def shown(place, rate, seconds):
@@ -16,7 +16,7 @@ def shown(place, rate, seconds):
     controller = Predictive(settings, np.array(SETTINGS.response_s), *limits, STEP_S, SETTINGS.patient_share)
     for k in range(round(seconds / STEP_S)):
         push = np.zeros((len(controller.looks_ahead_s), 3))
-        controller.observe(Sight(place_m=place(k * STEP_S), rate_m_s=rate(k * STEP_S), push_m_s2=push))
+        controller.observe(Sight(place_m=place(k * STEP_S), rate_m_s=rate(k * STEP_S), push_m_s2=push), NOT_FELT)
         controller.given(np.zeros(3), np.zeros(3))
     return controller
 
@@ -35,7 +35,7 @@ def test_a_surge_of_the_reel_is_not_held_on_the_probe():
     held = controller.steady_drift_m_s
     assert 0.1 < held[0] < 0.2
     for _ in range(500):
-        controller.observe(None)
+        controller.observe(None, NOT_FELT)
     np.testing.assert_array_equal(controller.steady_drift_m_s, held)
 
 

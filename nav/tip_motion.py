@@ -1,0 +1,59 @@
+"""How the probe's tip is felt to change its velocity: by accelerometers and gyros, without a look outside.
+
+In body axes, f being the specific force at the accelerometers' place I, w the body's rate, r = p_IP and c what takes
+off gravity and the steady acceleration of the formation: from sample to sample
+
+    dv_P = (f + c) dt + d(w x r) + w x (w x r) dt                                                         (1)
+    c' = -w x c - (f + c) / T                                                                             (2)
+
+Gusts and manoeuvres pass within seconds, so that over T the mean of f is -c; in between the gyros carry c along. T is
+the time since the start until it has grown to `levelling_s`.
+
+The belief's own c (`belief_motion`) would not do: it walks fast enough to take up the entry of a turn, and with it
+whatever the drogue does that its swing does not explain.
+
+Not modelled: a turn, which Eq. (2) takes for gravity by and by. In one guidance does not use dv_P.
+"""
+
+import numpy as np
+
+from dockair.rotations import Array, exp
+from dockair.vectors import cross
+
+
+class TipMotion:
+    """Eqs. (1) and (2).
+
+    Args:
+        p_IP: (3,) probe's tip from the accelerometers, body axes [m].
+        levelling_s: the longest T: gusts move c by their velocity over it, a gyro's bias turns it by bias times it.
+    """
+
+    def __init__(self, p_IP: Array, levelling_s: float) -> None:
+        self._p_IP, self._levelling_s = p_IP, levelling_s
+        self._c: Array | None = None
+        self._w: Array = np.zeros(3)
+        self._time_s = 0.0  # since the first sample
+
+    def change_m_s(self, force_B: Array, w_B: Array, step_s: float) -> Array:
+        """(3,) dv_P in body axes over a step, NaN at the first and where nothing was felt.
+
+        Args:
+            force_B: (3,) mean of f over the step [m/s^2]; NaN where there is none.
+            w_B: (3,) w at its end [rad/s].
+            step_s: dt.
+        """
+        before, self._w = self._w, w_B
+        if not np.isfinite(force_B).all():
+            if self._c is not None:
+                self._c = exp(-step_s * w_B) @ self._c
+            return np.full(3, np.nan)
+        if self._c is None:
+            self._c = -force_B
+            return np.full(3, np.nan)
+        self._time_s = min(self._time_s + step_s, self._levelling_s)
+        self._c = exp(-0.5 * step_s * (before + w_B)) @ self._c
+        felt = force_B + self._c
+        self._c = self._c - step_s / self._time_s * felt
+        turned = cross(w_B - before, self._p_IP) + step_s * cross(w_B, cross(w_B, self._p_IP))
+        return np.asarray(felt * step_s + turned)
