@@ -21,6 +21,9 @@ from dockair.rotations import Array, exp
 from dockair.vectors import cross
 
 
+_LEVEL_S = 10.0  # of gravity felt: the mean over a shorter time is as much the gust's
+
+
 class TipMotion:
     """Eqs. (1) and (2).
 
@@ -36,7 +39,7 @@ class TipMotion:
         self._time_s = 0.0  # since the first sample
 
     def change_m_s(self, force_B: Array, w_B: Array, step_s: float) -> Array:
-        """(3,) dv_P in body axes over a step, NaN at the first and where nothing was felt.
+        """(3,) dv_P in body axes over a step, NaN for the first seconds and where nothing was felt.
 
         Args:
             force_B: (3,) mean of f over the step [m/s^2]; NaN where there is none.
@@ -51,9 +54,11 @@ class TipMotion:
         if self._c is None:
             self._c = -force_B
             return np.full(3, np.nan)
-        self._time_s = min(self._time_s + step_s, self._levelling_s)
+        self._time_s += step_s
         self._c = exp(-0.5 * step_s * (before + w_B)) @ self._c
         felt = force_B + self._c
-        self._c = self._c - step_s / self._time_s * felt
+        self._c = self._c - step_s / min(self._time_s, self._levelling_s) * felt
+        if self._time_s < _LEVEL_S:
+            return np.full(3, np.nan)
         turned = cross(w_B - before, self._p_IP) + step_s * cross(w_B, cross(w_B, self._p_IP))
         return np.asarray(felt * step_s + turned)
