@@ -20,7 +20,6 @@ import numpy as np
 from dockair.rotations import Array, exp
 from dockair.vectors import cross
 
-
 _LEVEL_S = 10.0  # of gravity felt: the mean over a shorter time is as much the gust's
 
 
