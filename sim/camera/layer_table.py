@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 
 from dockair.rotations import Array
 from dockair.sim.camera.earth import Interval
-from dockair.sim.camera.layer_tiles import SIDE, TILE, LayerTiles
+from dockair.sim.camera.layer_tiles import SIDE, TILE, LayerTiles, Place
 
 _TILE, _SIDE, _SHIFT = TILE, SIDE, 6  # as of `layer_tiles`; the power of 2
 _STEEPEST = 2.74  # as of `sky_table`
@@ -37,15 +37,19 @@ _KEYS_PER_DEPTH = 3.0
 _FROM, _UNTIL = 0.05, 0.45  # way from a key, in keys' distances, over which the next one's tiles are made
 _LOOK_AGAIN = 16  # frames from one look at what the next key lacks to another
 
-Pairs = NDArray[np.uint64]  # light and transmittance of a node, four bytes each, as one
+Pairs = NDArray[np.uint64]  # the two values of a node, four bytes each, as one
+Neighbours = NDArray[np.complex128]  # those of a node and the next one, as one
+#: Of a row's blocks: the node before each, and the parts of the way down and to the right to the next ones.
+Places = tuple[NDArray[np.int32], NDArray[np.float32], NDArray[np.float32]]
 Geometry = tuple[float, float, float, float, float, float]  # e, 2 h - h^2/r, h', 1/2a, D_x, D_y
 View = tuple[Array, Array, Array, Interval]  # R_WC, tangents x and y, columns that see the layer
 
 
 class Nodes(NamedTuple):
-    """Values (nodes channels,) of a table for the kernel, tile after tile: what is near is near in memory."""
+    """Values of a table for the kernel, tile after tile: what is near is near in memory."""
 
     values: NDArray[np.float32]
+    neighbours: Neighbours
     side: int
     geometry: Geometry
 
@@ -66,8 +70,9 @@ class LayerTable:
     ) -> None:
         self._height_m, self._radius_m, self._tiles = height_m, radius_m, tiles
         self._own, self._next = (LayerTiles(function, tiles, channels) for _ in range(2))
+        self._is_missing = np.zeros_like(self._own.is_known)  # false between looks
         self._count = 0
-        self._last_m: Array = np.zeros(3)
+        self._last_m: Place = (0.0, 0.0, 0.0)
 
     def nodes(self, place_m: Array, R_WC: Array, x: Array, y: Array, below: Interval) -> Nodes:
         """Return the table for a place, known wherever a picture looks.
@@ -79,20 +84,20 @@ class LayerTable:
             y: (rows,) tangents below the axis.
             below: (rows, 2) first column and one past the last that see the layer.
         """
-        step_m, place = self._height_m / _KEYS_PER_DEPTH, np.asarray(place_m, dtype=float)
-        key = np.round(place / step_m) * step_m
-        if not np.array_equal(key, self._own.key):
+        step_m, place = self._height_m / _KEYS_PER_DEPTH, (float(place_m[0]), float(place_m[1]), float(place_m[2]))
+        key = _on_grid(place[0], step_m), _on_grid(place[1], step_m), _on_grid(place[2], step_m)
+        if key != self._own.key:
             self._own, self._next = self._next, self._own
-            if not np.array_equal(key, self._own.key):
+            if key != self._own.key:
                 self._own.restart(key)
         view = np.ascontiguousarray(R_WC, dtype=float), x, y, below
         self._own.complete(self._missing(self._own, place, view))
         self._prepare(place, key, step_m, view)
-        return Nodes(self._own.values.ravel(), self._tiles * _TILE, self._geometry(place, key))
+        return Nodes(self._own.values.ravel(), self._own.neighbours, self._tiles * _TILE, self._geometry(place, key))
 
-    def _prepare(self, place_m: Array, key: Array, step_m: float, view: View) -> None:
+    def _prepare(self, place_m: Place, key: Place, step_m: float, view: View) -> None:
         """Make a share of the tiles of the key that comes next if the way goes on: along the axis left first."""
-        moved, self._last_m = place_m - self._last_m, place_m.copy()
+        moved, self._last_m = [here - last for here, last in zip(place_m, self._last_m, strict=True)], place_m
         axis, frames = 0, math.inf
         for k in range(3):
             ahead = 0.5 * step_m - math.copysign(1.0, moved[k]) * (place_m[k] - key[k])
@@ -102,10 +107,11 @@ class LayerTable:
         share = (sign * (place_m[axis] - key[axis]) / step_m - _FROM) / (_UNTIL - _FROM)
         if share <= 0.0 or math.isinf(frames):
             return
-        coming = key.copy()
-        coming[axis] = (np.round(place_m[axis] / step_m) + sign) * step_m
+        coming_m = list(key)
+        coming_m[axis] = (round(place_m[axis] / step_m) + sign) * step_m
+        coming = coming_m[0], coming_m[1], coming_m[2]
         self._count += 1
-        if not np.array_equal(coming, self._next.key):
+        if coming != self._next.key:
             self._next.restart(coming)
         elif not (self._next.lacks_work and self._count >= _LOOK_AGAIN):
             self._next.prepare(share)
@@ -114,20 +120,26 @@ class LayerTable:
         self._next.plan(self._missing(self._next, place_m, view))
         self._next.prepare(share)
 
-    def _missing(self, tiles: LayerTiles, place_m: Array, view: View) -> list[tuple[int, int]]:
+    def _missing(self, tiles: LayerTiles, place_m: Place, view: View) -> list[tuple[int, int]]:
         """Which tiles a picture looks at that are not known."""
-        (R, x, y, below), side = view, self._tiles * _TILE
-        missing, step = np.zeros_like(tiles.is_known), max(_step(x), _step(y), 1e-9)
+        (R, x, y, below), side, missing = view, self._tiles * _TILE, self._is_missing
+        step = max(_step(x), _step(y), 1e-9)
         stride = max(1, int((_TILE - 1) / (0.5 * (side - 2) * _STEEPEST * _STRETCH * step)))
         if not _mark(R, x, y, below, stride, side, self._geometry(place_m, tiles.key), tiles.is_known, missing):
             return []
-        return [(int(row), int(column)) for row, column in np.argwhere(missing)]
+        found = [(int(row), int(column)) for row, column in np.argwhere(missing)]
+        missing[:] = False
+        return found
 
-    def _geometry(self, place_m: Array, key: Array) -> Geometry:
-        height, a = self._height_m + float(place_m[2]), self._radius_m
+    def _geometry(self, place_m: Place, key: Place) -> Geometry:
+        height, a = self._height_m + place_m[2], self._radius_m
         twice = 2.0 * height - height * height / (a + height)
-        aside = place_m - key
-        return twice / (a + height), twice, self._height_m + float(key[2]), 0.5 / a, float(aside[0]), float(aside[1])
+        aside_x, aside_y = place_m[0] - key[0], place_m[1] - key[1]
+        return twice / (a + height), twice, self._height_m + key[2], 0.5 / a, aside_x, aside_y
+
+
+def _on_grid(way_m: float, step_m: float) -> float:
+    return round(way_m / step_m) * step_m
 
 
 def _step(x: Array) -> float:
@@ -141,7 +153,8 @@ def lay_under(
     """Write the radiance of ground, or of a deck (light, transmittance) before it, into the columns that see it."""
     tangents, n = x.astype(np.float32), len(x)
     corner, down, right = np.empty(n, np.int32), np.empty(n, np.float32), np.empty(n, np.float32)
-    around, deck_pairs = np.empty((4, n), np.uint64), deck.values.view(np.uint64)
+    pairs, around_pairs = ground.values.view(np.uint64), np.empty((2, n), np.uint64)
+    around = np.empty((2, n), np.complex128)
     for i in range(len(y)):
         left, stop = below[i]
         if left == stop:
@@ -149,10 +162,10 @@ def lay_under(
         row, part, count = out[i, left:stop], tangents[left:stop], stop - left
         places = corner[:count], down[:count], right[:count]
         _place(R, part, y[i], ground, places)
-        _read(ground, places, row)
+        _read(pairs, around_pairs, places, row)
         if has_deck:
             _place(R, part, y[i], deck, places)
-            _read_over(deck_pairs, places, around, row)
+            _read_over(deck.neighbours, around, places, row)
 
 
 @njit(cache=True, error_model="numpy", inline="always")
@@ -185,14 +198,8 @@ def _single(g: Geometry) -> tuple[np.float32, ...]:
 
 
 @njit(cache=True, error_model="numpy")
-def _place(
-    R: Array,
-    x: NDArray[np.float32],
-    y_i: float,
-    nodes: Nodes,
-    places: tuple[NDArray[np.int32], NDArray[np.float32], NDArray[np.float32]],
-) -> None:
-    """Fill, for a row of blocks, the node before each and the parts of the way to the next ones."""
+def _place(R: Array, x: NDArray[np.float32], y_i: float, nodes: Nodes, places: Places) -> None:
+    """Fill the places of a row of blocks."""
     corner, down, right = places
     last, half, tiles = np.int32(nodes.side - 3), np.float32(0.5 * (nodes.side - 2)), np.int32(nodes.side // _TILE)
     width, rest, shift, zero = np.int32(_SIDE), np.int32(_TILE - 1), np.int32(_SHIFT), np.int32(0)
@@ -212,43 +219,39 @@ def _place(
 
 
 @njit(cache=True)
-def _read(
-    nodes: Nodes,
-    places: tuple[NDArray[np.int32], NDArray[np.float32], NDArray[np.float32]],
-    out: NDArray[np.float32],
-) -> None:
-    values, (corner, down, right) = nodes.values, places
-    for j in range(len(out)):
-        k = np.uint32(corner[j])
-        below = k + np.uint32(_SIDE)
-        a = values[k] + right[j] * (values[k + np.uint32(1)] - values[k])
-        b = values[below] + right[j] * (values[below + np.uint32(1)] - values[below])
-        out[j] = a + down[j] * (b - a)
+def _read(pairs: Pairs, around: Pairs, places: Places, out: NDArray[np.float32]) -> None:
+    """The ground, whose nodes have their own value and the next one's.
 
-
-@njit(cache=True, error_model="numpy")
-def _read_over(
-    pairs: Pairs,
-    places: tuple[NDArray[np.int32], NDArray[np.float32], NDArray[np.float32]],
-    around: Pairs,
-    out: NDArray[np.float32],
-) -> None:
-    """Light of the layer, and what it lets through of what is in `out`.
-
-    A node's two values are fetched as one, first for all blocks: the compiler then reckons several blocks at once.
+    Both are fetched as one, first for all blocks: the compiler then reckons several at once, and loads are halved.
     """
     corner, down, right = places
     for j in range(len(out)):
         k = np.uint64(np.uint32(corner[j]))
-        below = k + np.uint64(_SIDE)
-        around[0, j], around[1, j] = pairs[k], pairs[k + np.uint64(1)]
-        around[2, j], around[3, j] = pairs[below], pairs[below + np.uint64(1)]
+        around[0, j], around[1, j] = pairs[k], pairs[k + np.uint64(_SIDE)]
     values = around.view(np.float32)
-    a, b, c, d = values[0], values[1], values[2], values[3]
+    upper, lower = values[0], values[1]
     for j in range(len(out)):
-        light, clear, s, t = 2 * j, 2 * j + 1, right[j], down[j]
-        up, up_clear = a[light] + s * (b[light] - a[light]), a[clear] + s * (b[clear] - a[clear])
-        low, low_clear = c[light] + s * (d[light] - c[light]), c[clear] + s * (d[clear] - c[clear])
+        here, after = 2 * j, 2 * j + 1
+        a = upper[here] + right[j] * (upper[after] - upper[here])
+        b = lower[here] + right[j] * (lower[after] - lower[here])
+        out[j] = a + down[j] * (b - a)
+
+
+@njit(cache=True)
+def _read_over(neighbours: Neighbours, around: Neighbours, places: Places, out: NDArray[np.float32]) -> None:
+    """Light of the deck, and what it lets through of what is in `out`; of two nodes, all is fetched as one."""
+    corner, down, right = places
+    for j in range(len(out)):
+        k = np.uint64(np.uint32(corner[j]))
+        around[0, j], around[1, j] = neighbours[k], neighbours[k + np.uint64(_SIDE)]
+    values = around.view(np.float32)
+    upper, lower = values[0], values[1]
+    for j in range(len(out)):
+        light, clear, s, t = 4 * j, 4 * j + 1, right[j], down[j]
+        up = upper[light] + s * (upper[light + 2] - upper[light])
+        up_clear = upper[clear] + s * (upper[clear + 2] - upper[clear])
+        low = lower[light] + s * (lower[light + 2] - lower[light])
+        low_clear = lower[clear] + s * (lower[clear + 2] - lower[clear])
         out[j] = up + t * (low - up) + (up_clear + t * (low_clear - up_clear)) * out[j]
 
 

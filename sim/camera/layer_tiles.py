@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from dockair.rotations import Array
 from dockair.sim.camera.sky_table import directions_from_nodes
 
+Place = tuple[float, float, float]  #: [m]; numbers, as comparing arrays takes its time
 TILE = 64  #: nodes a side
 SIDE = TILE + 1  #: of what is kept of a tile: with the next ones' first nodes, so that it is read alone
 _STRIPS, _ROWS = 5, 13  # that a tile is made in, SIDE rows in sum
@@ -22,19 +23,25 @@ class LayerTiles:
     Args:
         function: (m, 3) unit vectors and the key's place (3,) -> (m, channels) values.
         tiles: a side.
-        channels: how many values a node has.
+        channels: how many values the function has, 1 or 2. Of one, a node keeps the next node's beside its own.
     """
 
     def __init__(self, function: Callable[[Array, Array], Array], tiles: int, channels: int) -> None:
-        self._function, self._tiles = function, tiles
+        self._function, self._tiles, self._channels = function, tiles, channels
         self._strips = np.zeros((tiles, tiles), dtype=np.int64)
         self._ahead: list[tuple[int, int]] = []
         self._made = 0
-        self.key: Array = np.zeros(3)
-        self.values: NDArray[np.float32] = np.zeros(((tiles * SIDE) ** 2, channels), dtype=np.float32)
+        self.key: Place = (0.0, 0.0, 0.0)
+        self.values: NDArray[np.float32] = np.zeros(((tiles * SIDE) ** 2, 2), dtype=np.float32)
         self.is_known = np.zeros((tiles, tiles), dtype=np.bool_)
 
-    def restart(self, key: Array) -> None:
+    @property
+    def neighbours(self) -> NDArray[np.complex128]:
+        """(nodes - 1,) the values of each node and of the next one as one: no other type has 16 bytes."""
+        values = self.values
+        return np.ndarray(len(values) - 1, np.complex128, values.data, strides=values.strides[:1])
+
+    def restart(self, key: Place) -> None:
         """Forget all, for another key."""
         self.key, self._ahead, self._made = key, [], 0
         self._strips[:] = 0
@@ -75,6 +82,7 @@ class LayerTiles:
         i, j = np.meshgrid(down + row * TILE, along + column * TILE, indexing="ij")
         directions = directions_from_nodes(i.ravel(), j.ravel(), self._tiles * TILE)
         place = slice(first + strip * _ROWS * SIDE, first + (strip + 1) * _ROWS * SIDE)
-        self.values[place] = self._function(directions, self.key)
+        values = self._function(directions, np.array(self.key))
+        self.values[place] = values if self._channels == 2 else np.hstack([values, np.roll(values, -1, axis=0)])
         self._strips[row, column] = strip + 1
         self.is_known[row, column] = strip + 1 == _STRIPS

@@ -1,0 +1,51 @@
+"""The sensors' benchmark takes several processes together; how fast they are is not tested."""
+
+import os
+
+import pytest
+
+from dockair.scenarios import bench_sensors as sensors
+from dockair.scenarios.schema import load_scenario
+
+
+def _times(drawn_ms, traced_ms):
+    """Of one process, all else at 4 ms."""
+    names = [
+        f"{name}: {stage}, {size}"
+        for name in ("mujoco", "analytic")
+        for stage in ("expose", "background")
+        for size in ("full frame", "400 rows", "300 x 300")
+    ]
+    names += ["bare mujoco.Renderer, RGB, full size", "NumPy: normals alone, full frame", "electronics, full frame"]
+    drawn, traced = "mujoco: background, full frame", "analytic: background, full frame"
+    return dict.fromkeys(names, 4.0) | {drawn: drawn_ms, traced: traced_ms}
+
+
+def test_times_and_ratios_are_medians_over_processes_with_the_range_of_the_ratios(monkeypatch):
+    runs = [_times(8.0, 4.0), _times(9.0, 2.0), _times(6.0, 2.0)]
+    monkeypatch.setattr(sensors, "require_rendering", lambda: None)
+    monkeypatch.setattr(sensors, "_in_fresh_processes", lambda measure, scenario: runs)
+    figures = sensors.bench_sensors(load_scenario("default"))
+    what = "MuJoCo's background over the analytic one, full frame"
+    assert figures["milliseconds"]["mujoco: background, full frame"] == 8.0
+    assert figures["milliseconds"]["analytic: background, full frame"] == 2.0
+    assert figures["ratios"][what] == 3.0  # not that of the medians, 4
+    assert (figures["ratios"][f"{what}, lowest"], figures["ratios"][f"{what}, highest"]) == (2.0, 4.5)
+    assert figures["ratios"]["analytic: full frame over 400 rows"] == pytest.approx(1.0)
+
+
+def test_every_measurement_has_a_process_of_its_own(monkeypatch):
+    monkeypatch.setattr(sensors, "_PROCESSES", 3)
+    numbers = sensors._in_fresh_processes(os.getpid)
+    assert len({*numbers, os.getpid()}) == 4
+
+
+@pytest.mark.slow
+@pytest.mark.gl
+def test_one_process_measures_all_that_the_ratios_are_made_of(monkeypatch):
+    for name in ("_TURNS", "_EACH", "_WARM_UP"):
+        monkeypatch.setattr(sensors, name, 1)
+    milliseconds = sensors._measure(load_scenario("still_air"))
+    assert all(ms > 0.0 for ms in milliseconds.values())
+    assert all(ratio > 0.0 for ratio in sensors._ratios(milliseconds).values())
+    assert {"IMU sample", "NumPy: Poisson alone, full frame"} < set(milliseconds)
