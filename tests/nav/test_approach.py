@@ -221,11 +221,26 @@ def test_a_miss_is_backed_off_from_and_tried_again_as_often_as_allowed(attempts)
 
 
 def test_a_push_that_nobody_foresaw_is_met_better_at_each_attempt():
-    plant = Plant(holds=False, pushed=np.array([-0.15, 0.05]))
+    plant = Plant(holds=False, pushed=np.array([-0.45, 0.15]))
     fly(plant)
     missed = [np.hypot(*at) for at, _ in plant.crossings]
     assert len(missed) == 3
     assert missed[1] < 0.8 * missed[0] and missed[2] < 0.8 * missed[1]
+
+
+@pytest.mark.parametrize(("ahead_m", "share"), [(2.0, SETTINGS.patient_share), (0.8, 1.0)])
+def test_within_a_metre_all_of_the_limits_may_be_used_to_stay_before_the_basket(ahead_m, share):
+    """Called back too late to stop far off, in a swing that a share of the limits does not follow."""
+    guidance, most = Guidance(SETTINGS, RATE_HZ), 0.0
+    for _ in range(RATE_HZ):
+        guidance.step(state([4.0, 0.0, 0.0]))
+    guidance.phase = Phase.APPROACH
+    for _ in range(RATE_HZ):
+        command = guidance.step(state([ahead_m, 0.4, 0.0]))
+        most = max(most, abs(float(command.acceleration_m_s2[1])))
+    assert guidance.phase is Phase.APPROACH
+    limit = SETTINGS.acceleration_limit_m_s2[1]
+    assert 0.8 * share * limit < most <= share * limit + 1e-9
 
 
 def test_does_not_close_on_an_unusable_state():
