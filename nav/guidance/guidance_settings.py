@@ -3,6 +3,8 @@
 from dataclasses import dataclass, field
 from typing import Literal
 
+import numpy as np
+
 from dockair.nav.guidance.announced_path import AnnouncedPathSettings
 from dockair.nav.guidance.bow_wave_push import BowWavePush
 from dockair.nav.guidance.closing import ClosingSettings
@@ -88,5 +90,6 @@ class RelativeState:
     rate_PD_B: Array  #: (3,) d/dt of p_PD_B [m/s]
     p_PK_B: Array  #: (3,) coupling from the probe's tip [m]
     w_WB_B: Array  #: (3,) the body's angular velocity [rad/s]
-    dv_WP_B: Array  #: (3,) what the tip's velocity is felt to have changed by since the last tick [m/s]; NaN: not felt
     sigma_lateral_m: float  #: standard deviation of p_PD_B across the probe's line
+    dv_WP_B: Array = field(default_factory=lambda: np.full(3, np.nan))
+    #: (3,) what the tip's velocity is felt to have changed by since the last control tick [m/s]; NaN: not felt
