@@ -114,7 +114,7 @@ class ImuRecord:
         return np.asarray(self.rates_B[first:stop].mean(axis=0)) if stop > first else self.rate_B(end_s)
 
     def mean_force_B(self, start_s: float, end_s: float) -> Array:
-        """(3,) mean specific force of the samples after `start_s` up to `end_s`; NaN when there is none."""
+        """(3,) mean specific force of the samples after `start_s` up to `end_s`; NaN when any or all are none."""
         first, stop = np.searchsorted(self.times_s, (start_s, end_s), side="right")
         return np.asarray(self.forces_B[first:stop].mean(axis=0)) if stop > first else np.full(3, np.nan)
 

@@ -35,6 +35,7 @@ from dockair.rotations import Array
 
 _EVEN_LEDS = 5  # four are seldom more than an accident
 _POSE_LEDS = 4  # fewer are no pose without a belief ...
+_LONGEST_TICKS = 1.5  # between two stamps, for what is felt at the second to stand for all of the time
 _LEAST_POSE_LEDS = 3  # ... and these are one with its attitude
 
 
@@ -49,7 +50,7 @@ class NavigatorSettings:
     contact: ContactLimits = field(default_factory=ContactLimits)
     fusion: FusionSettings = field(default_factory=FusionSettings)
     guidance: GuidanceSettings = field(default_factory=GuidanceSettings)
-    levelling_s: float = 60.0  # of the tip's motion: gusts of 1 m/s are then taken for 0.02 m/s^2 of gravity
+    tip_levelling_s: float = 60.0  # of the tip's motion: gusts of 1 m/s are then taken for 0.02 m/s^2 of gravity
     heading: OwnHeadingSettings | None = None  # none: docking needs no heading, and each of its frames shows no LEDs
     led_position_sigma_m: float = 3e-4  # as-built tolerance of an LED's place on the ring; 0.3 px at 3 m
     #: LEDs from which on a frame is tested by itself. Of four any three fit: the range could be off by 0.3 m unseen,
@@ -79,7 +80,7 @@ class Navigator:
             self._settings.few, self._settings.led_position_sigma_m,
         )  # fmt: skip
         mounting = sheets.mounting
-        self._tip = TipMotion(mounting.p_BP - mounting.p_BI, self._settings.levelling_s)
+        self._tip = TipMotion(mounting.p_BP - mounting.p_BI, self._settings.tip_levelling_s)
         self._guidance = Guidance(self._settings.guidance, sheets.control_rate_hz)
         self._heading = None if self._settings.heading is None else OwnHeading(sheets, self._settings.heading)
         self._points_D = sheets.ring.positions_D
@@ -255,8 +256,10 @@ class Navigator:
     def _felt_change(self, w_WB_B: Array) -> Array:
         """(3,) of the tip's velocity since the last control tick."""
         before_s, self._felt_time_s = self._felt_time_s, self._time_s
-        force_B = self._filter.mean_force_B(before_s, self._time_s)
-        return self._tip.change_m_s(force_B, w_WB_B, self._time_s - before_s)
+        step_s = self._time_s - before_s
+        in_step = 0.0 < step_s * self._sheets.control_rate_hz < _LONGEST_TICKS  # else stamps have leapt
+        force_B = self._filter.mean_force_B(before_s, self._time_s) if in_step else np.full(3, np.nan)
+        return self._tip.change_m_s(force_B, w_WB_B, step_s)
 
     def _heading_now(self) -> tuple[float, float, float]:
         """Exposure to ask for, heading and its sigma; the LEDs' frames are not given away while the probe goes in."""

@@ -12,7 +12,8 @@ the time since the start until it has grown to `levelling_s`.
 The belief's own c (`belief_motion`) would not do: it walks fast enough to take up the entry of a turn, and with it
 whatever the drogue does that its swing does not explain.
 
-Not modelled: a turn, which Eq. (2) takes for gravity by and by. In one guidance does not use dv_P.
+Not modelled: a turn, which Eq. (2) takes for gravity by and by; once one has been announced guidance does not use dv_P.
+A gyro's bias b that has changed and is not known yet turns c away by b g t, until T has passed.
 """
 
 import numpy as np
@@ -21,6 +22,7 @@ from dockair.rotations import Array, exp
 from dockair.vectors import cross
 
 _LEVEL_S = 10.0  # of gravity felt: the mean over a shorter time is as much the gust's
+_GAP_S = 0.1  # without samples the body turns unfelt; after longer ones c is found anew
 
 
 class TipMotion:
@@ -35,10 +37,10 @@ class TipMotion:
         self._p_IP, self._levelling_s = p_IP, levelling_s
         self._c: Array | None = None
         self._w: Array = np.zeros(3)
-        self._time_s = 0.0  # since the first sample
+        self._time_s = self._unfelt_s = 0.0  # since c was begun, and without samples
 
     def change_m_s(self, force_B: Array, w_B: Array, step_s: float) -> Array:
-        """(3,) dv_P in body axes over a step, NaN for the first seconds and where nothing was felt.
+        """(3,) dv_P in body axes over a step, NaN for the first seconds, where nothing was felt and just after.
 
         Args:
             force_B: (3,) mean of f over the step [m/s^2]; NaN where there is none.
@@ -47,11 +49,14 @@ class TipMotion:
         """
         before, self._w = self._w, w_B
         if not np.isfinite(force_B).all():
-            if self._c is not None:
-                self._c = exp(-step_s * w_B) @ self._c
+            self._unfelt_s += abs(step_s)
             return np.full(3, np.nan)
-        if self._c is None:
-            self._c = -force_B
+        unfelt_s, self._unfelt_s = self._unfelt_s, 0.0
+        if self._c is None or unfelt_s > _GAP_S:
+            self._c, self._time_s = -force_B, 0.0
+            return np.full(3, np.nan)
+        if unfelt_s > 0.0:
+            self._c = exp(-0.5 * (unfelt_s + step_s) * (before + w_B)) @ self._c
             return np.full(3, np.nan)
         self._time_s += step_s
         self._c = exp(-0.5 * step_s * (before + w_B)) @ self._c

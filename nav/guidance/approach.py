@@ -59,7 +59,7 @@ class Guidance:
         self._aim: Array = np.zeros(2)
         self._reckoning = DeadReckoning(settings, self._dt)
         self._passed: Array | None = None  # where the ring was when the tip last came to its plane, left and up
-        self._ahead_m = float("inf")  # tip to ring
+        self._ring_ahead_m = 0.0
         self._entered_m = 0.0  # how far off when the tip last came past it
         speeds = settings.closure_speed_m_s, settings.closure_acceleration_m_s2
         self._closure = Closure(settings.closing, *speeds, self._dt)
@@ -133,7 +133,7 @@ class Guidance:
     def _count(self, state: RelativeState, ring: Array, rate: Array, coupling: Array) -> None:
         settings, limits = self._settings, self._settings.limits
         self._time_s += self._dt
-        self._ahead_m = float(ring[0])
+        self._ring_ahead_m = float(ring[0])
         self._in_phase_s += self._dt
         self._has_seen = self._has_seen or state.usable
         self._unusable_s = self._unusable_s + self._dt if self._has_seen and not state.usable else 0.0
@@ -255,7 +255,7 @@ class Guidance:
     @property
     def _is_patient(self) -> bool:
         """Whether a share of the limits across is enough: as long as it can be called back and stop short."""
-        far = self._ahead_m >= self._settings.limits.off_axis_range_m
+        far = self._ring_ahead_m >= self._settings.limits.off_axis_range_m
         return self.phase in _WAITING or (self.phase is Phase.APPROACH and far and not self._closure.committed)
 
     def _to_contact_s(self, distance_m: float) -> float:

@@ -1,8 +1,8 @@
 """Where the drogue will be in a moment: its swing, estimated on the receiver's own scale (`own_path`).
 
-With y_r the receiver's place by its commands, y_D = p + y_r is the drogue's place on a scale that drifts steadily with
-the bias of the receiver's inertial velocity. Each axis of y_D is modelled as drift plus a swing that coloured gusts g
-and the receiver's bow wave b drive:
+With y_r the receiver's place by its commands and what it felt besides, y_D = p + y_r is the drogue's place on a scale
+that drifts steadily with the bias of the receiver's inertial velocity. Each axis of y_D is modelled as drift plus a
+swing that coloured gusts g and the receiver's bow wave b drive:
 
     m' = d,   d' = noise;     s'' = -omega^2 s - 2 zeta omega s' + g + b;     g' = -g/T + noise           (1)
     y_D = m + s

@@ -6,7 +6,8 @@ gyros feel otherwise, it strays by. With dv the felt change of the tip's velocit
     v(t) = u(t - tau),      f <- (f + dv - (v_k - v_k-1)) / (1 + dt/T_f)                                  (1)
     e <- (e + f_k - f_k-1) / (1 + dt/T_f),      y_r' = v + e                                              (2)
 
-Twice forgotten, gravity that is not quite taken off adds nothing to e. Flight control brings back a velocity that a
+Twice forgotten, a steady part of gravity that is not taken off adds nothing to e; and e is no more than a limit, lest
+what is felt wrongly, as a turn that nobody announced, is flown against. Flight control brings back a velocity that a
 gust has changed, not the place: e dies away,
 
     e(t) = e exp(-t/T_e),      y_r(t) - y_r - way commanded = T_e (1 - exp(-t/T_e)) e                     (3)
@@ -15,8 +16,9 @@ y_r is a scale of the receiver's own, which drifts against any other with the bi
 drogue's motion is its own: what the receiver did is taken off, so that a filter which follows the drogue closely does
 not chase the receiver's answer to its own commands.
 
-Not modelled: how e goes on in the gust that made it. Where nothing is felt, e is forgotten, and what the tip does
-besides its commands shows as motion of the drogue.
+Not modelled: how e goes on in the gust that made it; that a gyro's bias b, until it is known, adds b g T_f^2 to e.
+Where nothing is felt any more e dies away by Eq. (3), and what the tip does besides its commands shows as motion of the
+drogue.
 """
 
 import numpy as np
@@ -32,9 +34,13 @@ class OwnPath:
         step_s: control period.
         straying_s: (3,) T_e.
         forgotten_s: T_f.
+        limit_m_s: of e, each axis.
     """
 
-    def __init__(self, response_s: Array, step_s: float, straying_s: Array, forgotten_s: float) -> None:
+    def __init__(
+        self, response_s: Array, step_s: float, straying_s: Array, forgotten_s: float, limit_m_s: float
+    ) -> None:
+        self._limit_m_s, self._dies = limit_m_s, np.exp(-step_s / straying_s)
         self._step_s, self._straying_s, self._kept = step_s, straying_s, 1.0 / (1.0 + step_s / forgotten_s)
         self._response_s = np.asarray(response_s)
         self._ticks = np.maximum(np.round(self._response_s / step_s).astype(int), 1)
@@ -48,10 +54,14 @@ class OwnPath:
 
     def feel(self, change_m_s: Array) -> None:
         """Take note of dv (3,) since the last period, NaN where it was not felt."""
-        v, felt = self._commanded_m_s, self._felt
-        besides = change_m_s - (v - self._before) if np.isfinite(change_m_s).all() else 0.0
-        self._before, self._felt = v, self._kept * (felt + besides)
-        self._straying = self._kept * (self._straying + self._felt - felt)
+        v, felt, change = self._commanded_m_s, self._felt, self._commanded_m_s - self._before
+        self._before = v
+        if np.isfinite(change_m_s).all():
+            self._felt = self._kept * (felt + change_m_s - change)
+            straying = self._kept * (self._straying + self._felt - felt)
+            self._straying = np.clip(straying, -self._limit_m_s, self._limit_m_s)
+        else:
+            self._felt, self._straying = np.zeros(3), self._dies * self._straying
         self._strayed = self._strayed + self._straying * self._step_s
 
     def step(self, velocity_m_s: Array) -> None:

@@ -1,14 +1,15 @@
 """Follows the drogue by prediction: flies now what the drogue will do when the receiver has answered.
 
 With y_D place of the drogue and y_r that of the receiver on its own scale, both a response time ahead
-(`drogue_motion`, `own_path`), the tip goes across as planned for the next second and a half (`path_plan`), from where
-its commands will have brought it to where the drogue is predicted. Along, the commanded velocity u goes to
+(`drogue_motion`, `own_path`), and e what the tip then still strays at, the tip goes across as planned for the next
+second and a half (`path_plan`), from where commands and straying will have brought it to where the drogue is predicted.
+Along, the commanded velocity u goes to
 
-    e = y_D - y_r - wanted,     u* = y_D' + k e,     du/dt = y_D'' + k (y_D' - u) + s (u* - u)            (1)
+    v = y_D' - e,     u* = v + k (y_D - y_r - wanted),     du/dt = y_D'' + k (v - u) + s (u* - u)         (1)
 
-while closing at c, u* = y_D' + c. Both u and du/dt go out, so that the flight control has nothing to guess. A bias of
-the receiver's inertial velocity is part of y_D'. What the tip does otherwise than commanded is part of y_D too: it is
-predicted and flown against like the drogue's own motion, with the same filter.
+while closing at c, u* = v + c. Both u and du/dt go out, so that the flight control has nothing to guess. A bias of
+the receiver's inertial velocity is part of y_D'. What the tip does otherwise than commanded is part of y_r where it is
+felt; where not, of y_D: it is then predicted and flown against like the drogue's own motion, with the same filter.
 
 A swing that asks for more than a share of the acceleration that the receiver may fly (rms over some swings) is not
 followed but waited for astern: then y_D is the middle of the swing, and haste has a higher price. In gusts that move
@@ -16,8 +17,8 @@ the drogue so much the surfaces have no rate to spare for haste, and drogue and 
 unasked: the more the swing asks for, the farther astern it is waited for, and a drogue that is reeled in and out is not
 run after faster than the receiver joins up.
 
-Not modelled: limits of the airframe beyond those of acceleration and jerk; what they cut off is missing from y_r's
-scale until it is seen.
+Not modelled: limits of the airframe beyond those of acceleration and jerk; what they cut off is missing from y_r until
+it is felt or seen. That e dies away while du/dt is flown.
 """
 
 from dataclasses import replace
@@ -58,7 +59,9 @@ class Predictive:
     ) -> None:
         self._settings, self._step_s, self._seen = settings, step_s, False
         plan = settings.plan
-        self._own = OwnPath(response_s, step_s, np.array(settings.straying_s), settings.forgotten_s)
+        self._own = OwnPath(
+            response_s, step_s, np.array(settings.straying_s), settings.forgotten_s, settings.straying_limit_m_s
+        )
         self._motion = DrogueMotion(settings.swing, step_s, response_s, plan.node_s)
         self._plans, self._patient_plans = (
             [PathPlan(plan, share * acceleration_limit_m_s2[i], share * jerk_limit_m_s3[i]) for i in _ACROSS]

@@ -229,3 +229,22 @@ def test_a_descent_is_flown_as_announced():
         command = guidance.step(still)
     assert (command.turn_rate_rad_s, command.climb_rad) == (0.0, -0.05)
     np.testing.assert_allclose(command.velocity_m_s[1:], 0.0, atol=1e-9)
+
+
+def test_what_a_tip_feels_once_a_turn_is_announced_is_not_flown_against():
+    commands = []
+    for felt in (np.nan, 0.02):
+        guidance = Guidance(GuidanceSettings(), 100)
+        guidance.announce(_said())
+        near = RelativeState(
+            usable=True,
+            contact_usable=True,
+            p_PD_B=np.array([4.0, 0.1, 0.0]),
+            rate_PD_B=np.zeros(3),
+            p_PK_B=np.array([4.3, 0.1, 0.0]),
+            w_WB_B=np.zeros(3),
+            sigma_lateral_m=0.01,
+            dv_WP_B=np.full(3, felt),
+        )
+        commands.append(np.array([guidance.step(near).velocity_m_s for _ in range(100)]))
+    np.testing.assert_array_equal(*commands)

@@ -79,7 +79,7 @@ def test_prediction_is_as_good_as_its_own_covariance_says():
     settings, rng, ticks = SwingSettings(), np.random.default_rng(2), 60_000
     place, rate = np.array([1.0, 0.0, 1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0, 1.0, 0.0])
     H = [np.stack([place, rate - settings.rate_lag_s * (rate @ _dynamics(settings, axis))]) for axis in range(3)]
-    sigmas = np.array([pair for pair in zip(settings.position_sigma_m, settings.rate_sigma_m_s, strict=True)])  # (3, 2)
+    sigmas = np.array(list(zip(settings.position_sigma_m, settings.rate_sigma_m_s, strict=True)))  # (3, 2)
     lead, F, densities, expected = np.round(LEAD_S / STEP_S).astype(int), [], np.zeros((3, 5)), []
     densities[:, 1], densities[:, 4] = settings.drift_density, settings.gust_density
     for axis in range(3):

@@ -8,7 +8,7 @@ RESPONSE_S, STRAYING_S = np.array([0.4, 0.17, 0.14]), np.array([0.9, 0.6, 0.45])
 
 
 def test_each_axis_flies_its_commands_a_response_time_later():
-    path, u = OwnPath(RESPONSE_S, 0.01, STRAYING_S, 4.0), np.random.default_rng(1).normal(size=(300, 3))
+    path, u = OwnPath(RESPONSE_S, 0.01, STRAYING_S, 4.0, 0.5), np.random.default_rng(1).normal(size=(300, 3))
     sums = np.vstack([np.zeros(3), np.cumsum(u, axis=0) * 0.01])
     for k in range(300):
         path.step(u[k])
@@ -20,7 +20,7 @@ def test_each_axis_flies_its_commands_a_response_time_later():
 
 def test_what_is_felt_besides_the_commands_is_part_of_the_way():
     """A gust takes the tip to 0.3 m/s left at once, besides a command of 0.5 m/s: place and rate are those flown."""
-    path, left, flown = OwnPath(RESPONSE_S, 0.01, STRAYING_S, 1e6), np.array([0.0, 1.0, 0.0]), 0.0
+    path, left, flown = OwnPath(RESPONSE_S, 0.01, STRAYING_S, 1e6, 0.5), np.array([0.0, 1.0, 0.0]), 0.0
     before = 0.0
     for k in range(100):
         commanded = 0.5 if k >= 17 else 0.0  # felt a response time after it was given
@@ -33,7 +33,7 @@ def test_what_is_felt_besides_the_commands_is_part_of_the_way():
 
 
 def test_it_goes_on_to_stray_until_that_has_died_away():
-    path, strayed = OwnPath(RESPONSE_S, 0.01, STRAYING_S, 1e6), np.array([0.1, -0.2, 0.3])
+    path, strayed = OwnPath(RESPONSE_S, 0.01, STRAYING_S, 1e6, 0.5), np.array([0.1, -0.2, 0.3])
     path.feel(strayed)
     here = path.place_m
     for time_s in (RESPONSE_S, np.full(3, 0.8), np.full(3, 20.0)):
@@ -45,7 +45,7 @@ def test_it_goes_on_to_stray_until_that_has_died_away():
 
 def test_gravity_that_is_not_quite_taken_off_is_forgotten():
     """0.05 m/s^2 from now on: felt as 0.07 m/s at most, within half a minute as nothing."""
-    path, most = OwnPath(RESPONSE_S, 0.01, STRAYING_S, 4.0), 0.0
+    path, most = OwnPath(RESPONSE_S, 0.01, STRAYING_S, 4.0, 0.5), 0.0
     for _ in range(3000):
         path.feel(np.full(3, 0.0005))
         path.step(np.zeros(3))
@@ -54,15 +54,19 @@ def test_gravity_that_is_not_quite_taken_off_is_forgotten():
     assert np.abs(path.velocity_m_s).max() < 0.002
 
 
-def test_where_nothing_is_felt_any_more_the_commands_are_the_way_by_and_by():
-    path = OwnPath(RESPONSE_S, 0.01, STRAYING_S, 4.0)
-    path.feel(np.ones(3))
+def test_where_nothing_is_felt_any_more_straying_dies_away():
+    path = OwnPath(RESPONSE_S, 0.01, STRAYING_S, 4.0, 0.5)
+    path.feel(np.full(3, 0.3))
     straying = path.velocity_m_s
-    for _ in range(100):
+    for k in range(1, 300):
         path.feel(np.full(3, np.nan))
         path.step(np.zeros(3))
-    assert (np.abs(path.velocity_m_s) < straying).all()
-    for _ in range(3000):
-        path.feel(np.full(3, np.nan))
+        np.testing.assert_allclose(path.velocity_m_s, straying * np.exp(-k * 0.01 / STRAYING_S), atol=1e-12)
+
+
+def test_a_turn_that_nobody_announced_is_not_flown_against_for_more_than_the_limit():
+    path = OwnPath(RESPONSE_S, 0.01, STRAYING_S, 4.0, 0.5)
+    for _ in range(1000):
+        path.feel(np.full(3, 0.05))  # 5 m/s^2
         path.step(np.zeros(3))
-    assert np.abs(path.velocity_m_s).max() < 0.01
+    np.testing.assert_allclose(path.velocity_m_s, 0.5)

@@ -55,3 +55,27 @@ def test_the_middle_of_the_swing_is_seen_from_the_tip():
         30.0,
     )
     np.testing.assert_allclose(controller.middle_m, (4.0, 1.0, 0.0), atol=0.1)
+
+
+def test_a_drogue_at_rest_stays_at_rest_while_the_tip_strays():
+    """The tip sways by 0.1 m besides its commands and feels it: of the drogue's swing that it sees a third is left.
+
+    That is what forgetting twice within 4 s costs at 0.5 Hz.
+    """
+    limits = np.array(SETTINGS.acceleration_limit_m_s2), np.array(SETTINGS.jerk_limit_m_s3)
+    omega, left, swings = 2.0 * np.pi * 0.5, np.array([0.0, 1.0, 0.0]), {}
+    for felt in (True, False):
+        controller = Predictive(
+            SETTINGS.predictive, np.array(SETTINGS.response_s), *limits, STEP_S, SETTINGS.patient_share
+        )
+        push, unrest = np.zeros((len(controller.looks_ahead_s), 3)), []
+        for k in range(4000):
+            t = k * STEP_S
+            place = np.array([4.0, 0.0, 0.0]) - 0.1 * np.sin(omega * t) * left
+            rate = -0.1 * omega * np.cos(omega * t) * left
+            change = 0.1 * omega * (np.cos(omega * t) - np.cos(omega * (t - STEP_S))) * left
+            controller.observe(Sight(place_m=place, rate_m_s=rate, push_m_s2=push), change if felt else NOT_FELT)
+            controller.given(np.zeros(3), np.zeros(3))
+            unrest.append(controller.unrest)
+        swings[felt] = max(unrest[2000:])
+    assert swings[True] < 0.4 * swings[False]

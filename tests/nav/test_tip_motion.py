@@ -1,6 +1,7 @@
 """What accelerometers and gyros tell of the tip's velocity."""
 
 import numpy as np
+import pytest
 
 from dockair.nav.tip_motion import TipMotion
 from dockair.rotations import exp
@@ -65,13 +66,33 @@ def test_a_gyro_s_bias_turns_gravity_by_no_more_than_it_times_the_levelling():
     assert drift.std(axis=0).max() < 0.03
 
 
-def test_nothing_is_said_at_first_and_where_nothing_is_felt():
+def _told(motion, body, first, stop):
+    return [motion.change_m_s(body.force(k * STEP_S), body.rate(k * STEP_S), STEP_S) for k in range(first, stop)]
+
+
+def test_nothing_is_said_before_gravity_is_told_from_gusts():
     body, motion, nothing = Body(), TipMotion(P_IP, 60.0), np.full(3, np.nan)
     assert np.isnan(motion.change_m_s(nothing, body.rate(0.0), STEP_S)).all()
-    said = [motion.change_m_s(body.force(k * STEP_S), body.rate(k * STEP_S), STEP_S) for k in range(4000)]
-    assert np.isnan(said[:900]).all()  # gravity is not told from gusts yet
-    assert np.isfinite(said[1100:]).all()
-    for k in range(4000, 4100):  # a second without: the gyros carry gravity along
-        assert np.isnan(motion.change_m_s(nothing, body.rate(k * STEP_S), STEP_S)).all()
-    gravity = body.attitude(41.0).T @ GRAVITY
-    assert np.linalg.norm(motion._c - gravity) < 0.1
+    said = _told(motion, body, 0, 1200)
+    assert np.isnan(said[:1000]).all()
+    assert np.isfinite(said[1002:]).all()
+
+
+@pytest.mark.parametrize(("gap_ticks", "again_s"), [(5, 0.02), (100, 10.0)])
+def test_after_a_gap_in_the_samples_nothing_false_is_said(gap_ticks, again_s):
+    """Rates are held through it, as the navigation holds them; after a long one gravity is found anew."""
+    body, motion, nothing = Body(), TipMotion(P_IP, 60.0), np.full(3, np.nan)
+    _told(motion, body, 0, 4000)
+    for _ in range(gap_ticks):
+        assert np.isnan(motion.change_m_s(nothing, body.rate(39.99), STEP_S)).all()
+    begun = 4000 + gap_ticks
+    said = np.array(_told(motion, body, begun, begun + 1200))
+    assert (
+        np.isnan(said[: round(again_s / STEP_S) - 1]).all() and np.isfinite(said[round(again_s / STEP_S) + 2 :]).all()
+    )
+    times = STEP_S * np.arange(begun - 1, begun + 1200)
+    flown = np.diff([body.tip_velocity(t) for t in times], axis=0)
+    felt = np.array([body.attitude(t) @ dv for t, dv in zip(times[1:], said, strict=True)])
+    error = (felt - flown)[np.isfinite(said).all(axis=1)]
+    second = error[: len(error) // 100 * 100].reshape(-1, 100, 3).sum(axis=1)
+    assert np.abs(second).max() < 0.25  # m/s within a second; a jump of gravity by 1.4 degrees
