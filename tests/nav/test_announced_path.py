@@ -212,19 +212,24 @@ def test_in_a_turn_that_is_not_quite_the_announced_one_the_probe_meets_the_drogu
     assert command.turn_rate_rad_s == pytest.approx(TURN - less_rad_s, abs=0.2 * abs(less_rad_s))
 
 
+def _astern(left_m, dv_m_s=np.nan):
+    """The drogue at rest 4 m ahead."""
+    return RelativeState(
+        usable=True,
+        contact_usable=True,
+        p_PD_B=np.array([4.0, left_m, 0.0]),
+        rate_PD_B=np.zeros(3),
+        p_PK_B=np.array([4.3, left_m, 0.0]),
+        w_WB_B=np.zeros(3),
+        sigma_lateral_m=0.01,
+        dv_WP_B=np.full(3, dv_m_s),
+    )
+
+
 def test_a_descent_is_flown_as_announced():
     guidance = Guidance(GuidanceSettings(), 100)
     guidance.announce(_said(starts_s=0.0, entry_s=0.1, turn=0.0, climb=-0.05))
-    still = RelativeState(
-        usable=True,
-        contact_usable=True,
-        p_PD_B=np.array([4.0, 0.0, 0.0]),
-        rate_PD_B=np.zeros(3),
-        p_PK_B=np.array([4.3, 0.0, 0.0]),
-        w_WB_B=np.zeros(3),
-        dv_WP_B=np.full(3, np.nan),
-        sigma_lateral_m=0.01,
-    )
+    still = _astern(0.0)
     for _ in range(50):
         command = guidance.step(still)
     assert (command.turn_rate_rad_s, command.climb_rad) == (0.0, -0.05)
@@ -236,15 +241,6 @@ def test_what_a_tip_feels_once_a_turn_is_announced_is_not_flown_against():
     for felt in (np.nan, 0.02):
         guidance = Guidance(GuidanceSettings(), 100)
         guidance.announce(_said())
-        near = RelativeState(
-            usable=True,
-            contact_usable=True,
-            p_PD_B=np.array([4.0, 0.1, 0.0]),
-            rate_PD_B=np.zeros(3),
-            p_PK_B=np.array([4.3, 0.1, 0.0]),
-            w_WB_B=np.zeros(3),
-            sigma_lateral_m=0.01,
-            dv_WP_B=np.full(3, felt),
-        )
+        near = _astern(0.1, felt)
         commands.append(np.array([guidance.step(near).velocity_m_s for _ in range(100)]))
     np.testing.assert_array_equal(*commands)
