@@ -7,7 +7,7 @@ from dockair.scenarios.schema import load_scenario
 
 
 def test_in_gusts_the_tip_s_velocity_is_felt_as_it_is_flown():
-    """Over a second the tip's velocity changes by 0.3 m/s rms and more; it is felt to a tenth of that."""
+    """Over a second the tip's velocity changes by 0.3 m/s rms and more; it is felt to 15 % of that, as is each axis."""
     flight = Flight(load_scenario("moderate_gusts", {"camera.sensing": "measurements"}), 5)
     guidance, felt, flown = flight.navigator._guidance, [], []
     step = guidance.step
