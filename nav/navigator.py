@@ -1,8 +1,8 @@
 """The stages in order: gyro and frame in, belief and command out.
 
     frame ► ring_finder (detect ► identify ► track) ► pose ► integrity ► fusion ► guidance ► command
-    IMU   ────────────────────────────────────────────────────────────────┘    ▲
-       └► tip_motion ───────────────────────────────────────────────────────────┘
+    IMU   ─────────────────────────────────────────────────────────────────┘         ▲
+       └► tip_motion ────────────────────────────────────────────────────────────────┘
 
 Only this file knows the order. What it knows of its hardware arrives as `NavigationSheets`. Named LEDs may come in the
 place of a frame; they go the same way from the pose on.
