@@ -20,7 +20,7 @@ Source: Praun & Hoppe 2003 (octahedral maps), as `sky_table`.
 
 import math
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -37,8 +37,7 @@ _KEYS_PER_DEPTH = 3.0
 _FROM, _UNTIL = 0.05, 0.45  # way from a key, in keys' distances, over which the next one's tiles are made
 _LOOK_AGAIN = 16  # frames from one look at what the next key lacks to another
 
-Pairs = NDArray[np.uint64]  # the two values of a node, four bytes each, as one
-Neighbours = NDArray[np.complex128]  # those of a node and the next one, as one
+Neighbours = NDArray[Any]  # values of a node and of the next one, four bytes each, as one number of so many bytes
 #: Of a row's blocks: the node before each, and the parts of the way down and to the right to the next ones.
 Places = tuple[NDArray[np.int32], NDArray[np.float32], NDArray[np.float32]]
 Geometry = tuple[float, float, float, float, float, float]  # e, 2 h - h^2/r, h', 1/2a, D_x, D_y
@@ -48,10 +47,12 @@ View = tuple[Array, Array, Array, Interval]  # R_WC, tangents x and y, columns t
 class Nodes(NamedTuple):
     """Values of a table for the kernel, tile after tile: what is near is near in memory."""
 
-    values: NDArray[np.float32]
     neighbours: Neighbours
     side: int
     geometry: Geometry
+
+
+NO_DECK = Nodes(np.empty(0, dtype=np.complex128), 0, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
 
 
 class LayerTable:
@@ -93,7 +94,7 @@ class LayerTable:
         view = np.ascontiguousarray(R_WC, dtype=float), x, y, below
         self._own.complete(self._missing(self._own, place, view))
         self._prepare(place, key, step_m, view)
-        return Nodes(self._own.values.ravel(), self._own.neighbours, self._tiles * _TILE, self._geometry(place, key))
+        return Nodes(self._own.neighbours, self._tiles * _TILE, self._geometry(place, key))
 
     def _prepare(self, place_m: Place, key: Place, step_m: float, view: View) -> None:
         """Make a share of the tiles of the key that comes next if the way goes on: along the axis left first."""
@@ -148,13 +149,12 @@ def _step(x: Array) -> float:
 
 @njit(cache=True, error_model="numpy")
 def lay_under(
-    out: NDArray[np.float32], R: Array, x: Array, y: Array, below: Interval, ground: Nodes, deck: Nodes, has_deck: bool
+    out: NDArray[np.float32], R: Array, x: Array, y: Array, below: Interval, ground: Nodes, deck: Nodes
 ) -> None:
     """Write the radiance of ground, or of a deck (light, transmittance) before it, into the columns that see it."""
     tangents, n = x.astype(np.float32), len(x)
     corner, down, right = np.empty(n, np.int32), np.empty(n, np.float32), np.empty(n, np.float32)
-    pairs, around_pairs = ground.values.view(np.uint64), np.empty((2, n), np.uint64)
-    around = np.empty((2, n), np.complex128)
+    around_ground, around_deck = np.empty((2, n), np.uint64), np.empty((2, n), np.complex128)
     for i in range(len(y)):
         left, stop = below[i]
         if left == stop:
@@ -162,10 +162,10 @@ def lay_under(
         row, part, count = out[i, left:stop], tangents[left:stop], stop - left
         places = corner[:count], down[:count], right[:count]
         _place(R, part, y[i], ground, places)
-        _read(pairs, around_pairs, places, row)
-        if has_deck:
+        _read(ground.neighbours, around_ground, places, row)
+        if len(deck.neighbours) > 0:
             _place(R, part, y[i], deck, places)
-            _read_over(deck.neighbours, around, places, row)
+            _read_over(deck.neighbours, around_deck, places, row)
 
 
 @njit(cache=True, error_model="numpy", inline="always")
@@ -219,15 +219,15 @@ def _place(R: Array, x: NDArray[np.float32], y_i: float, nodes: Nodes, places: P
 
 
 @njit(cache=True)
-def _read(pairs: Pairs, around: Pairs, places: Places, out: NDArray[np.float32]) -> None:
-    """The ground, whose nodes have their own value and the next one's.
+def _read(neighbours: Neighbours, around: Neighbours, places: Places, out: NDArray[np.float32]) -> None:
+    """The ground.
 
-    Both are fetched as one, first for all blocks: the compiler then reckons several at once, and loads are halved.
+    Nodes are fetched first, for all blocks: the compiler then reckons several at once; by twos, that halves the loads.
     """
     corner, down, right = places
     for j in range(len(out)):
         k = np.uint64(np.uint32(corner[j]))
-        around[0, j], around[1, j] = pairs[k], pairs[k + np.uint64(_SIDE)]
+        around[0, j], around[1, j] = neighbours[k], neighbours[k + np.uint64(_SIDE)]
     values = around.view(np.float32)
     upper, lower = values[0], values[1]
     for j in range(len(out)):
@@ -239,7 +239,7 @@ def _read(pairs: Pairs, around: Pairs, places: Places, out: NDArray[np.float32])
 
 @njit(cache=True)
 def _read_over(neighbours: Neighbours, around: Neighbours, places: Places, out: NDArray[np.float32]) -> None:
-    """Light of the deck, and what it lets through of what is in `out`; of two nodes, all is fetched as one."""
+    """Light of the deck, and what it lets through of what is in `out`."""
     corner, down, right = places
     for j in range(len(out)):
         k = np.uint64(np.uint32(corner[j]))

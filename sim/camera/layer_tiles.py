@@ -4,6 +4,7 @@ A node's value depends on its direction and the place, its key, alone: not on wh
 """
 
 from collections.abc import Callable, Iterable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,23 +24,24 @@ class LayerTiles:
     Args:
         function: (m, 3) unit vectors and the key's place (3,) -> (m, channels) values.
         tiles: a side.
-        channels: how many values the function has, 1 or 2. Of one, a node keeps the next node's beside its own.
+        channels: how many values the function has, 1 or 2.
     """
 
     def __init__(self, function: Callable[[Array, Array], Array], tiles: int, channels: int) -> None:
-        self._function, self._tiles, self._channels = function, tiles, channels
+        self._function, self._tiles = function, tiles
         self._strips = np.zeros((tiles, tiles), dtype=np.int64)
         self._ahead: list[tuple[int, int]] = []
         self._made = 0
         self.key: Place = (0.0, 0.0, 0.0)
-        self.values: NDArray[np.float32] = np.zeros(((tiles * SIDE) ** 2, 2), dtype=np.float32)
+        self.values: NDArray[np.float32] = np.zeros(((tiles * SIDE) ** 2, channels), dtype=np.float32)
         self.is_known = np.zeros((tiles, tiles), dtype=np.bool_)
 
     @property
-    def neighbours(self) -> NDArray[np.complex128]:
-        """(nodes - 1,) the values of each node and of the next one as one: no other type has 16 bytes."""
+    def neighbours(self) -> NDArray[Any]:
+        """(nodes - 1,) the values of each node and of the next one as one, whatever that is a number of."""
         values = self.values
-        return np.ndarray(len(values) - 1, np.complex128, values.data, strides=values.strides[:1])
+        kind = np.uint64 if values.shape[1] == 1 else np.complex128
+        return np.ndarray(len(values) - 1, kind, values.data, strides=values.strides[:1])
 
     def restart(self, key: Place) -> None:
         """Forget all, for another key."""
@@ -82,7 +84,6 @@ class LayerTiles:
         i, j = np.meshgrid(down + row * TILE, along + column * TILE, indexing="ij")
         directions = directions_from_nodes(i.ravel(), j.ravel(), self._tiles * TILE)
         place = slice(first + strip * _ROWS * SIDE, first + (strip + 1) * _ROWS * SIDE)
-        values = self._function(directions, np.array(self.key))
-        self.values[place] = values if self._channels == 2 else np.hstack([values, np.roll(values, -1, axis=0)])
+        self.values[place] = self._function(directions, np.array(self.key))
         self._strips[row, column] = strip + 1
         self.is_known[row, column] = strip + 1 == _STRIPS

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from dockair.rotations import Array
 from dockair.sim.camera.earth import columns_below, dip_sine
-from dockair.sim.camera.layer_table import LayerTable, lay_under
+from dockair.sim.camera.layer_table import NO_DECK, LayerTable, lay_under
 from dockair.sim.camera.sky_radiance import LAYER_NODE_RAD, NODE_RAD, SkyRadiance
 from dockair.sim.camera.sky_table import DirectionTable
 
@@ -55,9 +55,8 @@ class Sky:
             self._table.fill(out[first:stop], R, x, y[first:stop])
         if any_below:
             ground = self._ground_table.nodes(place, R, x, y, below)
-            has_deck = self._law.has_deck
-            deck = self._deck_table.nodes(place, R, x, y, below) if has_deck else ground
-            lay_under(out, R, x, y, below, ground, deck, has_deck)
+            deck = self._deck_table.nodes(place, R, x, y, below) if self._law.has_deck else NO_DECK
+            lay_under(out, R, x, y, below, ground, deck)
 
     @property
     def ambient(self) -> float:

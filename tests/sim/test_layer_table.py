@@ -9,7 +9,7 @@ import pytest
 from dockair.parameters import load_parameters
 from dockair.rotations import exp, matrix_from_yaw_pitch_roll
 from dockair.sim.camera.earth import columns_below, dip_sine, meet_sphere
-from dockair.sim.camera.layer_table import LayerTable, lay_under
+from dockair.sim.camera.layer_table import NO_DECK, LayerTable, lay_under
 from dockair.sim.camera.sheets import SkyParameters
 from dockair.sim.camera.sky import Sky
 from dockair.sim.camera.sky_radiance import SkyRadiance
@@ -54,7 +54,7 @@ def test_a_point_of_the_plane_is_seen_where_its_ray_meets_the_sphere(
     below, out = np.empty((len(Y), 2), dtype=np.int64), np.full((len(Y), len(X)), np.nan, dtype=np.float32)
     columns_below(R, X, Y, dip_sine(RADIUS_M, ALTITUDE_M + at[2]), below)
     ground = _table(1).nodes(at, R, X, Y, below)
-    lay_under(out, R, X, Y, below, ground, ground, False)
+    lay_under(out, R, X, Y, below, ground, NO_DECK)
     d = _rays(R)
     meets, distance, _ = meet_sphere(d[:, 2], RADIUS_M, ALTITUDE_M + at[2])
     near = meets & (distance < 60e3)
@@ -87,8 +87,8 @@ def test_a_deck_lies_over_the_ground_by_its_light_and_transmittance() -> None:
     below = np.tile([0, len(X)], (len(Y), 1))
     out, alone = (np.zeros((len(Y), len(X)), dtype=np.float32) for _ in range(2))
     ground, deck = _table(1).nodes(place, R, X, Y, below), _table(2).nodes(place, R, X, Y, below)
-    lay_under(out, R, X, Y, below, ground, deck, True)
-    lay_under(alone, R, X, Y, below, ground, deck, False)
+    lay_under(out, R, X, Y, below, ground, deck)
+    lay_under(alone, R, X, Y, below, ground, NO_DECK)
     assert np.allclose(out, 1.3 * alone, atol=1e-5)
 
 
@@ -200,7 +200,7 @@ def test_the_next_key_is_made_bit_by_bit_and_right(heading_m: tuple[float, float
             pictures = []
             for table in (nodes, _table(2).nodes(at, R, X, Y, below)):
                 out = np.zeros((len(Y), len(X)), dtype=np.float32)
-                lay_under(out, R, X, Y, below, _table(1).nodes(at, R, X, Y, below), table, True)
+                lay_under(out, R, X, Y, below, _table(1).nodes(at, R, X, Y, below), table)
                 pictures.append(out)
             assert np.array_equal(*pictures)
     assert max(of_frame[1:]) < of_frame[0] / 20
