@@ -59,7 +59,6 @@ class Guidance:
         self._aim: Array = np.zeros(2)
         self._reckoning = DeadReckoning(settings, self._dt)
         self._passed: Array | None = None  # where the ring was when the tip last came to its plane, left and up
-        self._ring_ahead_m = 0.0
         self._entered_m = 0.0  # how far off when the tip last came past it
         speeds = settings.closure_speed_m_s, settings.closure_acceleration_m_s2
         self._closure = Closure(settings.closing, *speeds, self._dt)
@@ -133,7 +132,6 @@ class Guidance:
     def _count(self, state: RelativeState, ring: Array, rate: Array, coupling: Array) -> None:
         settings, limits = self._settings, self._settings.limits
         self._time_s += self._dt
-        self._ring_ahead_m = float(ring[0])
         self._in_phase_s += self._dt
         self._has_seen = self._has_seen or state.usable
         self._unusable_s = self._unusable_s + self._dt if self._has_seen and not state.usable else 0.0
@@ -228,6 +226,12 @@ class Guidance:
         """(2,) off the drogue's predicted place, left and up: what is learnt applies to contact."""
         return self._aim if self.phase is Phase.APPROACH else np.zeros(2)
 
+    def _clearance(self, ring: Array) -> Array:
+        """(2,) added to the aim: beside the basket if called back so late that it may be met from outside the rim."""
+        limits, lateral_m = self._settings.limits, float(np.hypot(ring[1], ring[2]))
+        meets = self._closure.recalled and ring[0] < limits.clear_range_m and lateral_m > limits.rim_m
+        return -limits.beside_m / lateral_m * ring[1:] if meets else np.zeros(2)
+
     def _follow(self, ring: Array) -> Array:
         """(3,) du/dt of the controller."""
         s = self._settings
@@ -236,7 +240,7 @@ class Guidance:
             wanted = Wanted(
                 distance_m=None,
                 speed_m_s=self._closure.speed_m_s,
-                aim_m=self._aim_now(),
+                aim_m=self._aim_now() + self._clearance(ring),
                 patient=self._is_patient,
                 must_follow=True,
                 to_contact_s=self._to_contact_s(distance_m) if self._closure.committed else None,
@@ -254,9 +258,8 @@ class Guidance:
 
     @property
     def _is_patient(self) -> bool:
-        """Whether a share of the limits across is enough: as long as it can be called back and stop short."""
-        far = self._ring_ahead_m >= self._settings.limits.off_axis_range_m
-        return self.phase in _WAITING or (self.phase is Phase.APPROACH and far and not self._closure.committed)
+        """Whether a share of the limits across is enough: as long as it can be called back."""
+        return self.phase in _WAITING or (self.phase is Phase.APPROACH and not self._closure.committed)
 
     def _to_contact_s(self, distance_m: float) -> float:
         s = self._settings

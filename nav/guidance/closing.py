@@ -32,7 +32,7 @@ class ClosingSettings:
     recall_m_s2: float = 1.5  # how fast c is then taken back: idle thrust at once, whatever the lag
     wait_at_m: float = 2.8  # from the ring: room to gain the speed of the run-up before the last moment
     retreat_m_s: float = 0.8  # to that place: walking pace, a second try within a few swings
-    margin_m: float = 0.4  # short of the ring, at rest: half of it goes as drogue and receiver come together by gusts
+    margin_m: float = 0.7  # short of the ring, at rest: half of it goes as drogue and receiver come together by gusts
 
 
 class PredictedMiss:

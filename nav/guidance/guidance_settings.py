@@ -62,8 +62,8 @@ class GuidanceSettings:
     response_s: tuple[float, float, float] = (0.28, 0.10, 0.10)  # tau: delay of the tip, computing included
     acceleration_limit_m_s2: tuple[float, float, float] = (0.75, 1.9, 1.9)  # less than the flight control's
     jerk_limit_m_s3: tuple[float, float, float] = (3.8, 6.6, 7.6)  # likewise
-    #: Of both limits across, until committed or within a metre. With all of them a receiver that runs up by camera met
-    #: gusts with its surfaces at their rates, and was thrown a metre aside; what needs more is no calm moment.
+    #: Of both limits across, until committed. With all of them a receiver that runs up by camera met gusts with its
+    #: surfaces at their rates, and was thrown a metre aside; what needs more than this share is no calm moment.
     patient_share: float = 0.6
     velocity_limit_m_s: float = 3.5
     closure_acceleration_m_s2: float = 0.6  # how fast the closure speed is asked for

@@ -50,6 +50,8 @@ class PhaseLimits:
     off_axis_m: float = 1.0  # breakaway practice: 1 m off ...
     off_axis_range_m: float = 1.0  # ... within 1 m
     rim_m: float = 0.25  # radius of the ring: a tip that came past its plane farther out is beside the basket
+    clear_range_m: float = 0.6  # assumed: who is called back and comes nearer than this ...
+    beside_m: float = 0.6  # ... outside the rim keeps so far from the axis: rim, probe and what a gust may do
     closure_limit_m_s: float = 2.6  # 5 kt, service limit
     breakaway_s: float = 10.0  # assumed: backing off at 1 m/s clears any attempt in this time
 

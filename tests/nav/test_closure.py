@@ -72,7 +72,7 @@ def test_a_standing_receiver_waits_for_calm_and_a_running_one_for_hope():
 
 def test_a_tip_that_is_blown_closer_is_called_back_earlier():
     def late(t, d):
-        return (0.5, 0.5) if d > 1.95 else (1.3, 0.5)
+        return (0.5, 0.5) if d > 2.3 else (1.3, 0.5)
 
     near = [_flown(late, 9.0, blown_m_s=v)[:, 0].min() for v in (0.0, 0.2)]
     assert near[1] > 0.1
