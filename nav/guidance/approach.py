@@ -62,7 +62,7 @@ class Guidance:
         self._entered_m = 0.0  # how far off when the tip last came past it
         speeds = settings.closure_speed_m_s, settings.closure_acceleration_m_s2
         self._closure = Closure(settings.closing, *speeds, self._dt)
-        self._attempts, self._docked, self._has_seen = 0, False, False
+        self._attempts, self._has_seen = 0, False
         self._time_s = self._in_phase_s = self._steady_s = self._patient_s = 0.0
         self._unusable_s = self._blind_s = self._doubtful_s = self._inside_s = self._pushed_in_m = 0.0
 
@@ -195,7 +195,6 @@ class Guidance:
             closing_m_s=-float(rate[0]),
             pushed_in_m=self._pushed_in_m,
             attempts=self._attempts,
-            docked=self._docked,
         )
 
     def _change_phase(self, situation: Situation) -> None:
@@ -204,7 +203,6 @@ class Guidance:
         if transition is None:
             return
         self.phase, self.phase_reason, self._in_phase_s = transition.to, transition.reason, 0.0
-        self._docked = self._docked or self.phase is Phase.HOLD
         if self.phase is Phase.APPROACH:
             self._attempts, self._passed, self._inside_s = self._attempts + 1, None, 0.0
             self._closure.begin()

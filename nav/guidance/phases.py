@@ -78,7 +78,6 @@ class Situation:
     closing_m_s: float  #: rate at which `ring_ahead_m` shrinks
     pushed_in_m: float  #: way flown toward the tanker since the coupling was reached
     attempts: int  #: approaches begun
-    docked: bool  #: the drogue has been held in the refuelling range
 
 
 _Condition = Callable[[PhaseLimits, Situation], bool]
@@ -120,7 +119,6 @@ class Transition:
 
 _TOO_FAST = Transition(Phase.BREAKAWAY, "closing too fast", lambda limits, s: s.closing_m_s > limits.closure_limit_m_s)
 _AWAY = (
-    Transition(Phase.CLEAR, "has docked", lambda limits, s: _far_enough(limits, s) and s.docked),
     Transition(
         Phase.CLEAR,
         "no attempts left",

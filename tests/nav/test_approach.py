@@ -236,6 +236,22 @@ def test_before_it_is_committed_it_uses_a_share_of_the_limits_across():
         assert 0.8 * limit < most <= limit + 1e-9
 
 
+def test_a_drogue_that_slips_off_before_all_is_taken_in_is_tried_again():
+    class Slips(Plant):
+        def step(self, command):
+            now = super().step(command)
+            if self.latched and self.take_in > 1.45 and not self.slipped:
+                self.latched, self.holds, self.slipped = False, True, True
+                self.p_WD0 = self.p_WP + [0.6, 0.1, 0.0]
+            return now
+
+    plant = Slips()
+    plant.slipped = False
+    phases, _ = fly(plant, seconds=150.0)
+    again = [Phase.PRE_CONTACT, Phase.APPROACH, Phase.CONTACT, Phase.HOLD, Phase.DISCONNECT, Phase.CLEAR]
+    assert phases == [*DOCKING[:4], Phase.BREAKAWAY, *again]
+
+
 @pytest.mark.parametrize(("ahead_m", "left_m", "away"), [(0.5, 0.35, True), (0.5, 0.1, False), (0.8, 0.35, False)])
 def test_who_is_called_back_too_late_passes_beside_a_basket_that_would_be_met_from_outside(ahead_m, left_m, away):
     at_last = _accelerations_to_the_left([ahead_m, left_m, 0.0])[-1]

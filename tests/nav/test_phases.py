@@ -30,7 +30,6 @@ CALM = Situation(
     closing_m_s=1.2,
     pushed_in_m=0.0,
     attempts=1,
-    docked=False,
 )
 HELD = {"ahead_m": 0.0, "ring_ahead_m": -0.3, "closing_m_s": 0.0}
 
@@ -77,8 +76,6 @@ HELD = {"ahead_m": 0.0, "ring_ahead_m": -0.3, "closing_m_s": 0.0}
         ("back_off", {"ring_ahead_m": 3.1}, "pre_contact"),
         ("back_off", {"ring_ahead_m": 3.1, "unusable_s": 0.1}, None),
         ("back_off", {"ring_ahead_m": 3.1, "attempts": 3}, "clear"),
-        ("back_off", {"ring_ahead_m": 2.9, "docked": True}, None),
-        ("breakaway", {"ring_ahead_m": 3.1, "docked": True}, "clear"),
         ("breakaway", {"in_phase_s": 10.0}, "pre_contact"),
         ("breakaway", {"in_phase_s": 10.0, "attempts": 3}, "clear"),
     ],
