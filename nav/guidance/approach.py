@@ -83,7 +83,7 @@ class Guidance:
             self._follow_path(state, ring, rate)
         self._observe(state, ring, rate)
         middle = self._controller.middle_m if state.usable else None
-        self._reckoning.step(middle, self._controller.drift_m_s, self._u)
+        self._reckoning.step(middle, self._controller.steady_drift_m_s, self._u)
         self._count(state, ring, rate, coupling)
         self._change_phase(self._situation(ring, rate, coupling))
         u_dot = self._follow(ring) if self._follows(state, ring) else self._hold_course()
@@ -209,10 +209,10 @@ class Guidance:
         elif self.phase is Phase.CONTACT:  # what is commanded already will still be flown
             self._pushed_in_m = self._closure.speed_m_s * self._settings.response_s[0]
         elif self.phase in (Phase.BACK_OFF, Phase.BREAKAWAY):
+            if self._passed is not None and self._closure.committed:  # else it did not mean to meet the drogue
+                self._aim = self._settings.bow_wave.learnt(self._aim, self._passed)
             self._closure.begin()
             self._miss.forget()
-            if self._passed is not None:
-                self._aim = self._settings.bow_wave.learnt(self._aim, self._passed)
 
     def _follows(self, state: RelativeState, ring: Array) -> bool:
         """Whether the drogue is followed; not while it is on the probe or about it, or out of view."""
@@ -225,9 +225,9 @@ class Guidance:
         return self._aim if self.phase is Phase.APPROACH else np.zeros(2)
 
     def _clearance(self, ring: Array) -> Array:
-        """(2,) added to the aim: beside the basket if called back so late that it may be met from outside the rim."""
+        """(2,) added to the aim: beside a basket that is not to be met and may be, from outside the rim."""
         limits, lateral_m = self._settings.limits, float(np.hypot(ring[1], ring[2]))
-        meets = self._closure.recalled and ring[0] < limits.clear_range_m and lateral_m > limits.rim_m
+        meets = not self._closure.committed and ring[0] < limits.clear_range_m and lateral_m > limits.rim_m
         return -limits.beside_m / lateral_m * ring[1:] if meets else np.zeros(2)
 
     def _follow(self, ring: Array) -> Array:
@@ -266,11 +266,12 @@ class Guidance:
 
     def _hold_course(self) -> Array:
         """(3,) du/dt toward the drogue's drift, plus the speed along that the phase asks for."""
-        s = self._settings
-        target = self._controller.drift_m_s
-        if self.phase in _TOUCHING:
-            target[0] = self._controller.steady_drift_m_s[0]
-        if self._path.is_announced and self.phase in _TOUCHING:  # the drogue has come along
+        s, steady, touching = self._settings, self._controller.steady_drift_m_s, self.phase in _TOUCHING
+        lost = self._unusable_s > 0.0 and not touching
+        target = self._reckoning.believed(steady) if lost else self._controller.drift_m_s
+        if touching:
+            target[0] = steady[0]
+        if self._path.is_announced and touching:  # the drogue has come along
             target += self._axes.turned(np.array([self._pushed_in_m, 0.0, 0.0]))
         if self.phase is Phase.CONTACT:  # slows down so as to stop where it is to hold
             to_go = max(s.limits.take_in_m - self._pushed_in_m, 0.0)
@@ -278,10 +279,12 @@ class Guidance:
         elif self.phase in _RETREATING or (
             self.phase in _WAITING and self._unusable_s > s.limits.lost_s
         ):  # nobody waits near a drogue that is not seen
-            if self._unusable_s > 0.0 and self.phase not in _TOUCHING:
-                target = self._reckoning.believed(target) + self._reckoning.astern_m_s()
+            if lost:
+                target += self._reckoning.astern_m_s()
             target[0] -= s.back_off_speed_m_s
-        elif self.phase is Phase.APPROACH:  # out of view, or in the basket: on as before
+        elif self.phase is Phase.APPROACH and lost and not self._closure.committed and self._inside_s == 0.0:
+            target[0] += self._closure.speed_m_s
+        elif self.phase is Phase.APPROACH:  # out of view at the last, or in the basket: on as before
             target[0] = self._u[0]
         return np.asarray(s.course_gain_1_s * (target - self._u))
 

@@ -51,7 +51,7 @@ class Closure:
         if last and known and max(miss, unrest) <= 1.0 and not self.recalled:
             self.committed = True
         hopeful = known and miss <= s.hopeful and unrest <= (s.hopeful if closes else 1.0)
-        if not self.committed and distance_m < s.recall_m and (last or not hopeful):
+        if not self.committed and (last or (distance_m < s.recall_m and not hopeful)):
             self.recalled = True
         if distance_m >= s.wait_at_m:
             self.recalled = False

@@ -80,6 +80,10 @@ class DrogueMotion:
         self._x, self._ticks = np.zeros((3, _STATES)), 0
         self._x[:, 0], self._x[:, 3] = place_m, velocity_m_s
 
+    def resume(self, place_m: Array) -> None:
+        """Begin anew at a place (3,) where it comes into view again, whatever the swing; the drift stays as learnt."""
+        self._x[:, 0], self._x[:, 2:], self._ticks = place_m, 0.0, 0
+
     def step(self, place_m: Array | None, velocity_m_s: Array | None, push_m_s2: Array) -> None:
         """Advance by one control period.
 

@@ -31,6 +31,7 @@ class PredictiveSettings:
     bearing_s: float = 4.0  # over which that mean is taken: a swing and a half
     gusts_s: float = 30.0  # over which it is taken before an approach: a lull in severe turbulence is over too soon
     steady_s: float = 6.0  # over which the drift is taken that is held on the probe: longer than a surge of the reel
+    unseen_s: float = 0.5  # after which the swing is begun anew: what has come of it would be taken for drift
     #: T_e of `own_path`: in moderate gusts the tip, astern, went on by 0.41, 0.36, 0.30 m in half a second for each m/s
     #: that it strayed at.
     straying_s: tuple[float, float, float] = (0.9, 0.6, 0.45)

@@ -152,6 +152,7 @@ TRANSITIONS: dict[Phase, tuple[Transition, ...]] = {
         Transition(Phase.BREAKAWAY, "integrity lost", _doubtful),
         Transition(Phase.BREAKAWAY, "far off axis", _off_axis),
         Transition(Phase.BREAKAWAY, "beside the basket", _beside),
+        _LOST_FOR_GOOD,
         Transition(Phase.BACK_OFF, "time slot over", lambda limits, s: s.time_s >= limits.slot_s and s.waiting_s > 0.0),
         Transition(Phase.BACK_OFF, "no good moment to close", lambda limits, s: s.waiting_s >= limits.waiting_s),
         Transition(Phase.BACK_OFF, "coupling not reached", lambda limits, s: s.inside_s >= limits.inside_s),

@@ -57,7 +57,7 @@ class Predictive:
         step_s: float,
         patient_share: float,
     ) -> None:
-        self._settings, self._step_s, self._seen = settings, step_s, False
+        self._settings, self._step_s, self._unseen_s = settings, step_s, float("inf")
         plan = settings.plan
         self._own = OwnPath(
             response_s, step_s, np.array(settings.straying_s), settings.forgotten_s, settings.straying_limit_m_s
@@ -91,14 +91,17 @@ class Predictive:
         """Take note of the drogue, None when it is not seen, and of the tip's velocity, once a control tick."""
         self._own.feel(change_m_s)
         if sight is None:
+            self._unseen_s += self._step_s
             push: Array = np.zeros((len(self._times), 3))
             self._motion.step(None, None, push[0])
         else:
             push = sight.push_m_s2
             place, velocity = sight.place_m + self._own.place_m, sight.rate_m_s + self._own.velocity_m_s
-            if not self._seen:
+            if np.isinf(self._unseen_s):
                 self._motion.start(place, velocity)
-                self._seen = True
+            elif self._unseen_s > self._settings.unseen_s:
+                self._motion.resume(place)
+            self._unseen_s = 0.0
             self._motion.step(place, velocity, push[0])
         self._ahead = self._motion.ahead(push[0], push[1])
         self._path = self._motion.path(push)

@@ -270,6 +270,30 @@ def _accelerations_to_the_left(p_PD_B):
     return np.array(out)
 
 
+def test_a_drogue_lost_on_the_way_is_not_closed_on_and_given_up_in_time():
+    """Beyond the range in which a lost track is broken away from."""
+    guidance = Guidance(SETTINGS, RATE_HZ)
+    for _ in range(RATE_HZ):
+        guidance.step(state([4.0, 0.0, 0.0]))
+    guidance.phase = Phase.APPROACH
+    for k in range(2 * RATE_HZ):
+        guidance.step(state([4.0 - 0.4 * k / RATE_HZ, 0.0, 0.0], [-0.4, 0.0, 0.0]))
+    ahead, unseen = [], state([3.2, 0.0, 0.0], usable=False, contact_usable=False)
+    while guidance.phase is Phase.APPROACH and len(ahead) < 60 * RATE_HZ:
+        ahead.append(guidance.step(unseen).velocity_m_s[0])
+    assert max(ahead[2 * RATE_HZ :]) < 0.1
+    assert guidance.phase is Phase.CLEAR and guidance.phase_reason == "drogue lost"
+
+
+def test_a_basket_that_was_passed_on_purpose_teaches_nothing():
+    guidance = Guidance(SETTINGS, RATE_HZ)
+    guidance.phase = Phase.APPROACH
+    for ahead_m in np.linspace(0.5, -0.2, RATE_HZ):
+        guidance.step(state([ahead_m, 0.45, 0.0], [-0.7, 0.0, 0.0]))
+    assert guidance.phase is Phase.BREAKAWAY
+    np.testing.assert_array_equal(guidance._aim, np.zeros(2))
+
+
 def test_does_not_close_on_an_unusable_state():
     guidance = Guidance(SETTINGS, RATE_HZ)
     for _ in range(10 * RATE_HZ):

@@ -71,10 +71,7 @@ def test_a_standing_receiver_waits_for_calm_and_a_running_one_for_hope():
 
 
 def test_a_tip_that_is_blown_closer_is_called_back_earlier():
-    def late(t, d):
-        return (0.5, 0.5) if d > 2.3 else (1.3, 0.5)
-
-    near = [_flown(late, 9.0, blown_m_s=v)[:, 0].min() for v in (0.0, 0.2)]
-    assert near[1] > 0.1
-    blind = dataclasses.replace(SETTINGS, recall_m=0.0)
-    assert _flown(late, 9.0, blind)[:, 0].min() < near[0]
+    near = [_flown(lambda t, d: (1.3, 0.5), 9.0, blown_m_s=v)[:, 0].min() for v in (0.0, 0.2, 0.4)]
+    assert min(near) > SETTINGS.margin_m
+    deaf = dataclasses.replace(SETTINGS, margin_m=SETTINGS.margin_m - 0.4)
+    assert _flown(lambda t, d: (1.3, 0.5), 9.0, deaf)[:, 0].min() < near[0] - 0.3

@@ -57,6 +57,22 @@ def test_the_middle_of_the_swing_is_seen_from_the_tip():
     np.testing.assert_allclose(controller.middle_m, (4.0, 1.0, 0.0), atol=0.1)
 
 
+def test_what_a_drogue_did_unseen_is_no_drift():
+    """It swings by a metre, goes out of view for 1.2 s, and is 1.5 m lower at a glimpse of 0.1 s."""
+    omega, up = 2.0 * np.pi * np.array(SETTINGS.predictive.swing.frequency_hz[2]), np.array([0.0, 0.0, 1.0])
+    controller = shown(
+        lambda t: np.array([6.0, 0.0, 0.0]) + np.sin(omega * t) * up, lambda t: omega * np.cos(omega * t) * up, 20.0
+    )
+    for k in range(130):
+        seen_m, push = np.array([6.0, 0.0, np.sin(omega * 20.0) - 1.5]), np.zeros((len(controller.looks_ahead_s), 3))
+        sight = Sight(place_m=seen_m, rate_m_s=-0.5 * up, push_m_s2=push) if k >= 120 else None
+        controller.observe(sight, NOT_FELT)
+        controller.given(np.zeros(3), np.zeros(3))
+    assert np.abs(controller.steady_drift_m_s).max() < 0.1
+    assert np.abs(controller.drift_m_s).max() < 0.3
+    np.testing.assert_allclose(controller.middle_m, seen_m, atol=0.5)
+
+
 def test_a_drogue_at_rest_stays_at_rest_while_the_tip_strays():
     """The tip sways by 0.1 m besides its commands and feels it: of the drogue's swing that it sees a third is left.
 
