@@ -6,6 +6,7 @@ One step is one control tick (or `ticks_per_step` of them). The world, the senso
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Generic, Literal, SupportsFloat, TypeVar
 
@@ -108,7 +109,7 @@ class Episodes(gymnasium.Env[Obs, NDArray[np.float32]], Generic[Obs]):
         command = self._command(action)
         before_m, failed = self._distance_m(self._tick.truth), 0
         for _ in range(self._ticks_per_step):
-            failed += self._fly(command)
+            failed += self._fly(self._on_the_path(command))
             if self._outcome is not None:
                 break
         reward = failed * RETRY_REWARD
@@ -202,6 +203,11 @@ class Episodes(gymnasium.Env[Obs, NDArray[np.float32]], Generic[Obs]):
             raise DockairError("action", expected=f"{len(ACTION)} finite numbers", got=action)
         values = np.clip(values, self.action_space.low, self.action_space.high)
         return ReceiverCommand(velocity_m_s=values[:3], acceleration_m_s2=values[3:])
+
+    def _on_the_path(self, command: ReceiverCommand) -> ReceiverCommand:
+        """What is flown: the command as an increment on the path that the tanker has announced."""
+        path = self.tick.solution.command
+        return replace(command, turn_rate_rad_s=path.turn_rate_rad_s, climb_rad=path.climb_rad)
 
     def _distance_m(self, truth: Truth) -> float:
         assert self._flight is not None

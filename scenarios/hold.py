@@ -1,7 +1,9 @@
-"""The time between contact and release: how long, how far in, how hard."""
+"""The time between contact and release: how long, how far in, how hard. Of a flight that docks twice, the first."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import takewhile
+from operator import attrgetter
 
 from dockair.sim.truth import Truth
 
@@ -24,11 +26,11 @@ class Disconnect:
 
 def hold_of(truths: Sequence[Truth]) -> tuple[Hold | None, Disconnect | None]:
     """Return what happened while the probe was held, and how it came free (None: it did not)."""
-    held = [k for k, truth in enumerate(truths) if truth.latched]
-    if not held:
+    first = next((k for k, truth in enumerate(truths) if truth.latched), None)
+    if first is None:
         return None, None
-    first, last = held[0], held[-1]
-    during = truths[first : last + 1]
+    during = list(takewhile(attrgetter("latched"), truths[first:]))
+    last = first + len(during) - 1
     hold = Hold(
         duration_s=truths[last].time_s - truths[first].time_s,
         take_in_max_m=max(truth.reel_position_m for truth in during),

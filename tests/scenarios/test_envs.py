@@ -206,6 +206,21 @@ def test_commands_beyond_the_limits_are_clipped_and_nonsense_is_refused(env):
             env._command(wrong)
 
 
+def test_the_receiver_goes_along_where_the_tanker_has_announced_to_turn():
+    """Two seconds after the start into 25 degrees of bank: without it the drogue is 15 m aside 8 s later."""
+    env = gymnasium.make("dockair/DockFast-v0", scenario="racetrack", disable_env_checker=True).unwrapped
+    env.reset(seed=3)
+    rates = []
+    while env.tick.truth.time_s < 10.0:
+        wanted = env.tick.solution.command.turn_rate_rad_s
+        env.step(env.tick.solution.command.velocity_m_s.tolist() + [0.0] * 3)
+        rates.append(wanted)
+    aside_m = np.hypot(*env.tick.truth.p_PD_B[1:])
+    env.close()
+    assert max(rates) > 0.02
+    assert aside_m < 2.0
+
+
 def test_an_observation_is_finite_and_inside_its_space_when_the_navigation_knows_nothing(hand_made, env):
     truth, _, _, solution = hand_made.tick(1)
     blind = replace(solution, valid=False, covariance=np.full((9, 9), np.nan), led_pixels_px=np.full((8, 2), np.nan))

@@ -101,6 +101,11 @@ def test_hold_and_disconnect_are_read_from_the_latch(hand_made):
     assert disconnect.time_s == 8.5
 
 
+def test_of_two_holds_the_first_counts(hand_made):
+    once = [hand_made.truth(10 * k) for k in range(1, 900)]
+    assert hold_of(once + once) == hold_of(once)
+
+
 def test_a_probe_still_held_at_the_end_was_not_disconnected(hand_made):
     _, disconnect = hold_of([hand_made.truth(10 * k) for k in range(600, 700)])
     assert disconnect is None
