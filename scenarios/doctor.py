@@ -1,7 +1,8 @@
 """Looks at the machine before it flies: Python, links, off-screen OpenGL, cores, memory, disk, packages.
 
-Without OpenGL the camera draws its background itself, and only pictures for people are missing. Whether there is any
-is tried in a process of its own (`dockair.sim.opengl`); however it fails becomes one line here.
+Without OpenGL the camera's background cannot be MuJoCo's, which by default it is not, and pictures for people are
+missing. Whether there is any is tried in a process of its own (`dockair.sim.opengl`); however it fails becomes one line
+here.
 """
 
 import os
@@ -15,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from dockair.errors import MachineError
+from dockair.scenarios.light_tables import CameraOptions
 from dockair.sim.opengl import APT_PACKAGES, RENDER_SCRIPT, TIMEOUT_S, kind_of_context, try_drawing
 
 PYTHON_AT_LEAST = (3, 11)
@@ -99,11 +101,13 @@ def _rendering() -> Check:
 
 
 def _camera(rendering: Check) -> Check:
-    """Which background the camera takes by itself."""
+    """Which background the camera takes when a scenario names none, and what it could take here."""
+    default = CameraOptions.model_fields["background"].default
+    words = f'{default} background by default; camera.background = "mujoco"'
     if rendering.ok:
         renderer = rendering.found.split(" (")[0]
-        return Check("camera", True, f"MuJoCo off-screen ({_opengl().upper()}, {renderer})")
-    return Check("camera", True, f"analytic background, no OpenGL: {rendering.found}")
+        return Check("camera", True, f'{words} or "auto" draws by {_opengl().upper()}, {renderer}')
+    return Check("camera", True, f'{words} is refused here, "auto" is analytic: {rendering.found}')
 
 
 def _cores() -> Check:

@@ -22,6 +22,9 @@ from dockair.scenarios.reproduce.reference import picture_name
 ID = "sensor/contact-sheet"
 TITLE = "sixteen frames: Sun, clouds, glints, night, haze, ranges, faults"
 _FOUND_WITHIN_PX = 2.0
+_WHITE_DN = 255
+_REACH_PX = 3  # of an LED's image, to each side
+_OTHER_PX = 12  # from every LED: what is brightest there is none of them, nor its reflection in its own seat
 _REDUCTION = 4
 _GAMMA = 0.4
 _INSET_MARGIN = 1.6  # ring radii
@@ -103,17 +106,33 @@ def _figures(frame: CameraFrame, leds_px: Array, visible: NDArray[np.bool_]) -> 
     return {
         "exposure_us": 1e6 * frame.exposure_s,
         "background_dn": float(np.median(frame.pixels)),
-        "brightest_led_dn": float(max(_peak(frame.pixels, uv) for uv in leds_px)),
+        "mean_dn": float(frame.pixels.mean()),
+        "white_pixels": int((frame.pixels == _WHITE_DN).sum()),
+        "brightest_led_dn": float(max(_around(frame.pixels, uv, 2).max(initial=0) for uv in leds_px)),
+        "brightest_other_dn": float(_elsewhere(frame.pixels, leds_px).max()),
+        "led_pixels": float(np.median([_above_half(_around(frame.pixels, uv, _REACH_PX)) for uv in leds_px])),
         "leds_visible": int(visible.sum()),
         "leds_found": int(found.sum()),
         "other_blobs": int((~on_led).sum()),
     }
 
 
-def _peak(pixels: NDArray[np.uint8], uv: Array) -> int:
+def _around(pixels: NDArray[np.uint8], uv: Array, reach: int) -> NDArray[np.uint8]:
     column, row = (round(float(c)) for c in uv)
-    around = pixels[max(row - 2, 0) : row + 3, max(column - 2, 0) : column + 3]
-    return int(around.max(initial=0))
+    return pixels[max(row - reach, 0) : row + reach + 1, max(column - reach, 0) : column + reach + 1]
+
+
+def _above_half(patch: NDArray[np.uint8]) -> int:
+    """How many pixels are brighter than half the brightest: the width of an image."""
+    return int((patch > patch.max(initial=0) / 2).sum())
+
+
+def _elsewhere(pixels: NDArray[np.uint8], leds_px: Array) -> NDArray[np.uint8]:
+    """The picture, black around every LED."""
+    others = pixels.copy()
+    for uv in leds_px:
+        _around(others, uv, _OTHER_PX)[:] = 0
+    return others
 
 
 def _draw(frames: list[tuple[str, CameraFrame, Array]], path: Path) -> None:

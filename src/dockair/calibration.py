@@ -24,6 +24,7 @@ from dockair.errors import DockairError
 from dockair.messages import Window
 from dockair.rotations import Array
 
+_PRINCIPAL_POINT_OFF = 0.25  # of width and height, in a sheet; a camera made by code may count pixels from anywhere
 _INVERSE_DISTORTION_ITERATIONS = 20  # fixed point; contracts by about 0.1 a step for lenses of this class
 
 
@@ -103,8 +104,19 @@ class Camera:
 
     @classmethod
     def from_toml(cls, path: str | Path) -> Self:
-        """Read the sheet from a TOML file whose keys are the fields, all of them but those of OPTIONAL."""
-        return _from_toml(cls, path)  # type: ignore[no-any-return]
+        """Read the sheet from a TOML file whose keys are the fields, all of them but those of OPTIONAL.
+
+        Raises:
+            DockairError: a file that is no such sheet, or a principal point far off the sensor's middle: a wrong unit.
+        """
+        camera: Self = _from_toml(cls, path)
+        size = np.array([camera.width_px, camera.height_px])
+        middle, bound = 0.5 * (size - 1), _PRINCIPAL_POINT_OFF * size
+        if (np.abs(np.array(camera.principal_point_px) - middle) > bound).any():
+            (u, v), (u_end, v_end) = middle - bound, middle + bound
+            expected = f"u from {u:g} to {u_end:g} px, v from {v:g} to {v_end:g} px, around the sensor's middle"
+            raise DockairError(f"{path}: principal_point_px", expected=expected, got=camera.principal_point_px)
+        return camera
 
     @property
     def focal_length_px(self) -> float:

@@ -116,6 +116,8 @@ def test_sheet_is_read_from_toml(tmp_path):
         ("focal_length_mm = 16.0", "focal_length_mm", "a known key"),
         ('width_px = "2048"', "width_px", "from 16 to 16384 px, got '2048'"),
         ("width_px = true", "width_px", "from 16 to 16384 px, got True"),
+        ("principal_point_px = [5.629, 2.989]", "principal_point_px", "v from 271.5 to 815.5 px"),  # millimetres
+        ("principal_point_px = [1023.5, 1023.5]", "principal_point_px", "u from 511.5 to 1535.5 px, v from 271.5"),
         ("principal_point_px = [1023.5]", "principal_point_px", "2 numbers [px]"),
         ('principal_point_px = ["a", "b"]', "principal_point_px", "2 numbers [px]"),
     ],
@@ -128,6 +130,25 @@ def test_a_wrong_unit_or_type_is_refused_with_file_key_and_limits(tmp_path, line
         Camera.from_toml(file)
     assert str(error.value).startswith(f"{file}: {key}: expected ")
     assert words in str(error.value)
+
+
+def test_a_ring_in_millimetres_is_refused_with_file_key_and_limits(tmp_path):
+    file = tmp_path / "ring.toml"
+    file.write_text("diameter_m = 500\ncount = 8\n", encoding="utf-8")
+    with pytest.raises(DockairError) as error:
+        LedRing.from_toml(file)
+    assert str(error.value) == f"{file}: diameter_m: expected a number from 0.05 to 5 m, got 500"
+
+
+@pytest.mark.parametrize("off", [-0.25, 0.25])
+def test_a_sheets_principal_point_is_within_a_quarter_of_the_sensor_of_its_middle(tmp_path, off):
+    file, (u, v) = tmp_path / "camera.toml", (1023.5 + off * 2048, 543.5 + off * 1088)
+    file.write_text(SHEET.replace("[1023.5, 543.5]", f"[{u}, {v}]"), encoding="utf-8")
+    assert Camera.from_toml(file).principal_point_px == (u, v)
+    for beyond in ((u + 0.1 * off, v), (u, v + 0.1 * off)):
+        file.write_text(SHEET.replace("[1023.5, 543.5]", str(list(beyond))), encoding="utf-8")
+        with pytest.raises(DockairError, match="around the sensor's middle"):
+            Camera.from_toml(file)
 
 
 @pytest.mark.parametrize("key", ["focal_length_m", "pixel_pitch_m", "width_px", "height_px", "principal_point_px"])

@@ -9,6 +9,7 @@ import pytest
 
 from dockair.errors import MachineError
 from dockair.scenarios import doctor
+from dockair.scenarios.schema import load_scenario
 from dockair.sim.opengl import Trial, kind_of_context
 
 
@@ -23,17 +24,20 @@ def test_this_machine_is_fit_with_opengl_or_without(monkeypatch, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("trial", "camera"),
+    ("trial", "besides"),
     [
-        (Trial("llvmpipe (LLVM 15.0.6, 256 bits)"), "MuJoCo off-screen (EGL, llvmpipe)"),
-        (Trial("", "no picture through egl"), "analytic background, no OpenGL: no picture through egl"),
+        (Trial("llvmpipe (LLVM 15.0.6, 256 bits)"), '= "mujoco" or "auto" draws by EGL, llvmpipe'),
+        (Trial("", "no picture through egl"), '= "mujoco" is refused here, "auto" is analytic: no picture through egl'),
     ],
 )
-def test_the_camera_line_says_which_background_will_run(monkeypatch, tmp_path, trial, camera):
+def test_the_camera_line_says_what_runs_by_default_and_what_could(monkeypatch, tmp_path, trial, besides):
+    """The default is the scenario's, whatever this machine can draw."""
     monkeypatch.setenv("MUJOCO_GL", "egl")
     monkeypatch.setattr(doctor, "try_drawing", lambda *_: trial)
     checks = doctor.examine(tmp_path)
-    assert {check.name: check.found for check in checks}["camera"] == camera
+    flown = load_scenario("default").camera.background
+    said = {check.name: check.found for check in checks}["camera"]
+    assert said == f"{flown} background by default; camera.background {besides}"
     assert doctor.is_fit(checks)
 
 

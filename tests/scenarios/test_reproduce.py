@@ -91,3 +91,16 @@ def test_the_contact_sheet_shows_in_figures_what_its_titles_say(tmp_path):
     assert shot["LEDs 1 and 2 off, 5 dim"]["leds_found"] <= 6
     assert shot["exposure stuck at 500 µs"]["exposure_us"] == pytest.approx(500.0)
     assert shot["Sun in view"]["background_dn"] > 1.5 * shot["Sun in view, 20 nm band-pass"]["background_dn"]
+    plain, glints = shot["6 m, Sun behind"], shot["glints: Sun high behind, bare metal"]
+    assert glints["brightest_other_dn"] > 2.0 * plain["brightest_other_dn"]
+    assert glints["exposure_us"] < 0.8 * plain["exposure_us"]  # it is metered by them
+    hot = shot["2000 hot pixels"]
+    assert hot["white_pixels"] == 2000 and plain["white_pixels"] == 0
+    assert hot["exposure_us"] == pytest.approx(14.0) and hot["leds_found"] == 8
+    clean, dirty = shot["Sun in view"], shot["dirty window, Sun in view"]
+    assert dirty["mean_dn"] > 1.1 * clean["mean_dn"]  # what smudges take of the Sun comes back as veil and halo
+    assert dirty["white_pixels"] > clean["white_pixels"]
+    assert dirty["brightest_led_dn"] <= clean["brightest_led_dn"]
+    wide = shot["f/2.8, focused at 30 m"]
+    assert wide["led_pixels"] >= 2.0 * plain["led_pixels"]
+    assert wide["exposure_us"] == pytest.approx(14.0) and wide["brightest_led_dn"] == 255  # eight times the light
