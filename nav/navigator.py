@@ -230,6 +230,7 @@ class Navigator:
                 w_WB_B=w_WB_B,
                 dv_WP_B=self._felt_change(w_WB_B),
                 sigma_lateral_m=sigma_lateral_m,
+                age_s=aged_s,
             )
         )
         exposure_s, heading_rad, sigma_rad = self._heading_now()

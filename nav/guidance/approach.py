@@ -64,7 +64,8 @@ class Guidance:
         self._closure = Closure(settings.closing, *speeds, self._dt)
         self._attempts, self._has_seen = 0, False
         self._time_s = self._in_phase_s = self._steady_s = self._patient_s = 0.0
-        self._unusable_s = self._blind_s = self._doubtful_s = self._inside_s = self._pushed_in_m = 0.0
+        self._unusable_s = self._track_lost_s = self._blind_s = self._doubtful_s = 0.0
+        self._inside_s = self._pushed_in_m = 0.0
 
     def announce(self, announcement: TankerAnnouncement) -> None:
         """Take note of what the tanker is about to do."""
@@ -135,6 +136,7 @@ class Guidance:
         self._in_phase_s += self._dt
         self._has_seen = self._has_seen or state.usable
         self._unusable_s = self._unusable_s + self._dt if self._has_seen and not state.usable else 0.0
+        self._track_lost_s = max(self._unusable_s, state.age_s if self._has_seen else 0.0)
         self._blind_s = max(self._blind_s + (self._dt if self._unusable_s > 0.0 else -self._dt), 0.0)
         self._doubtful_s = 0.0 if state.contact_usable else self._doubtful_s + self._dt
         steady = (
@@ -185,6 +187,7 @@ class Guidance:
             waiting_s=self._closure.waiting_s,
             inside_s=self._inside_s,
             unusable_s=self._unusable_s,
+            track_lost_s=self._track_lost_s,
             blind_s=self._blind_s,
             doubtful_s=self._doubtful_s,
             station_m=float(np.linalg.norm(ring - [self._settings.stand_off_m, 0.0, 0.0])),

@@ -68,6 +68,7 @@ class Situation:
     waiting_s: float  #: time for which the approach has stood still for want of a good moment
     inside_s: float  #: time for which the tip has been past the ring's plane
     unusable_s: float  #: time for which the relative state has been unusable, once it has been usable
+    track_lost_s: float  #: the same, or since the newest frame that was used, whichever is longer
     blind_s: float  #: time for which it has been unusable beyond that for which it has been usable
     doubtful_s: float  #: time for which the integrity monitor has not claimed that contact may be flown
     station_m: float  #: probe's tip from the stand-off point
@@ -84,7 +85,7 @@ _Condition = Callable[[PhaseLimits, Situation], bool]
 
 
 def _lost(limits: PhaseLimits, s: Situation) -> bool:
-    return s.unusable_s > limits.lost_s and s.ahead_m < limits.lost_range_m
+    return s.track_lost_s > limits.lost_s and s.ahead_m < limits.lost_range_m
 
 
 def _doubtful(limits: PhaseLimits, s: Situation) -> bool:

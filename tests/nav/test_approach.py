@@ -285,6 +285,20 @@ def test_a_drogue_lost_on_the_way_is_not_closed_on_and_given_up_in_time():
     assert guidance.phase is Phase.CLEAR and guidance.phase_reason == "drogue lost"
 
 
+@pytest.mark.parametrize("aged", [True, False])
+def test_a_track_is_lost_half_a_second_after_its_last_frame(aged):
+    """Whether the state still counts as usable by then, or not at once."""
+    guidance, k = Guidance(SETTINGS, RATE_HZ), 0
+    for _ in range(RATE_HZ):
+        guidance.step(state([1.5, 0.0, 0.0]))
+    guidance.phase = Phase.APPROACH
+    while guidance.phase is Phase.APPROACH and k < 2 * RATE_HZ:
+        k += 1
+        guidance.step(state([1.5, 0.0, 0.0], usable=aged, age_s=k / RATE_HZ))
+    assert guidance.phase_reason == "track lost"
+    assert k / RATE_HZ == pytest.approx(SETTINGS.limits.lost_s, abs=2.1 / RATE_HZ)
+
+
 def test_a_basket_that_was_passed_on_purpose_teaches_nothing():
     guidance = Guidance(SETTINGS, RATE_HZ)
     guidance.phase = Phase.APPROACH
