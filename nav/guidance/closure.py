@@ -34,7 +34,7 @@ class Closure:
     def begin(self) -> None:
         """Stand still, for another approach or none."""
         self.speed_m_s = self.waiting_s = 0.0  #: c; for so long it has not closed
-        self.committed = self.recalled = False  #: to come in; to where it runs up again
+        self.committed = self._recalled = False
 
     def step(self, distance_m: float, closing_m_s: float, *, known: bool, miss: float, unrest: float) -> None:
         """Advance by one control tick.
@@ -48,21 +48,21 @@ class Closure:
         """
         s, closes = self._settings, self.speed_m_s > 0.0
         last = closes and distance_m <= room_to_stop_m(s, max(self.speed_m_s, closing_m_s))
-        if last and known and max(miss, unrest) <= 1.0 and not self.recalled:
+        if last and known and max(miss, unrest) <= 1.0 and not self._recalled:
             self.committed = True
         hopeful = known and miss <= s.hopeful and unrest <= (s.hopeful if closes else 1.0)
         if not self.committed and (last or (distance_m < s.recall_m and not hopeful)):
-            self.recalled = True
+            self._recalled = True
         if distance_m >= s.wait_at_m:
-            self.recalled = False
-        falls_back = self.recalled or (not closes and distance_m < s.wait_at_m)
+            self._recalled = False
+        falls_back = self._recalled or (not closes and distance_m < s.wait_at_m)
         goes = self.committed or (hopeful and not falls_back)
         self._ramp(goes, falls_back)
         self.waiting_s = self.waiting_s + self._step_s if self.speed_m_s <= 0.0 else 0.0
 
     def _ramp(self, goes: bool, falls_back: bool) -> None:
         s = self._settings
-        ramp_m_s2 = s.recall_m_s2 if self.recalled else self._ramp_m_s2
+        ramp_m_s2 = s.recall_m_s2 if self._recalled else self._ramp_m_s2
         speed = self.speed_m_s + (ramp_m_s2 if goes else -ramp_m_s2) * self._step_s
         fastest = self._full_m_s if self.committed else min(s.run_up_m_s, self._full_m_s)
         self.speed_m_s = min(max(speed, -s.retreat_m_s if falls_back else 0.0), fastest)
