@@ -136,8 +136,9 @@ class Group:
 
     @cached_property
     def causes(self) -> list[tuple[str, int]]:
-        """Causes of the attempts that failed, the most frequent first."""
-        return Counter(a["cause"] or "not said" for a in self.attempts if a["outcome"] != "contact").most_common()
+        """Causes of the attempts that failed, a contact outside the limits among them; the most frequent first."""
+        failed = [a["cause"] for a in self.attempts if a["cause"] or a["outcome"] != "contact"]
+        return Counter(cause or "not said" for cause in failed).most_common()
 
     @cached_property
     def by_range(self) -> list[dict[str, float]]:

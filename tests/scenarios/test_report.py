@@ -146,6 +146,12 @@ def test_evidence_is_plain_json_with_counts_of_every_group():
     assert truth["shortfalls"] is None
 
 
+def test_a_contact_outside_the_limits_has_its_cause_in_the_table():
+    wide = _row(1, attempts=[_attempt(1, "contact", 0.2, "control_limit")])
+    (camera,) = evidence_of([_campaign([_row(0), wide])])["groups"]
+    assert camera["causes_of_failed_attempts"] == {"control_limit": 1}
+
+
 def test_a_flight_in_two_campaigns_is_refused(tmp_path):
     folders = []
     for name in ("a", "b"):
