@@ -91,7 +91,7 @@ class Guidance:
         limit = np.array(self._settings.acceleration_limit_m_s2)
         change = self._dt * np.array(self._settings.jerk_limit_m_s3)
         if self._is_patient:
-            limit[1:], change[1:] = self._settings.patient_share * limit[1:], self._settings.patient_share * change[1:]
+            limit[1:], change[1:] = limit[1:] * self._settings.patient_share, change[1:] * self._settings.patient_share
         u_dot = np.clip(np.clip(u_dot, -limit, limit), self._u_dot - change, self._u_dot + change)
         self._u_dot = u_dot
         self._u = _limited(self._u + u_dot * self._dt, self._settings.velocity_limit_m_s)

@@ -1,21 +1,28 @@
 """Where the drogue will be in a moment: its swing, estimated on the receiver's own scale (`own_path`).
 
 With y_r the receiver's place by its commands and what it felt besides, y_D = p + y_r is the drogue's place on a scale
-that drifts steadily with the bias of the receiver's inertial velocity. Each axis of y_D is modelled as drift plus a
-swing that coloured gusts g and the receiver's bow wave b drive:
+that drifts steadily with the bias of the receiver's inertial velocity. Each axis of y_D is modelled as drift plus the
+modes i of a hose with a drogue on its end, a swing and two overtones, that coloured gusts g drive, each by its share
+q_i, and noise of their own; the receiver's bow wave b pushes the swing:
 
-    m' = d,   d' = noise;     s'' = -omega^2 s - 2 zeta omega s' + g + b;     g' = -g/T + noise           (1)
-    y_D = m + s
+    m' = d,   d' = noise;     s_i'' = -omega_i^2 s_i - 2 zeta_i omega_i s_i' + q_i g + b + noise
+    g' = -g/T + noise;        y_D = m + sum_i s_i                                                         (1)
 
-A Kalman filter follows (m, d, s, s', g) from p and its rate, which is late where the drogue accelerates, since nobody
-measures that: seen is y_D' - tau_v y_D''. Its gains, which depend on nothing that is seen, are worked out beforehand
-until they stay the same. Its prediction over the response time is what a command given now can
+What a gust gives the drogue the hose takes back when the wave from the pod has come down, half a second later: that is
+the overtones' part. The gust reaches the receiver, too, and its tip is felt to change its velocity by df; with it, up,
+the modes'
+
+    s_i' <- s_i' + c_i df                                                                                 (2)
+
+A Kalman filter follows (m, d, s_i, s_i', g) from p and its rate, which is late where the drogue accelerates, since
+nobody measures that: seen is y_D' - tau_v y_D''. Its gains, which depend on nothing that is seen, are worked out
+beforehand until they stay the same. Its prediction over the response time is what a command given now can
 still meet.
 
-Not modelled: coupling of the axes, another frequency for another length of hose or airspeed. Over a response time of
-a quarter second neither matters: the frequency may be off by a third.
+Not modelled: coupling of the axes, other frequencies for another length of hose or airspeed, how a gust that is felt
+goes on.
 Settings: fitted to the simulated drogue (15 m of hose, 20 kg) at 180 m/s in moderate gusts, as one would to a record of
-flight; the peers' hoses and research on hose-drogue dynamics give 0.2-0.5 Hz.
+flight; the peers' hoses and research on hose-drogue dynamics give 0.2-0.5 Hz for the swing.
 """
 
 from dataclasses import dataclass
@@ -27,18 +34,46 @@ from scipy.linalg import expm, solve_continuous_lyapunov, solve_discrete_are
 
 from dockair.rotations import Array
 
-_STATES, _GUST_INPUT = 5, 3
-_PLACE, _RATE = np.array([1.0, 0.0, 1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0, 1.0, 0.0])
+_FIRST = 2  # of the states: m and d, then place and rate of each mode, then g
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HoseMode:
+    """A mode of the hose; (3,) values are forward, left, up."""
+
+    frequency_hz: tuple[float, float, float]
+    damping: tuple[float, float, float]
+    gust_density: tuple[float, float, float]  # q_i, of a g' of one [m/s^3/sqrt(Hz)]; below zero: against the swing
+    felt_share: tuple[float, float, float] = (0.0, 0.0, 0.0)  # c_i
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SwingSettings:
     """Model of the drogue's motion; (3,) values are forward, left, up."""
 
-    frequency_hz: tuple[float, float, float] = (0.44, 0.31, 0.45)
-    damping: tuple[float, float, float] = (0.5, 0.05, 0.12)
-    gust_time_s: tuple[float, float, float] = (1.2, 0.7, 1.2)  # T
-    gust_density: tuple[float, float, float] = (0.7, 3.0, 7.0)  # of g' [m/s^3/sqrt(Hz)]
+    modes: tuple[HoseMode, ...] = (
+        HoseMode(
+            frequency_hz=(0.44, 0.345, 0.433),
+            damping=(0.5, 0.073, 0.177),
+            gust_density=(0.7, 1.49, 4.09),
+            felt_share=(0.0, 0.0, -0.52),
+        ),
+        HoseMode(
+            frequency_hz=(0.9, 0.869, 0.865),
+            damping=(0.5, 0.03, 0.074),
+            gust_density=(0.0, -0.4, 1.76),
+            felt_share=(0.0, 0.0, -0.83),
+        ),
+        HoseMode(
+            frequency_hz=(1.5, 1.486, 1.437),
+            damping=(0.5, 0.03, 0.051),
+            gust_density=(0.0, 0.11, -1.38),
+            felt_share=(0.0, 0.0, 0.87),
+        ),
+    )
+    gust_time_s: tuple[float, float, float] = (1.2, 2.8, 0.7)  # T
+    #: Of every s_i'': what drives a mode by itself [m/s^2/sqrt(Hz)]. Forward there is the reel, and no mode.
+    rattle_density: tuple[float, float, float] = (0.0, 0.035, 0.035)
     drift_sigma_m_s: float = 0.4  # of d at the start: the inertial velocity's bias, twice its 0.2 m/s
     learning_s: float = 12.0  # after which the gains stay the same: drift and swing are told apart within a few periods
     drift_density: float = 0.03  # of d' [m/s^2/sqrt(Hz)]: the inertial velocity's drift, gusts far below the swing
@@ -61,7 +96,9 @@ class DrogueMotion:
 
     def __init__(self, settings: SwingSettings, step_s: float, lead_s: Array, node_s: float) -> None:
         self._lead_s = np.asarray(lead_s)
-        self._omega_rad_s = 2.0 * np.pi * np.array(settings.frequency_hz)
+        self._omega_rad_s = 2.0 * np.pi * np.array([mode.frequency_hz for mode in settings.modes])  # (modes, 3)
+        self._felt_share = np.array([mode.felt_share for mode in settings.modes])
+        self._states = _FIRST + 2 * len(settings.modes) + 1
         self._A = np.stack([_dynamics(settings, axis) for axis in range(3)])
         self._F = np.stack([expm(A * step_s) for A in self._A])
         self._lead = np.stack([expm(A * lead) for A, lead in zip(self._A, self._lead_s, strict=True)])
@@ -73,30 +110,32 @@ class DrogueMotion:
         self._F_node = np.stack([expm(A * node_s) for A in self._A])
         self._pushed_node = np.stack([_held(A, node_s) for A in self._A])
         self._node_s = node_s
-        self._x: Array = np.zeros((3, _STATES))
+        self._x: Array = np.zeros((3, self._states))
 
     def start(self, place_m: Array, velocity_m_s: Array) -> None:
         """Begin anew, at rest but for the swing; (3,) each."""
-        self._x, self._ticks = np.zeros((3, _STATES)), 0
-        self._x[:, 0], self._x[:, 3] = place_m, velocity_m_s
+        self._x, self._ticks = np.zeros((3, self._states)), 0
+        self._x[:, 0], self._x[:, _FIRST + 1] = place_m, velocity_m_s
 
     def resume(self, place_m: Array) -> None:
         """Begin anew at a place (3,) where it comes into view again, whatever the swing; the drift stays as learnt."""
-        self._x[:, 0], self._x[:, 2:], self._ticks = place_m, 0.0, 0
+        self._x[:, 0], self._x[:, _FIRST:], self._ticks = place_m, 0.0, 0
 
-    def step(self, place_m: Array | None, velocity_m_s: Array | None, push_m_s2: Array) -> None:
+    def step(self, place_m: Array | None, velocity_m_s: Array | None, push_m_s2: Array, felt_m_s: Array) -> None:
         """Advance by one control period.
 
         Args:
             place_m: (3,) on the receiver's scale, None if not seen.
             velocity_m_s: (3,) likewise.
             push_m_s2: (3,) b.
+            felt_m_s: (3,) df over the period.
         """
         seen = place_m is not None and velocity_m_s is not None
         gains = self._K[min(self._ticks, len(self._K) - 1)]
         if place_m is None or velocity_m_s is None:
             place_m = velocity_m_s = push_m_s2  # of the right shape, and not looked at
         rate = self._seen_rate, self._rate_lag_s
+        self._x[:, _FIRST + 1 : -1 : 2] += (self._felt_share * felt_m_s).T
         _advance(self._x, self._F, self._pushed, push_m_s2, gains, *rate, seen, place_m, velocity_m_s)
         self._ticks += seen
 
@@ -112,8 +151,12 @@ class DrogueMotion:
 
     @property
     def swing_m_s2(self) -> Array:
-        """(3,) acceleration at the ends of the swing of now, omega hypot(omega s, s'), if no gust drove it on."""
-        return np.asarray(self._omega_rad_s * np.hypot(self._omega_rad_s * self._x[:, 2], self._x[:, 3]))
+        """(3,) acceleration at the ends of the swing of now, omega hypot(omega s, s'), if no gust drove it on.
+
+        Of the modes, the root of the sum of squares.
+        """
+        omega, s, rate = self._omega_rad_s, self._x[:, _FIRST:-1:2].T, self._x[:, _FIRST + 1 : -1 : 2].T
+        return np.asarray(np.linalg.norm(omega * np.hypot(omega * s, rate), axis=0))
 
     def ahead(self, push_m_s2: Array, push_then_m_s2: Array) -> tuple[Array, Array, Array]:
         """(3,) place [m], velocity [m/s] and acceleration [m/s^2] after the lead time.
@@ -149,8 +192,17 @@ class DrogueMotion:
 
 
 @njit(cache=True)
+def _at(x, first):  # type: ignore[no-untyped-def]
+    """Place (first = 0) or rate (1) of a state (n,): m + s_1 + s_2 + ... or its derivative."""
+    total = 0.0
+    for j in range(first, len(x) - 1, 2):
+        total += x[j]
+    return total
+
+
+@njit(cache=True)
 def _advance(x, F, pushed, push, K, seen_rate, lag_s, seen, place, velocity):  # type: ignore[no-untyped-def]
-    """A step of the filter in place: x (3, 5), F (3, 5, 5), pushed (3, 5), K (3, 5, 2), seen_rate (3, 5)."""
+    """A step of the filter in place: x (3, n), F (3, n, n), pushed (3, n), K (3, n, 2), seen_rate (3, n)."""
     n = x.shape[1]
     later = np.empty(n)
     for axis in range(3):
@@ -160,7 +212,7 @@ def _advance(x, F, pushed, push, K, seen_rate, lag_s, seen, place, velocity):  #
                 later[i] += F[axis, i, j] * x[axis, j]
         off, off_rate = 0.0, 0.0
         if seen:
-            off, off_rate = place[axis] - later[0] - later[2], velocity[axis] + lag_s * push[axis]
+            off, off_rate = place[axis] - _at(later, 0), velocity[axis] + lag_s * push[axis]
             for j in range(n):
                 off_rate -= seen_rate[axis, j] * later[j]
         for i in range(n):
@@ -178,11 +230,12 @@ def _predict(x, lead, A, lead_s, push, push_then, out):  # type: ignore[no-untyp
             for j in range(n):
                 later[i] += lead[axis, i, j] * x[axis, j]
         tau, now, then = lead_s[axis], push[axis], push_then[axis]
-        out[0, axis] = later[0] + later[2] + tau * tau * (now / 3.0 + then / 6.0)
-        out[1, axis] = later[1] + later[3] + 0.5 * tau * (now + then)
+        out[0, axis] = _at(later, 0) + tau * tau * (now / 3.0 + then / 6.0)
+        out[1, axis] = _at(later, 1) + 0.5 * tau * (now + then)
         out[2, axis] = then
-        for j in range(n):
-            out[2, axis] += (A[axis, 1, j] + A[axis, 3, j]) * later[j]
+        for i in range(1, n - 1, 2):
+            for j in range(n):
+                out[2, axis] += A[axis, i, j] * later[j]
 
 
 @njit(cache=True)
@@ -196,8 +249,8 @@ def _go_on(x, lead, lead_s, F, pushed, push, out):  # type: ignore[no-untyped-de
             for j in range(n):
                 state[i] += lead[axis, i, j] * x[axis, j]
         tau, now, then = lead_s[axis], push[0, axis], push[1, axis]
-        state[2] += tau * tau * (now / 3.0 + then / 6.0)
-        state[3] += 0.5 * tau * (now + then)
+        state[_FIRST] += tau * tau * (now / 3.0 + then / 6.0)
+        state[_FIRST + 1] += 0.5 * tau * (now + then)
         for k in range(len(out)):
             b = 0.5 * (push[k + 1, axis] + push[k + 2, axis])
             for i in range(n):
@@ -205,43 +258,62 @@ def _go_on(x, lead, lead_s, F, pushed, push, out):  # type: ignore[no-untyped-de
                 for j in range(n):
                     later[i] += F[axis, i, j] * state[j]
             state[:] = later
-            out[k, axis] = state[0] + state[2]
+            out[k, axis] = _at(state, 0)
 
 
 def _dynamics(settings: SwingSettings, axis: int) -> Array:
-    """(5, 5) A of Eq. (1), b apart."""
-    omega = 2.0 * np.pi * settings.frequency_hz[axis]
-    A = np.zeros((_STATES, _STATES))
-    A[0, 1] = A[2, 3] = A[_GUST_INPUT, 4] = 1.0
-    A[3, 2:4] = -(omega**2), -2.0 * settings.damping[axis] * omega
-    A[4, 4] = -1.0 / settings.gust_time_s[axis]
+    """(n, n) A of Eq. (1), b apart."""
+    n = _FIRST + 2 * len(settings.modes) + 1
+    A = np.zeros((n, n))
+    A[0, 1] = 1.0
+    for i, mode in enumerate(settings.modes):
+        omega, s = 2.0 * np.pi * mode.frequency_hz[axis], _FIRST + 2 * i
+        A[s, s + 1] = 1.0
+        A[s + 1, s : s + 2] = -(omega**2), -2.0 * mode.damping[axis] * omega
+        A[s + 1, -1] = mode.gust_density[axis]
+    A[-1, -1] = -1.0 / settings.gust_time_s[axis]
     return A
 
 
+def _drive(settings: SwingSettings, axis: int) -> Array:
+    """(n, n) densities, squared, of what drives Eq. (1); that of g' is one."""
+    densities = np.zeros(_FIRST + 2 * len(settings.modes) + 1)
+    densities[1], densities[_FIRST + 1 : -1 : 2] = settings.drift_density, settings.rattle_density[axis]
+    densities[-1] = 1.0
+    return np.diag(densities**2)
+
+
+def _place_row(states: int) -> Array:
+    """(n,) what is seen of the place."""
+    return np.append((np.arange(states - 1) % 2 == 0).astype(float), 0.0)
+
+
 def _rate_row(settings: SwingSettings, A: Array) -> Array:
-    """(5,) what is seen of the rate, b apart: late by tau_v."""
-    return np.asarray(_RATE - settings.rate_lag_s * (_RATE @ A))
+    """(n,) what is seen of the rate, b apart: late by tau_v."""
+    rate = np.append((np.arange(len(A) - 1) % 2 == 1).astype(float), 0.0)
+    return np.asarray(rate - settings.rate_lag_s * (rate @ A))
 
 
 def _held(A: Array, step_s: float) -> Array:
-    """(5,) what an acceleration of one, held for a step, adds to the state."""
-    augmented = np.zeros((_STATES + 1, _STATES + 1))
-    augmented[:_STATES, :_STATES], augmented[_GUST_INPUT, _STATES] = A, 1.0
-    return np.asarray(expm(augmented * step_s)[:_STATES, _STATES])
+    """(n,) what an acceleration of the swing of one, held for a step, adds to the state."""
+    n = len(A)
+    augmented = np.zeros((n + 1, n + 1))
+    augmented[:n, :n], augmented[_FIRST + 1, n] = A, 1.0
+    return np.asarray(expm(augmented * step_s)[:n, n])
 
 
 @lru_cache(maxsize=12)
 def _gains(settings: SwingSettings, axis: int, step_s: float) -> Array:
-    """(n, 5, 2) gains of the Kalman filter tick by tick, the last for good; the step's noise by Van Loan's matrix."""
-    A = _dynamics(settings, axis)
-    H = np.stack([_PLACE, _rate_row(settings, A)])
-    drive = np.diag([0.0, settings.drift_density**2, 0.0, 0.0, settings.gust_density[axis] ** 2])
+    """(ticks, n, 2) gains of the Kalman filter tick by tick, the last for good; the step's noise by Van Loan's."""
+    A, drive = _dynamics(settings, axis), _drive(settings, axis)
+    n = len(A)
+    H = np.stack([_place_row(n), _rate_row(settings, A)])
     loan = expm(np.block([[-A, drive], [np.zeros_like(A), A.T]]) * step_s)
-    F = loan[_STATES:, _STATES:].T
-    Q, R = F @ loan[:_STATES, _STATES:], np.diag([settings.position_sigma_m[axis], settings.rate_sigma_m_s[axis]]) ** 2
-    P, gains = np.zeros((_STATES, _STATES)), []
-    P[2:, 2:] = solve_continuous_lyapunov(A[2:, 2:], -drive[2:, 2:])  # any moment of the swing
-    P[0, 0], P[1, 1] = P[2, 2], settings.drift_sigma_m_s**2
+    F = loan[n:, n:].T
+    Q, R = F @ loan[:n, n:], np.diag([settings.position_sigma_m[axis], settings.rate_sigma_m_s[axis]]) ** 2
+    P, gains = np.zeros((n, n)), []
+    P[_FIRST:, _FIRST:] = solve_continuous_lyapunov(A[_FIRST:, _FIRST:], -drive[_FIRST:, _FIRST:])  # any moment
+    P[0, 0], P[1, 1] = P[_FIRST, _FIRST], settings.drift_sigma_m_s**2
     for _ in range(round(settings.learning_s / step_s)):
         gains.append(P @ H.T @ np.linalg.inv(H @ P @ H.T + R))
         P = F @ (P - gains[-1] @ H @ P) @ F.T + Q

@@ -49,6 +49,7 @@ class OwnPath:
         self._places, self._velocities = np.zeros((self._length, 3)), np.zeros((self._length, 3))  # rings
         self._before: Array = np.zeros(3)  # v_k-1
         self._felt: Array = np.zeros(3)  # f
+        self.felt_change_m_s: Array = np.zeros(3)  #: (3,) of the tip's velocity, besides its commands; 0 where not felt
         self._straying: Array = np.zeros(3)  # e
         self._strayed: Array = np.zeros(3)  # its integral
 
@@ -58,10 +59,12 @@ class OwnPath:
         self._before = v
         if np.isfinite(change_m_s).all():
             self._felt = self._kept * (felt + change_m_s - change)
-            straying = self._kept * (self._straying + self._felt - felt)
+            self.felt_change_m_s = self._felt - felt
+            straying = self._kept * (self._straying + self.felt_change_m_s)
             self._straying = np.clip(straying, -self._limit_m_s, self._limit_m_s)
         else:
             self._felt, self._straying = np.zeros(3), self._dies * self._straying
+            self.felt_change_m_s = np.zeros(3)
         self._strayed = self._strayed + self._straying * self._step_s
 
     def step(self, velocity_m_s: Array) -> None:

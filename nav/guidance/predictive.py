@@ -45,7 +45,7 @@ class Predictive:
         acceleration_limit_m_s2: (3,) that the receiver may fly.
         jerk_limit_m_s3: (3,) likewise.
         step_s: control period.
-        patient_share: of both limits, what is used across where patience is wanted.
+        patient_share: left and up, of both limits, what is used where patience is wanted.
     """
 
     def __init__(
@@ -55,7 +55,7 @@ class Predictive:
         acceleration_limit_m_s2: Array,
         jerk_limit_m_s3: Array,
         step_s: float,
-        patient_share: float,
+        patient_share: tuple[float, float],
     ) -> None:
         self._settings, self._step_s, self._unseen_s = settings, step_s, float("inf")
         plan = settings.plan
@@ -64,8 +64,11 @@ class Predictive:
         )
         self._motion = DrogueMotion(settings.swing, step_s, response_s, plan.node_s)
         self._plans, self._patient_plans = (
-            [PathPlan(plan, share * acceleration_limit_m_s2[i], share * jerk_limit_m_s3[i]) for i in _ACROSS]
-            for share in (1.0, patient_share)
+            [
+                PathPlan(plan, k * acceleration_limit_m_s2[i], k * jerk_limit_m_s3[i])
+                for i, k in zip(_ACROSS, share, strict=True)
+            ]
+            for share in ((1.0, 1.0), patient_share)
         )
         self._response_s = float(response_s[_ACROSS[0]])
         nodes = self._response_s + plan.node_s * np.arange(plan.nodes + 1)
@@ -75,7 +78,7 @@ class Predictive:
         self._path: Array = np.zeros((plan.nodes, 3))
         self._u_dot: Array = np.zeros(3)
         self._calm = np.array(settings.calm_share) * acceleration_limit_m_s2[1:]
-        self._bearable = (settings.bearable_share * acceleration_limit_m_s2[1:]) ** 2
+        self._bearable = (np.array(settings.bearable_share) * acceleration_limit_m_s2[1:]) ** 2
         self._asked = _AT_FIRST * self._bearable  # mean square of the drogue's acceleration, left and up
         self._gusts: Array = np.zeros(2)  # the same over some swings more, beginning at nothing ...
         self._gusts_seen = 0.0  # ... so that this share of it has been seen
@@ -93,7 +96,7 @@ class Predictive:
         if sight is None:
             self._unseen_s += self._step_s
             push: Array = np.zeros((len(self._times), 3))
-            self._motion.step(None, None, push[0])
+            self._motion.step(None, None, push[0], self._own.felt_change_m_s)
         else:
             push = sight.push_m_s2
             place, velocity = sight.place_m + self._own.place_m, sight.rate_m_s + self._own.velocity_m_s
@@ -102,7 +105,7 @@ class Predictive:
             elif self._unseen_s > self._settings.unseen_s:
                 self._motion.resume(place)
             self._unseen_s = 0.0
-            self._motion.step(place, velocity, push[0])
+            self._motion.step(place, velocity, push[0], self._own.felt_change_m_s)
         self._ahead = self._motion.ahead(push[0], push[1])
         self._path = self._motion.path(push)
         if sight is not None:

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from dockair.nav.guidance.drogue_motion import DrogueMotion, SwingSettings
+from dockair.nav.guidance.drogue_motion import DrogueMotion, HoseMode, SwingSettings
 from dockair.nav.guidance.path_plan import PathPlan, PlanSettings
 from dockair.rotations import Array
 from dockair.scenarios.reproduce.reference import picture_name
@@ -30,9 +30,16 @@ _PLACE_SIGMA_M, _RATE_SIGMA_M_S = 0.005, 0.025  # of what the camera's fusion te
 _SIZE_IN, _DPI = (7.0, 4.6), 110
 
 
-#: A drogue in moderate gusts as fitted to records of its place; what flies follows more closely.
-_SWING = SwingSettings(
-    gust_density=(0.7, 1.3, 3.0), position_sigma_m=(0.02,) * 3, rate_sigma_m_s=(0.05, 0.10, 0.10), rate_lag_s=0.032
+#: A drogue in moderate gusts as fitted to records of its place, by its swing alone; what flies knows overtones, too.
+SWING = HoseMode(frequency_hz=(0.44, 0.31, 0.45), damping=(0.5, 0.05, 0.12), gust_density=(0.7, 1.3, 3.0))
+GUST_TIME_S = (1.2, 0.7, 1.2)
+_SETTINGS = SwingSettings(
+    modes=(SWING,),
+    gust_time_s=GUST_TIME_S,
+    rattle_density=(0.0,) * 3,
+    position_sigma_m=(0.02,) * 3,
+    rate_sigma_m_s=(0.05, 0.10, 0.10),
+    rate_lag_s=0.032,
 )
 
 
@@ -65,11 +72,11 @@ def reproduce(out: Path | None) -> dict[str, Any]:
 def missed(way: Way, seed: int) -> Array:
     """(n,) misses at the contacts of one flight [m]."""
     rng = np.random.default_rng(seed)
-    places, rates = drogue(rng, _SWING)
+    places, rates = drogue(rng)
     seen = places + _PLACE_SIGMA_M * rng.standard_normal(places.shape)
     seen_rates = rates + _RATE_SIGMA_M_S * rng.standard_normal(places.shape)
     plan = PlanSettings(half_way_s=0.0)  # the moment is all that is asked for here
-    motion = DrogueMotion(_SWING, _STEP_S, _RESPONSE_S, plan.node_s)
+    motion = DrogueMotion(_SETTINGS, _STEP_S, _RESPONSE_S, plan.node_s)
     motion.start(seen[0], seen_rates[0])
     plans = [PathPlan(plan, a, j) for a, j in zip(way.acceleration_m_s2, way.jerk_m_s3, strict=True)]
     contacts_s = np.arange(_FIRST_S, _FLIGHT_S, _EVERY_S)
@@ -80,7 +87,7 @@ def missed(way: Way, seed: int) -> Array:
         next_s = float(to_go_s[to_go_s > -0.5 * _STEP_S].min(initial=np.inf))
         if abs(next_s) < 0.5 * _STEP_S:
             found.append(float(np.hypot(*(places[i + round(_RESPONSE_S[1] / _STEP_S), 1:] - tip[:, 0]))))
-        motion.step(seen[i], seen_rates[i], np.zeros(3))
+        motion.step(seen[i], seen_rates[i], np.zeros(3), np.zeros(3))
         path = motion.path(np.zeros((plan.nodes + 2, 3)))
         to_contact_s = next_s if way.meets and next_s < _COMMITTED_S else None
         for row, (axis, planned) in enumerate(zip(_ACROSS, plans, strict=True)):
@@ -93,11 +100,11 @@ def missed(way: Way, seed: int) -> Array:
     return np.array(found)
 
 
-def drogue(rng: np.random.Generator, settings: SwingSettings) -> tuple[Array, Array]:
+def drogue(rng: np.random.Generator) -> tuple[Array, Array]:
     """(n, 3) places and rates of the swing, control tick by control tick, from rest."""
     dt, count = _STEP_S / _FINE, round(_FLIGHT_S / _STEP_S)
-    omega, damping = 2.0 * np.pi * np.array(settings.frequency_hz), np.array(settings.damping)
-    memory, density = np.array(settings.gust_time_s), np.array(settings.gust_density)
+    omega, damping = 2.0 * np.pi * np.array(SWING.frequency_hz), np.array(SWING.damping)
+    memory, density = np.array(GUST_TIME_S), np.array(SWING.gust_density)
     noise = density * np.sqrt(dt) * rng.standard_normal((count * _FINE, 3))
     s, v, g = np.zeros(3), np.zeros(3), np.zeros(3)
     places, rates = np.empty((count, 3)), np.empty((count, 3))

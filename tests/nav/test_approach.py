@@ -181,10 +181,10 @@ def test_what_comes_before_an_approach_is_flown_with_a_share_of_the_limits():
     now = plant.step(ReceiverCommand())
     for _ in range(40 * RATE_HZ):
         command = guidance.step(now)
-        used.setdefault(guidance.phase, []).append(np.abs(command.acceleration_m_s2[1:]).max())
+        used.setdefault(guidance.phase, []).append(np.abs(command.acceleration_m_s2[1:]))
         now = plant.step(command)
-    limit = max(SETTINGS.acceleration_limit_m_s2[1:])
-    assert 0.9 < max(used[Phase.PRE_CONTACT]) / (SETTINGS.patient_share * limit) < 1.0 + 1e-9
+    limits = np.array(SETTINGS.acceleration_limit_m_s2[1:]) * SETTINGS.patient_share
+    assert 0.9 < (np.array(used[Phase.PRE_CONTACT]) / limits).max() < 1.0 + 1e-9
 
 
 def test_past_the_ring_the_drogue_is_followed_no_longer_than_the_way_to_the_coupling_takes():
@@ -230,7 +230,7 @@ def test_a_push_that_nobody_foresaw_is_met_better_at_each_attempt():
 
 def test_before_it_is_committed_it_uses_a_share_of_the_limits_across():
     """However near: with all of them a receiver in gusts was thrown aside."""
-    limit = SETTINGS.patient_share * SETTINGS.acceleration_limit_m_s2[1]
+    limit = SETTINGS.patient_share[0] * SETTINGS.acceleration_limit_m_s2[1]
     for ahead_m in (2.0, 0.8):
         most = np.abs(_accelerations_to_the_left([ahead_m, 0.4, 0.0])).max()
         assert 0.8 * limit < most <= limit + 1e-9
@@ -254,17 +254,18 @@ def test_a_drogue_that_slips_off_before_all_is_taken_in_is_tried_again():
 
 @pytest.mark.parametrize(("ahead_m", "left_m", "away"), [(0.5, 0.35, True), (0.5, 0.1, False), (0.8, 0.35, False)])
 def test_who_is_called_back_too_late_passes_beside_a_basket_that_would_be_met_from_outside(ahead_m, left_m, away):
-    at_last = _accelerations_to_the_left([ahead_m, left_m, 0.0])[-1]
-    assert at_last < -0.5 if away else at_last > 0.5
+    """By what it has gained to the left within 2 s: a drogue that hops to its place excites the hose's modes at first."""
+    gained_m_s = _accelerations_to_the_left([ahead_m, left_m, 0.0], seconds=2).sum() / RATE_HZ
+    assert gained_m_s < -0.3 if away else gained_m_s > 0.3
 
 
-def _accelerations_to_the_left(p_PD_B):
-    """Commanded for a second in an approach that is called back; until then the drogue stood right ahead."""
+def _accelerations_to_the_left(p_PD_B, seconds=1):
+    """Commanded in an approach that is called back; until then the drogue stood right ahead."""
     guidance, out = Guidance(SETTINGS, RATE_HZ), []
     for _ in range(RATE_HZ):
         guidance.step(state([4.0, 0.0, 0.0]))
     guidance.phase = Phase.APPROACH
-    for _ in range(RATE_HZ):
+    for _ in range(seconds * RATE_HZ):
         out.append(guidance.step(state(p_PD_B)).acceleration_m_s2[1])
     assert guidance.phase is Phase.APPROACH and not guidance._closure.committed
     return np.array(out)
@@ -458,7 +459,8 @@ def test_a_belief_that_a_blow_unsettles_does_not_end_an_entry_inside_the_rim():
 def test_until_committed_a_share_of_the_limits_across_is_enough():
     """The drogue hops aside by 1.5 m while the receiver runs up."""
     plant, guidance, most = Plant(), Guidance(SETTINGS, RATE_HZ), 0.0
-    limits, now = np.array(SETTINGS.acceleration_limit_m_s2)[1:], plant.step(ReceiverCommand())
+    limits = np.array(SETTINGS.acceleration_limit_m_s2)[1:] * SETTINGS.patient_share
+    now = plant.step(ReceiverCommand())
     while plant.t < 10.0:
         command = guidance.step(now)
         if guidance.phase is Phase.APPROACH:
@@ -467,7 +469,7 @@ def test_until_committed_a_share_of_the_limits_across_is_enough():
             if guidance._closure.speed_m_s > 0.5:
                 plant.drogue = lambda _: np.array([0.0, 1.5, 0.0])
         now = plant.step(command)
-    assert 0.9 * SETTINGS.patient_share < most < SETTINGS.patient_share + 1e-9
+    assert 0.9 < most < 1.0 + 1e-9
 
 
 def test_a_drogue_that_is_not_seen_is_not_waited_for_beside_it():

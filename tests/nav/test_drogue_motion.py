@@ -6,10 +6,15 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from dockair.nav.guidance.drogue_motion import DrogueMotion, SwingSettings, _dynamics
+from dockair.nav.guidance.drogue_motion import DrogueMotion, HoseMode, SwingSettings, _dynamics
 
 STEP_S, LEAD_S = 0.01, np.array([0.4, 0.17, 0.14])
-CALM = np.zeros(3)
+CALM = STILL = np.zeros(3)
+SWING = SwingSettings(  # alone, and hardly driven: what is seen of it is followed by its own equation
+    modes=(HoseMode(frequency_hz=(0.44, 0.31, 0.45), damping=(0.5, 0.05, 0.12), gust_density=(0.7, 3.0, 7.0)),),
+    gust_time_s=(1.2, 0.7, 1.2),
+    rattle_density=(0.0,) * 3,
+)
 
 
 def follow(path, rate, seconds):
@@ -17,19 +22,22 @@ def follow(path, rate, seconds):
     motion = DrogueMotion(SwingSettings(), STEP_S, LEAD_S, 0.1)
     motion.start(path(0.0), rate(0.0))
     for k in range(1, round(seconds / STEP_S) + 1):
-        motion.step(path(k * STEP_S), rate(k * STEP_S), CALM)
+        motion.step(path(k * STEP_S), rate(k * STEP_S), CALM, STILL)
     return seconds, motion
 
 
-def test_a_known_swing_is_continued_by_its_closed_form():
-    """s = 0.1 exp(-zeta omega t) cos(omega_d t), the free response of Eq. (1), with its first two derivatives."""
+def test_known_modes_are_continued_by_their_closed_form():
+    """s = 0.1 exp(-zeta omega t) cos(omega_d t) of each, the free response of Eq. (1), with its first derivatives."""
     settings, t = SwingSettings(), 0.7
-    omega, zeta = 2.0 * np.pi * np.array(settings.frequency_hz), np.array(settings.damping)
+    omega = 2.0 * np.pi * np.array([mode.frequency_hz for mode in settings.modes])
+    zeta = np.array([mode.damping for mode in settings.modes])
     pole = -zeta * omega + 1j * omega * np.sqrt(1.0 - zeta**2)
     motion = DrogueMotion(settings, STEP_S, LEAD_S, 0.1)
-    motion._x[:, 2], motion._x[:, 3] = ((0.1 * pole**n * np.exp(pole * t)).real for n in (0, 1))
+    for n in (0, 1):
+        motion._x[:, 2 + n : -1 : 2] = (0.1 * pole**n * np.exp(pole * t)).real.T
     for n, predicted in enumerate(motion.ahead(CALM, CALM)):
-        np.testing.assert_allclose(predicted, (0.1 * pole**n * np.exp(pole * (t + LEAD_S))).real, atol=1e-12)
+        expected = (0.1 * pole**n * np.exp(pole * (t + LEAD_S))).real.sum(axis=0)
+        np.testing.assert_allclose(predicted, expected, atol=1e-11)
 
 
 def test_a_steady_drift_is_predicted_without_error_and_told_from_the_swing():
@@ -42,7 +50,7 @@ def test_a_steady_drift_is_predicted_without_error_and_told_from_the_swing():
 
 
 def test_the_middle_of_a_swing_is_where_it_swings_about():
-    omega, middle = 2.0 * np.pi * np.array(SwingSettings().frequency_hz), np.array([5.0, 1.0, -2.0])
+    omega, middle = 2.0 * np.pi * np.array(SwingSettings().modes[0].frequency_hz), np.array([5.0, 1.0, -2.0])
     _, motion = follow(lambda t: middle + 0.3 * np.sin(omega * t), lambda t: 0.3 * omega * np.cos(omega * t), 40.0)
     place, velocity, acceleration = motion.mean_ahead()
     np.testing.assert_allclose(place, middle, atol=0.2)  # of 0.3 m either way, drift and swing being hard to tell apart
@@ -63,8 +71,8 @@ def test_a_steady_push_bends_the_swing_by_its_own_stiffness():
     motion = DrogueMotion(SwingSettings(), STEP_S, LEAD_S, 0.1)
     push = np.array([0.0, 0.5, -0.3])
     for _ in range(12_000):
-        motion.step(None, None, push)
-    omega = 2.0 * np.pi * np.array(SwingSettings().frequency_hz)
+        motion.step(None, None, push, STILL)
+    omega = 2.0 * np.pi * np.array(SwingSettings().modes[0].frequency_hz)
     np.testing.assert_allclose(motion._x[:, 2], push / omega**2, rtol=1e-3, atol=1e-9)
 
 
@@ -76,27 +84,29 @@ def test_prediction_is_as_good_as_its_own_covariance_says():
     P over the lead time is e^(A tau) P e^(A' tau) plus what the noise adds; P is computed here by iteration. Errors
     are correlated over about a second: 600 s give some 600 independent ones an axis, 5 sigma of their variance 29 %.
     """
-    settings, rng, ticks = SwingSettings(), np.random.default_rng(2), 60_000
-    place, rate = np.array([1.0, 0.0, 1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0, 1.0, 0.0])
+    settings, rng, ticks, states = SwingSettings(), np.random.default_rng(2), 60_000, 9
+    place, rate = np.array([1.0, 0.0] * 4 + [0.0]), np.array([0.0, 1.0] * 4 + [0.0])
     H = [np.stack([place, rate - settings.rate_lag_s * (rate @ _dynamics(settings, axis))]) for axis in range(3)]
     sigmas = np.array(list(zip(settings.position_sigma_m, settings.rate_sigma_m_s, strict=True)))  # (3, 2)
-    lead, F, densities, expected = np.round(LEAD_S / STEP_S).astype(int), [], np.zeros((3, 5)), []
-    densities[:, 1], densities[:, 4] = settings.drift_density, settings.gust_density
+    lead, F, expected = np.round(LEAD_S / STEP_S).astype(int), [], []
+    densities = np.zeros((3, states))
+    densities[:, 1], densities[:, 8] = settings.drift_density, 1.0
+    densities[:, 3:8:2] = np.array(settings.rattle_density)[:, np.newaxis]
     for axis in range(3):
         F.append(expm(_dynamics(settings, axis) * STEP_S))
-        Q, P = np.diag(densities[axis] ** 2) * STEP_S, np.eye(5)
+        Q, P = np.diag(densities[axis] ** 2) * STEP_S, np.eye(states)
         for _ in range(6000):
             P = F[-1] @ P @ F[-1].T + Q
             P = P - P @ H[axis].T @ np.linalg.solve(H[axis] @ P @ H[axis].T + np.diag(sigmas[axis] ** 2), H[axis] @ P)
         for _ in range(lead[axis]):
             P = F[-1] @ P @ F[-1].T + Q
         expected.append(place @ P @ place)
-    x, true, motion, predicted = np.zeros((3, 5)), [], DrogueMotion(settings, STEP_S, LEAD_S, 0.1), []
+    x, true, motion, predicted = np.zeros((3, states)), [], DrogueMotion(settings, STEP_S, LEAD_S, 0.1), []
     for _ in range(ticks):
-        kick = np.sqrt(STEP_S) * densities * rng.standard_normal((3, 5))
+        kick = np.sqrt(STEP_S) * densities * rng.standard_normal((3, states))
         x = np.stack([F[i] @ x[i] for i in range(3)]) + kick
         seen = np.stack([H[i] @ x[i] for i in range(3)]) + rng.standard_normal((3, 2)) * sigmas
-        motion.step(seen[:, 0], seen[:, 1], CALM)
+        motion.step(seen[:, 0], seen[:, 1], CALM, STILL)
         true.append(x @ place)
         predicted.append(motion.ahead(CALM, CALM)[0])
     true, predicted = np.array(true), np.array(predicted)
@@ -115,11 +125,26 @@ def test_a_push_that_is_known_is_part_of_what_is_seen_late():
         motion, t = DrogueMotion(settings, STEP_S, LEAD_S, 0.1), 0.0
         for k in range(1, n + 1):
             t = k * STEP_S
-            motion.step(0.5 * push * t * t, push * (t - late.rate_lag_s), push)
-        places.append(motion._x[:, 0] + motion._x[:, 2] - 0.5 * push * t * t)
-        rates.append(motion._x[:, 1] + motion._x[:, 3] - push * t)
+            motion.step(0.5 * push * t * t, push * (t - late.rate_lag_s), push, STILL)
+        places.append(motion._x[:, 0:-1:2].sum(axis=1) - 0.5 * push * t * t)
+        rates.append(motion._x[:, 1:-1:2].sum(axis=1) - push * t)
     assert np.abs(rates[0]).max() < 0.5 * np.abs(rates[1]).max()
     assert np.abs(places[0]).max() < 0.01
+
+
+def test_what_the_tip_feels_is_part_of_the_prediction():
+    """Up, each mode's rate changes at once by its share of what was felt, and swings on from there."""
+    settings, felt = SwingSettings(), np.array([0.3, 0.2, 0.1])
+    motion, axis = DrogueMotion(settings, STEP_S, np.full(3, 0.3), 0.1), 2
+    motion.step(None, None, CALM, felt)
+    omega = np.array([2.0 * np.pi * mode.frequency_hz[axis] for mode in settings.modes])
+    zeta = np.array([mode.damping[axis] for mode in settings.modes])
+    share = np.array([mode.felt_share[axis] for mode in settings.modes])
+    damped, t = omega * np.sqrt(1.0 - zeta**2), STEP_S + 0.3
+    expected = share * felt[axis] * np.exp(-zeta * omega * t) * np.sin(damped * t) / damped
+    place, _, _ = motion.ahead(CALM, CALM)
+    np.testing.assert_allclose(place, [0.0, 0.0, expected.sum()], atol=1e-12)
+    assert abs(expected).max() > 1e-3
 
 
 def test_it_learns_a_large_drift_within_two_swings():
@@ -138,30 +163,32 @@ def test_unseen_it_goes_on_by_the_model():
     motion = DrogueMotion(SwingSettings(), STEP_S, LEAD_S, 0.1)
     motion._x[:, 0], motion._x[:, 1] = 1.0, 0.1
     for _ in range(100):
-        motion.step(None, None, CALM)
+        motion.step(None, None, CALM, STILL)
     np.testing.assert_allclose(motion.ahead(CALM, CALM)[0], 1.0 + 0.1 * (1.0 + LEAD_S), atol=1e-9)
 
 
 def test_the_path_goes_on_from_the_prediction_by_the_swing_s_own_equation():
     """Against scipy's integration of Eq. (1) with a push that changes steadily between the nodes."""
-    settings, node_s, axis = SwingSettings(), 0.1, 1
+    settings, node_s, axis = SWING, 0.1, 1
     motion = DrogueMotion(settings, STEP_S, LEAD_S, node_s)
     motion.start(np.array([4.0, 0.1, -0.2]), np.array([0.0, 0.4, 0.3]))
     for k in range(300):
         t = k * STEP_S
-        motion.step(
-            np.array([4.0, 0.2 * np.sin(2.0 * t), 0.0]), np.array([0.0, 0.4 * np.cos(2.0 * t), 0.0]), np.zeros(3)
-        )
+        place, rate = np.array([4.0, 0.2 * np.sin(2.0 * t), 0.0]), np.array([0.0, 0.4 * np.cos(2.0 * t), 0.0])
+        motion.step(place, rate, CALM, STILL)
     push = np.zeros((12, 3))
     push[1:, axis] = np.linspace(0.0, 3.0, 11)
-    omega, zeta, T = 2 * np.pi * settings.frequency_hz[axis], settings.damping[axis], settings.gust_time_s[axis]
+    swing, T = settings.modes[0], settings.gust_time_s[axis]
+    omega, zeta, q = 2 * np.pi * swing.frequency_hz[axis], swing.damping[axis], swing.gust_density[axis]
 
-    def rate(t, x):
+    def derivative(t, x):
         b = np.interp(t, LEAD_S[axis] + node_s * np.arange(11), push[1:, axis])
-        return [x[1], 0.0, x[3], -(omega**2) * x[2] - 2 * zeta * omega * x[3] + x[4] + b, -x[4] / T]
+        return [x[1], 0.0, x[3], -(omega**2) * x[2] - 2 * zeta * omega * x[3] + q * x[4] + b, -x[4] / T]
 
     times = LEAD_S[axis] + node_s * np.arange(1, 11)
-    exact = solve_ivp(rate, (0.0, times[-1]), motion._x[axis], t_eval=times, rtol=1e-10, atol=1e-12, max_step=0.02).y
+    exact = solve_ivp(
+        derivative, (0.0, times[-1]), motion._x[axis], t_eval=times, rtol=1e-10, atol=1e-12, max_step=0.02
+    ).y
     assert np.allclose(motion.path(push)[:, axis], exact[0] + exact[2], atol=2e-3)  # the mean of a node is held
 
 
@@ -169,14 +196,14 @@ def test_the_mean_path_is_the_drift_alone():
     motion = DrogueMotion(SwingSettings(), STEP_S, LEAD_S, 0.1)
     motion.start(np.array([4.0, 0.0, 0.0]), np.zeros(3))
     for k in range(3000):
-        motion.step(np.array([4.0, 0.2 * k * STEP_S, 0.0]), np.array([0.0, 0.2, 0.0]), np.zeros(3))
+        motion.step(np.array([4.0, 0.2 * k * STEP_S, 0.0]), np.array([0.0, 0.2, 0.0]), CALM, STILL)
     expected = 0.2 * (2999 * STEP_S + LEAD_S[1] + 0.1 * np.arange(1, 6))
     assert np.allclose(motion.mean_path(5)[:, 1], expected, atol=5e-3)
 
 
 def test_the_middle_of_the_swing_is_told_from_the_place():
     """A swing of 0.4 m across about 1.0 m: within half a minute the middle is known to a third of it."""
-    omega = 2 * np.pi * np.array(SwingSettings().frequency_hz)
+    omega = 2 * np.pi * np.array(SwingSettings().modes[0].frequency_hz)
     for seconds in np.arange(30.0, 34.0, 0.4):  # at any moment of the swing
         _, motion = follow(lambda t: 1.0 + 0.4 * np.sin(omega * t), lambda t: 0.4 * omega * np.cos(omega * t), seconds)
         assert np.abs(motion.middle_m - 1.0)[1:].max() < 0.4 / 3.0

@@ -47,7 +47,7 @@ def test_a_bias_of_the_velocity_is_held_after_some_seconds():
 
 def test_the_middle_of_the_swing_is_seen_from_the_tip():
     """A drogue 4 m ahead and 1 m left swings by 0.3 m: out of view it is sought in the middle."""
-    omega = 2.0 * np.pi * np.array(SETTINGS.predictive.swing.frequency_hz[1])
+    omega = 2.0 * np.pi * np.array(SETTINGS.predictive.swing.modes[0].frequency_hz[1])
     across = np.array([0.0, 1.0, 0.0])
     controller = shown(
         lambda t: np.array([4.0, 1.0, 0.0]) + 0.3 * np.sin(omega * t) * across,
@@ -59,7 +59,7 @@ def test_the_middle_of_the_swing_is_seen_from_the_tip():
 
 def test_what_a_drogue_did_unseen_is_no_drift():
     """It swings by a metre, goes out of view for 1.2 s, and is 1.5 m lower at a glimpse of 0.1 s."""
-    omega, up = 2.0 * np.pi * np.array(SETTINGS.predictive.swing.frequency_hz[2]), np.array([0.0, 0.0, 1.0])
+    omega, up = 2.0 * np.pi * np.array(SETTINGS.predictive.swing.modes[0].frequency_hz[2]), np.array([0.0, 0.0, 1.0])
     controller = shown(
         lambda t: np.array([6.0, 0.0, 0.0]) + np.sin(omega * t) * up, lambda t: omega * np.cos(omega * t) * up, 20.0
     )

@@ -3,20 +3,19 @@
 import numpy as np
 import pytest
 
-from dockair.nav.guidance.drogue_motion import SwingSettings
 from dockair.scenarios.reproduce import guidance_path_plan as paths
 
 
 def test_the_drogue_swings_as_widely_as_its_stationary_covariance_says():
     """Of s'' + 2 z w s' + w^2 s = g, T g' = -g + noise: rms by the integral of its spectrum."""
-    settings = SwingSettings()
-    flights = np.concatenate([paths.drogue(np.random.default_rng(k), settings)[0][1500:] for k in range(12)])
-    w = 2.0 * np.pi * np.array(settings.frequency_hz)
+    swing = paths.SWING
+    flights = np.concatenate([paths.drogue(np.random.default_rng(k))[0][1500:] for k in range(12)])
+    w = 2.0 * np.pi * np.array(swing.frequency_hz)
     f = np.linspace(1e-4, 20.0, 40001)[:, np.newaxis]
     s = 2j * np.pi * f
-    gust = np.array(settings.gust_density) / (s + 1.0 / np.array(settings.gust_time_s))
-    swing = gust / (s**2 + 2.0 * np.array(settings.damping) * w * s + w**2)
-    rms = np.sqrt(2.0 * np.trapezoid(np.abs(swing) ** 2, f, axis=0))
+    gust = np.array(swing.gust_density) / (s + 1.0 / np.array(paths.GUST_TIME_S))
+    answer = gust / (s**2 + 2.0 * np.array(swing.damping) * w * s + w**2)
+    rms = np.sqrt(2.0 * np.trapezoid(np.abs(answer) ** 2, f, axis=0))
     assert np.sqrt((flights**2).mean(axis=0))[1:] == pytest.approx(
         rms[1:], rel=0.25
     )  # three sigma of 12 flights of 35 s
