@@ -13,6 +13,7 @@ from dockair.messages import Navigates
 from dockair.nav.guidance.announced_path import AnnouncedPathSettings
 from dockair.nav.guidance.approach import GuidanceSettings
 from dockair.nav.guidance.bow_wave_push import BowWavePush
+from dockair.nav.guidance.drogue_motion import SwingSettings
 from dockair.nav.guidance.guidance_settings import PredictiveSettings
 from dockair.nav.guidance.phases import PhaseLimits
 from dockair.nav.heading.own_heading import OwnHeadingSettings
@@ -187,6 +188,8 @@ def build(scenario: Scenario, seed: int) -> Parts:
 def guidance_settings(scenario: Scenario) -> GuidanceSettings:
     """Return the guidance that the scenario asks for, with what the nominal sheets say of the receiver."""
     g, duration_s = scenario.guidance, scenario.flight.duration_s
+    density = standard_atmosphere(scenario.flight.altitude_m).density_kg_m3
+    pressure_pa = 0.5 * density * scenario.flight.airspeed_m_s**2
     mounting = load_parameters(scenario.hardware.receiver_sheet("mounting"), MountingParameters)
     bow_wave = load_parameters("bow_wave", BowWaveParameters)
     source_B = bow_wave_coefficients(bow_wave, mounting.probe_tip_m, scenario.flight.airspeed_m_s)[:3]
@@ -207,7 +210,9 @@ def guidance_settings(scenario: Scenario) -> GuidanceSettings:
         response_s=RESPONSE_S[scenario.hardware.airframe],
         acceleration_limit_m_s2=_commanded(control.acceleration_limit_m_s2),
         jerk_limit_m_s3=_commanded(control.jerk_limit_m_s3),
-        predictive=PredictiveSettings(straying_limit_m_s=STRAYING_LIMIT_M_S[scenario.hardware.airframe]),
+        predictive=PredictiveSettings(
+            straying_limit_m_s=STRAYING_LIMIT_M_S[scenario.hardware.airframe], swing=SwingSettings().at(pressure_pa)
+        ),
         bow_wave=BowWavePush(source_from_tip_m=(x, y, z), radius_m=bow_wave.radius_m),
         path=AnnouncedPathSettings(airspeed_m_s=scenario.flight.airspeed_m_s),
         limits=limits,

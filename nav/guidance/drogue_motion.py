@@ -19,13 +19,12 @@ nobody measures that: seen is y_D' - tau_v y_D''. Its gains, which depend on not
 beforehand until they stay the same. Its prediction over the response time is what a command given now can
 still meet.
 
-Not modelled: coupling of the axes, other frequencies for another length of hose or airspeed, how a gust that is felt
-goes on.
+Not modelled: coupling of the axes, other frequencies for another length of hose, how a gust that is felt goes on.
 Settings: fitted to the simulated drogue (15 m of hose, 20 kg) at 180 m/s in moderate gusts, as one would to a record of
 flight; the peers' hoses and research on hose-drogue dynamics give 0.2-0.5 Hz for the swing.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -35,6 +34,8 @@ from scipy.linalg import expm, solve_continuous_lyapunov, solve_discrete_are
 from dockair.rotations import Array
 
 _FIRST = 2  # of the states: m and d, then place and rate of each mode, then g
+_FITTED_AT_PA = 10_690.0  # dynamic pressure at 180 m/s and 6000 m
+_STIFFENS = 0.4  # frequencies over dynamic pressure: at 120 m/s and 3000 m, 0.61 of it, 0.83 foretells best
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -82,6 +83,13 @@ class SwingSettings:
     position_sigma_m: tuple[float, float, float] = (0.02, 0.002, 0.002)
     rate_sigma_m_s: tuple[float, float, float] = (0.05, 0.12, 0.12)
     rate_lag_s: float = 0.015  # tau_v: half a frame, its way here, and what the fusion's own filter needs
+
+    def at(self, dynamic_pressure_pa: float) -> "SwingSettings":
+        """Return the same for another dynamic pressure [Pa], which stretches the hose more or less across."""
+        k = (dynamic_pressure_pa / _FITTED_AT_PA) ** _STIFFENS
+        across = ((mode.frequency_hz[0], k * mode.frequency_hz[1], k * mode.frequency_hz[2]) for mode in self.modes)
+        modes = (replace(mode, frequency_hz=f) for mode, f in zip(self.modes, across, strict=True))
+        return replace(self, modes=tuple(modes))
 
 
 class DrogueMotion:

@@ -254,7 +254,7 @@ def test_a_drogue_that_slips_off_before_all_is_taken_in_is_tried_again():
 
 @pytest.mark.parametrize(("ahead_m", "left_m", "away"), [(0.5, 0.35, True), (0.5, 0.1, False), (0.8, 0.35, False)])
 def test_who_is_called_back_too_late_passes_beside_a_basket_that_would_be_met_from_outside(ahead_m, left_m, away):
-    """By what it has gained to the left within 2 s: a drogue that hops to its place excites the hose's modes at first."""
+    """By what it has gained to the left within 2 s: a drogue that hops excites the modes of the hose at first."""
     gained_m_s = _accelerations_to_the_left([ahead_m, left_m, 0.0], seconds=2).sum() / RATE_HZ
     assert gained_m_s < -0.3 if away else gained_m_s > 0.3
 

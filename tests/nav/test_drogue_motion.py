@@ -147,6 +147,19 @@ def test_what_the_tip_feels_is_part_of_the_prediction():
     assert abs(expected).max() > 1e-3
 
 
+def test_a_hose_that_is_stretched_less_swings_more_slowly():
+    """Across; forward there is the reel. Nothing changes at the dynamic pressure of 180 m/s and 6000 m."""
+    fitted, slow = SwingSettings(), SwingSettings().at(0.5 * 0.9093 * 120.0**2)
+    for mode, slower in zip(fitted.modes, slow.modes, strict=True):
+        assert slower.frequency_hz[0] == mode.frequency_hz[0]
+        np.testing.assert_allclose(slower.frequency_hz[1:], 0.822 * np.array(mode.frequency_hz[1:]), rtol=2e-3)
+    np.testing.assert_allclose(
+        [mode.frequency_hz for mode in fitted.at(0.5 * 0.6601 * 180.0**2).modes],
+        [mode.frequency_hz for mode in fitted.modes],
+        rtol=1e-3,
+    )
+
+
 def test_it_learns_a_large_drift_within_two_swings():
     """The gains of the start are those of a filter that knows that it does not know the drift yet."""
     omega, drift = 2.0 * np.pi * 0.33, np.array([0.2, -0.3, 0.3])
