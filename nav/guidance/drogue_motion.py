@@ -2,10 +2,10 @@
 
 With y_r the receiver's place by its commands and what it felt besides, y_D = p + y_r is the drogue's place on a scale
 that drifts steadily with the bias of the receiver's inertial velocity. Each axis of y_D is modelled as drift plus the
-modes i of a hose with a drogue on its end, a swing and two overtones, that coloured gusts g drive, each by its share
-q_i, and noise of their own; the receiver's bow wave b pushes the swing:
+modes i of a hose with a drogue on its end, a swing (i = 1) and two overtones, that coloured gusts g drive, each by its
+share q_i, and noise of their own; the receiver's bow wave b pushes the swing:
 
-    m' = d,   d' = noise;     s_i'' = -omega_i^2 s_i - 2 zeta_i omega_i s_i' + q_i g + b + noise
+    m' = d,   d' = noise;     s_i'' = -omega_i^2 s_i - 2 zeta_i omega_i s_i' + q_i g + noise,   b besides for i = 1
     g' = -g/T + noise;        y_D = m + sum_i s_i                                                         (1)
 
 What a gust gives the drogue the hose takes back when the wave from the pod has come down, half a second later: that is
@@ -19,7 +19,8 @@ nobody measures that: seen is y_D' - tau_v y_D''. Its gains, which depend on not
 beforehand until they stay the same. Its prediction over the response time is what a command given now can
 still meet.
 
-Not modelled: coupling of the axes, other frequencies for another length of hose, how a gust that is felt goes on.
+Not modelled: coupling of the axes, other frequencies for another length of hose, how a gust that is felt goes on, what
+the bow wave does to the overtones. Forward there is the reel: one mode, well damped, and nothing is felt.
 Settings: fitted to the simulated drogue (15 m of hose, 20 kg) at 180 m/s in moderate gusts, as one would to a record of
 flight; the peers' hoses and research on hose-drogue dynamics give 0.2-0.5 Hz for the swing.
 """
@@ -76,6 +77,7 @@ class SwingSettings:
     #: Of every s_i'': what drives a mode by itself [m/s^2/sqrt(Hz)]. Forward there is the reel, and no mode.
     rattle_density: tuple[float, float, float] = (0.0, 0.035, 0.035)
     drift_sigma_m_s: float = 0.4  # of d at the start: the inertial velocity's bias, twice its 0.2 m/s
+    drift_kept_sigma_m_s: float = 0.1  # of d where the swing alone is begun anew: it has not changed much meanwhile
     learning_s: float = 12.0  # after which the gains stay the same: drift and swing are told apart within a few periods
     drift_density: float = 0.03  # of d' [m/s^2/sqrt(Hz)]: the inertial velocity's drift, gusts far below the swing
     #: Of the place, and of its rate. The camera knows the place across to a millimetre, but for what does not change;
@@ -110,7 +112,11 @@ class DrogueMotion:
         self._A = np.stack([_dynamics(settings, axis) for axis in range(3)])
         self._F = np.stack([expm(A * step_s) for A in self._A])
         self._lead = np.stack([expm(A * lead) for A, lead in zip(self._A, self._lead_s, strict=True)])
-        self._K = np.stack([_gains(settings, axis, step_s) for axis in range(3)], axis=1)
+        self._K_begun, self._K_resumed = (
+            np.stack([_gains(settings, axis, step_s, sigma) for axis in range(3)], axis=1)
+            for sigma in (settings.drift_sigma_m_s, settings.drift_kept_sigma_m_s)
+        )
+        self._K = self._K_begun
         self._ticks = 0
         self._seen_rate = np.stack([_rate_row(settings, A) for A in self._A])
         self._rate_lag_s = settings.rate_lag_s
@@ -122,12 +128,12 @@ class DrogueMotion:
 
     def start(self, place_m: Array, velocity_m_s: Array) -> None:
         """Begin anew, at rest but for the swing; (3,) each."""
-        self._x, self._ticks = np.zeros((3, self._states)), 0
+        self._x, self._ticks, self._K = np.zeros((3, self._states)), 0, self._K_begun
         self._x[:, 0], self._x[:, _FIRST + 1] = place_m, velocity_m_s
 
     def resume(self, place_m: Array) -> None:
         """Begin anew at a place (3,) where it comes into view again, whatever the swing; the drift stays as learnt."""
-        self._x[:, 0], self._x[:, _FIRST:], self._ticks = place_m, 0.0, 0
+        self._x[:, 0], self._x[:, _FIRST:], self._ticks, self._K = place_m, 0.0, 0, self._K_resumed
 
     def step(self, place_m: Array | None, velocity_m_s: Array | None, push_m_s2: Array, felt_m_s: Array) -> None:
         """Advance by one control period.
@@ -310,8 +316,8 @@ def _held(A: Array, step_s: float) -> Array:
     return np.asarray(expm(augmented * step_s)[:n, n])
 
 
-@lru_cache(maxsize=12)
-def _gains(settings: SwingSettings, axis: int, step_s: float) -> Array:
+@lru_cache(maxsize=24)
+def _gains(settings: SwingSettings, axis: int, step_s: float, drift_sigma_m_s: float) -> Array:
     """(ticks, n, 2) gains of the Kalman filter tick by tick, the last for good; the step's noise by Van Loan's."""
     A, drive = _dynamics(settings, axis), _drive(settings, axis)
     n = len(A)
@@ -321,7 +327,7 @@ def _gains(settings: SwingSettings, axis: int, step_s: float) -> Array:
     Q, R = F @ loan[:n, n:], np.diag([settings.position_sigma_m[axis], settings.rate_sigma_m_s[axis]]) ** 2
     P, gains = np.zeros((n, n)), []
     P[_FIRST:, _FIRST:] = solve_continuous_lyapunov(A[_FIRST:, _FIRST:], -drive[_FIRST:, _FIRST:])  # any moment
-    P[0, 0], P[1, 1] = P[_FIRST, _FIRST], settings.drift_sigma_m_s**2
+    P[0, 0], P[1, 1] = P[_FIRST, _FIRST], drift_sigma_m_s**2
     for _ in range(round(settings.learning_s / step_s)):
         gains.append(P @ H.T @ np.linalg.inv(H @ P @ H.T + R))
         P = F @ (P - gains[-1] @ H @ P) @ F.T + Q

@@ -23,10 +23,10 @@ class PredictiveSettings:
     along_gain_1_s: float = 0.5  # k: an eighth of 1 / tau, for the receiver is pushed about by gusts itself
     smoothing_1_s: float = 4.0  # how fast u goes to the u of Eq. (1) where it is not there
     #: Left and up, of the limits of acceleration, rms: above it a swing's peaks are cut off every time.
-    bearable_share: tuple[float, float] = (0.7, 0.47)
+    bearable_share: tuple[float, float] = (0.7, 0.525)
     #: Left and up, of the limits: a swing that would need no more, unless driven on, leaves room on the last metre for
     #: a gust. Of approaches forced upon 455 moments in moderate gusts 92 % met such swings, 70 % the larger ones.
-    calm_share: tuple[float, float] = (0.5, 0.56)
+    calm_share: tuple[float, float] = (0.5, 0.63)
     keep_away_m: float = 4.0  # farther astern of a swing that asks for twice what is bearable: another stand-off
     excess_max: float = 1.5  # of that: three times what is bearable is severe turbulence
     bearing_s: float = 4.0  # over which that mean is taken: a swing and a half
@@ -62,11 +62,11 @@ class GuidanceSettings:
     join_up_speed_m_s: float = 1.5  # assumed: walking pace, as in practice from some tens of metres
     back_off_speed_m_s: float = 1.0  # breakaway practice 1-2 m/s
     response_s: tuple[float, float, float] = (0.28, 0.10, 0.10)  # tau: delay of the tip, computing included
-    acceleration_limit_m_s2: tuple[float, float, float] = (0.75, 1.9, 2.85)  # less than the flight control's
-    jerk_limit_m_s3: tuple[float, float, float] = (3.8, 6.6, 11.4)  # likewise
+    acceleration_limit_m_s2: tuple[float, float, float] = (0.75, 1.9, 2.53)  # less than the flight control's
+    jerk_limit_m_s3: tuple[float, float, float] = (3.8, 6.6, 10.1)  # likewise
     #: Left and up, of both limits, until committed. With all of them a receiver that runs up by camera met gusts with
     #: its surfaces at their rates, and was thrown a metre aside; what needs more than this share is no calm moment.
-    patient_share: tuple[float, float] = (0.6, 0.4)
+    patient_share: tuple[float, float] = (0.6, 0.45)
     velocity_limit_m_s: float = 3.5
     closure_acceleration_m_s2: float = 0.6  # how fast the closure speed is asked for
     take_in_gain_1_s: float = 0.35  # speed into the refuelling range per metre to go; a third of the next: no overshoot

@@ -49,7 +49,7 @@ class OwnPath:
         self._places, self._velocities = np.zeros((self._length, 3)), np.zeros((self._length, 3))  # rings
         self._before: Array = np.zeros(3)  # v_k-1
         self._felt: Array = np.zeros(3)  # f
-        self.felt_change_m_s: Array = np.zeros(3)  #: (3,) of the tip's velocity, besides its commands; 0 where not felt
+        self.felt_change_m_s: Array = np.zeros(3)  #: (3,) of f inside the limit; 0 where not felt
         self._straying: Array = np.zeros(3)  # e
         self._strayed: Array = np.zeros(3)  # its integral
 
@@ -59,9 +59,9 @@ class OwnPath:
         self._before = v
         if np.isfinite(change_m_s).all():
             self._felt = self._kept * (felt + change_m_s - change)
-            self.felt_change_m_s = self._felt - felt
-            straying = self._kept * (self._straying + self.felt_change_m_s)
-            self._straying = np.clip(straying, -self._limit_m_s, self._limit_m_s)
+            straying = self._kept * (self._straying + self._felt - felt)
+            self._straying, now, before = self._limited(straying), self._limited(self._felt), self._limited(felt)
+            self.felt_change_m_s = now - before
         else:
             self._felt, self._straying = np.zeros(3), self._dies * self._straying
             self.felt_change_m_s = np.zeros(3)
@@ -97,6 +97,9 @@ class OwnPath:
         """(..., 3) y_r in times (..., 3) to come, no shorter than the response times, by the commands given so far."""
         way = self._straying_s * (1.0 - np.exp(-time_s / self._straying_s)) * self._straying
         return np.asarray(self._places[self._newest] + self._strayed + way)
+
+    def _limited(self, v: Array) -> Array:
+        return np.clip(v, -self._limit_m_s, self._limit_m_s)
 
     @property
     def _commanded_m_s(self) -> Array:

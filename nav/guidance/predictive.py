@@ -96,7 +96,7 @@ class Predictive:
         if sight is None:
             self._unseen_s += self._step_s
             push: Array = np.zeros((len(self._times), 3))
-            self._motion.step(None, None, push[0], self._own.felt_change_m_s)
+            self._motion.step(None, None, push[0], np.zeros(3))
         else:
             push = sight.push_m_s2
             place, velocity = sight.place_m + self._own.place_m, sight.rate_m_s + self._own.velocity_m_s

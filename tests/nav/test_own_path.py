@@ -43,6 +43,22 @@ def test_it_goes_on_to_stray_until_that_has_died_away():
     np.testing.assert_allclose(path.straying_ahead_m_s, strayed * np.exp(-RESPONSE_S / STRAYING_S))
 
 
+def test_it_tells_what_it_felt_inside_the_limit_and_nothing_where_it_did_not():
+    """A push up to 0.7 m/s within 0.1 s: 0.5 of it; a gap in what is felt tells nothing, nor does a limit of 0."""
+    path, told = OwnPath(RESPONSE_S, 0.01, STRAYING_S, 1e6, 0.5), []
+    for _ in range(10):
+        path.feel(np.array([0.0, 0.0, 0.07]))
+        told.append(path.felt_change_m_s)
+        path.step(np.zeros(3))
+    np.testing.assert_allclose(told[0], (0.0, 0.0, 0.07), atol=1e-6)
+    np.testing.assert_allclose(np.sum(told, axis=0), (0.0, 0.0, 0.5), atol=1e-6)
+    path.feel(np.full(3, np.nan))
+    np.testing.assert_array_equal(path.felt_change_m_s, np.zeros(3))
+    unfelt = OwnPath(RESPONSE_S, 0.01, STRAYING_S, 4.0, 0.0)
+    unfelt.feel(np.full(3, 0.1))
+    np.testing.assert_array_equal(unfelt.felt_change_m_s, np.zeros(3))
+
+
 def test_gravity_that_is_not_quite_taken_off_is_forgotten():
     """0.05 m/s^2 from now on: felt as 0.07 m/s at most, within half a minute as nothing."""
     path, most = OwnPath(RESPONSE_S, 0.01, STRAYING_S, 4.0, 0.5), 0.0

@@ -95,3 +95,22 @@ def test_a_drogue_at_rest_stays_at_rest_while_the_tip_strays():
             unrest.append(controller.unrest)
         swings[felt] = max(unrest[2000:])
     assert swings[True] < 0.4 * swings[False]
+
+
+def test_a_gust_that_lifts_the_tip_says_where_the_drogue_will_go():
+    """Felt up by 0.3 m/s while the drogue is still where it was: it is expected to go by the modes' shares of that."""
+    limits = np.array(SETTINGS.acceleration_limit_m_s2), np.array(SETTINGS.jerk_limit_m_s3)
+    ahead = {}
+    for felt_m_s in (0.0, 0.03):
+        settings, response_s = SETTINGS.predictive, np.array(SETTINGS.response_s)
+        controller = Predictive(settings, response_s, *limits, STEP_S, SETTINGS.patient_share)
+        push, tip_m = np.zeros((len(controller.looks_ahead_s), 3)), 0.0
+        for k in range(410):
+            lifted = felt_m_s if k >= 400 else 0.0
+            tip_m += STEP_S * lifted * max(k - 399, 0)
+            place, rate = np.array([4.0, 0.0, -tip_m]), np.array([0.0, 0.0, -lifted * max(k - 399, 0)])
+            controller.observe(Sight(place_m=place, rate_m_s=rate, push_m_s2=push), np.array([0.0, 0.0, lifted]))
+            controller.given(np.zeros(3), np.zeros(3))
+        ahead[felt_m_s] = controller._motion.path(np.zeros((5, 3)))[:, 2]
+    assert np.abs(ahead[0.0]).max() < 1e-9
+    assert np.abs(ahead[0.03]).max() > 0.01

@@ -82,6 +82,12 @@ def test_guidance_takes_the_scenarios_figures():
     assert settings.stand_off_m == 4.0
 
 
+def test_guidance_knows_how_a_hose_swings_at_the_speed_and_height_of_the_flight():
+    fast, slow = (guidance_settings(load_scenario(name)).predictive.swing for name in ("default", "slow_set"))
+    assert fast.modes[0].frequency_hz[1] == pytest.approx(0.345, rel=1e-3)
+    assert slow.modes[0].frequency_hz[1] == pytest.approx(0.822 * 0.345, rel=2e-3)
+
+
 def test_the_drogues_nominal_attitude_points_along_the_hose():
     """Forward and up in W, that is nearly along the trimmed receiver's own nose."""
     sheets = truth_parts(1).sheets

@@ -33,7 +33,7 @@ def test_every_parameter_has_one_row_under_its_sheet_with_its_source() -> None:
 def test_numbers_are_told_as_they_are_and_tables_by_their_span() -> None:
     page = parameters_page()
     assert "| `length_m` | 15 | m | 10 to 23 | published |" in page
-    assert "| `acceleration_limit_m_s2` | 0.8, 3, 4.5 | m/s^2 | 0.1 to 5 | assumed |" in page
+    assert "| `acceleration_limit_m_s2` | 0.8, 3, 6 | m/s^2 | 0.1 to 10 | assumed |" in page
     assert "| `damping` | 9 x 12 numbers, -38.3 to 2.91 | 1 | -50 to 50 | published |" in page
 
 
