@@ -472,6 +472,20 @@ def test_until_committed_a_share_of_the_limits_across_is_enough():
     assert 0.9 < most < 1.0 + 1e-9
 
 
+def test_once_committed_it_uses_all_of_the_limits_across():
+    """The drogue hops up by 0.4 m 0.9 m before the ring."""
+    plant, guidance, most = Plant(), Guidance(SETTINGS, RATE_HZ), 0.0
+    limit, now = SETTINGS.acceleration_limit_m_s2[2], plant.step(ReceiverCommand())
+    while guidance.phase is not Phase.CONTACT and plant.t < 60.0:
+        command = guidance.step(now)
+        if guidance._closure.committed:
+            most = max(most, float(np.abs(command.acceleration_m_s2[2])))
+            if now.p_PD_B[0] < 0.9:
+                plant.drogue = lambda _: np.array([0.0, 0.0, 0.4])
+        now = plant.step(command)
+    assert 0.9 * limit < most <= limit + 1e-9
+
+
 def test_a_drogue_that_is_not_seen_is_not_waited_for_beside_it():
     """Lost as the tip enters, the belief running away: the retreat goes on, so does falling back, then it is over."""
     plant, guidance = Plant(offset=(4.0, 0.0, 0.0)), Guidance(SETTINGS, RATE_HZ)
