@@ -1,7 +1,7 @@
 """What planning for the moment of contact is worth: a drogue that swings as a filter believes, followed and met.
 
-The drogue's paths are Eq. (1) of `nav.guidance.drogue_motion`, of the swing alone, driven by white noise; the filter sees
-them as well as a camera shows them, and the plan flies what the filter predicts, a response time ahead. Every few
+The drogue's paths are Eq. (1) of `nav.guidance.drogue_motion`, of the swing alone, driven by white noise; the filter
+sees them as well as a camera shows them, and the plan flies what the filter predicts, a response time ahead. Every few
 seconds a contact is due: the miss is the distance across at that moment.
 
 Not modelled: the receiver's own motion in gusts, the bow wave, anything but the two axes across.
