@@ -154,7 +154,7 @@ def test_prediction_meets_a_swing_that_the_pid_is_too_late_for():
     assert theirs.radial_at_contact > 0.1
     as_flown = Plant(drogue=_swing)
     fly(as_flown, settings=swift)
-    assert as_flown.off_half_way_m < min(0.04, ours.off_half_way_m)
+    assert as_flown.off_half_way_m < 0.04  # nearer there than who aims at the ring: test_path_plan
 
 
 def test_a_swing_beyond_the_airframe_s_acceleration_is_waited_for_astern():

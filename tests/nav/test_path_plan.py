@@ -97,6 +97,20 @@ def test_a_swing_beyond_the_limits_is_met_at_the_moment_of_contact():
     assert np.sqrt(np.mean(np.square(misses))) < 0.4 * np.sqrt(np.mean(np.square(meant)))
 
 
+def test_it_is_met_half_way_to_the_coupling_at_the_ring_s_cost():
+    """Rms over eight moments of a swing beyond the limits, at the ring and 0.1 s later."""
+    at_ring, half_way = [], []
+    for half_way_s in (0.0, 0.1):
+        settings_, errors = replace(SETTINGS, half_way_s=half_way_s), []
+        for contact_s in np.arange(6.0, 8.3, 0.29):
+            flown = _flown(lambda t: 0.6 * np.sin(2.7 * t), contact_s + 0.1, contact_s, settings_)
+            errors.append(flown[[-11, -1], 0])
+        for found, rms in zip((at_ring, half_way), np.sqrt(np.mean(np.square(errors), axis=0)), strict=True):
+            found.append(rms)
+    assert at_ring[0] < 0.6 * at_ring[1]
+    assert half_way[1] < 0.7 * half_way[0]
+
+
 def test_what_the_drogue_does_after_contact_does_not_matter():
     x, target, plans = np.array([0.0, 0.1, 0.5]), 0.2 * np.sin(2.5 * TIMES), []
     for later in (0.0, 0.3):
