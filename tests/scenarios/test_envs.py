@@ -200,7 +200,7 @@ def test_a_full_deflection_costs_what_is_written(env):
 def test_commands_beyond_the_limits_are_clipped_and_nonsense_is_refused(env):
     command = env._command(np.full(6, 100.0, np.float32))
     np.testing.assert_array_equal(command.velocity_m_s, 3.5)
-    np.testing.assert_array_equal(command.acceleration_m_s2, 2.0)
+    np.testing.assert_array_equal(command.acceleration_m_s2, 6.0)
     for wrong in (np.full(6, np.nan, np.float32), np.zeros(5, np.float32)):
         with pytest.raises(DockairError, match="6 finite numbers"):
             env._command(wrong)
