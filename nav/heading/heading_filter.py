@@ -137,7 +137,7 @@ class HeadingFilter:
     def sigma_rad(self) -> float:
         """Standard deviation of the heading."""
         g = self._to_heading
-        return float(np.sqrt(max(g @ self._P @ g, 0.0)))  # nothing at the start, or what rounding makes of it
+        return float(np.sqrt(max(float(g @ self._P @ g), 0.0)))  # nothing at the start, or what rounding makes of it
 
     @property
     def _to_heading(self) -> Array:
