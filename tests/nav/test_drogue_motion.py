@@ -10,7 +10,7 @@ from dockair.nav.guidance.drogue_motion import DrogueMotion, HoseMode, SwingSett
 
 STEP_S, LEAD_S = 0.01, np.array([0.4, 0.17, 0.14])
 CALM = STILL = np.zeros(3)
-SWING = SwingSettings(  # alone, and hardly driven: what is seen of it is followed by its own equation
+SWING = SwingSettings(  # alone, for what has a closed form for one mode only
     modes=(HoseMode(frequency_hz=(0.44, 0.31, 0.45), damping=(0.5, 0.05, 0.12), gust_density=(0.7, 3.0, 7.0)),),
     gust_time_s=(1.2, 0.7, 1.2),
     rattle_density=(0.0,) * 3,
