@@ -32,6 +32,11 @@ class Controller:
         """
         self._step_s, self._velocity, self._lined_up_s, self.closing = step_s, np.zeros(3), 0.0, False
 
+    def hold(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return the velocity commanded last and no acceleration: there is nothing to steer to."""
+        self._lined_up_s = 0.0
+        return self._velocity, np.zeros(3)
+
     def step(self, p: np.ndarray, rate: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return velocity and acceleration to command.
 
@@ -54,10 +59,10 @@ class Controller:
 
 def action_for(controller: Controller, observation: np.ndarray) -> np.ndarray:
     """Return the action for an observation."""
+    if not observation[INDEX["valid"]]:
+        return np.concatenate(controller.hold()).astype(np.float32)
     p, v, gyro = (observation[INDEX[name] : INDEX[name] + 3] for name in ("p_PD_B_x", "v_PD_B_x", "gyro_x"))
     rate = v - np.cross(gyro, p)  # in turning axes
-    if not observation[INDEX["valid"]]:
-        p, rate = np.array([STAND_OFF_M, 0.0, 0.0]), np.zeros(3)  # nothing to steer to: hold the velocity
     return np.concatenate(controller.step(p, rate)).astype(np.float32)
 
 

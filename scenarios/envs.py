@@ -41,7 +41,7 @@ class DockEnv(Episodes[NDArray[np.float64]]):
 
     def observation(self) -> NDArray[np.float64]:
         """(31,) of OBSERVATION."""
-        return clipped(observation_from(self.tick.solution, self.tick.imu), self.observation_space)
+        return clipped(observation_from(self.tick.solution, self.imu), self.observation_space)
 
 
 class DockFastEnv(DockEnv):
@@ -96,10 +96,9 @@ class DockPixelsEnv(Episodes[Pixels]):
         """Picture and state."""
         tick, frame, space = self.tick, self._frame, self.observation_space
         time_s = tick.solution.time_stamp_s
-        imu = tick.imu[-1] if tick.imu else None
         motion: list[Array] = [np.zeros(6)]
-        if imu is not None:
-            motion = [imu.angular_rate_rad_s, imu.specific_force_m_s2]
+        if self.imu is not None:
+            motion = [self.imu.angular_rate_rad_s, self.imu.specific_force_m_s2]
         if frame is None:
             picture, place, exposure = np.zeros(self._shape, np.uint8), [0.0, 0.0, 0.0, FRAME_AGE_LIMIT_S], 0.0
         else:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dockair.errors import DockairError
-from dockair.messages import ReceiverCommand
+from dockair.messages import ImuSample, ReceiverCommand
 from dockair.scenarios.attempts import succeeded
 from dockair.scenarios.envs_judge import AttemptJudge
 from dockair.scenarios.envs_tables import ACTION, OUTCOME_REWARD, RETRY_REWARD, action_cost, box, truth_info
@@ -63,9 +63,8 @@ class Episodes(gymnasium.Env[Obs, NDArray[np.float32]], Generic[Obs]):
         """
         check_choice("render_mode", render_mode, (None, *RENDER_MODES))
         check_choice("reward", reward, REWARDS)
-        for name, value in (("ticks_per_step", ticks_per_step), ("attempts", attempts)):
-            if value < 1:
-                raise DockairError(name, expected="an integer from 1 on", got=value)
+        check_integer("ticks_per_step", ticks_per_step, 1)
+        check_integer("attempts", attempts, 1)
         self._source, self._attempts, self._is_dense = scenario, attempts, reward == "dense"
         self._until_clear, self._ticks_per_step = until_clear, ticks_per_step
         self.render_mode = render_mode
@@ -76,6 +75,7 @@ class Episodes(gymnasium.Env[Obs, NDArray[np.float32]], Generic[Obs]):
         self._tick: Tick | None = None
         self._outcome: Outcome | None = None
         self._judge = AttemptJudge(attempts)
+        self.imu: ImuSample | None = None  #: the newest sample; None until the first
         chosen = self.chosen_scenario({})
         self.metadata = self.metadata | {"render_fps": chosen.rates.control_hz / ticks_per_step}
 
@@ -90,10 +90,10 @@ class Episodes(gymnasium.Env[Obs, NDArray[np.float32]], Generic[Obs]):
         options = options or {}
         scenario = self.chosen_scenario(options)
         chosen = options.get("seed", seed)
-        flight_seed = int(self.np_random.integers(2**63)) if chosen is None else int(chosen)
+        flight_seed = self.np_random.integers(2**63) if chosen is None else check_integer("options.seed", chosen, 0)
         self.close()
-        self._flight = Flight(scenario, flight_seed, full_frames=self.full_frames)
-        self._judge, self._outcome = AttemptJudge(self._attempts), None
+        self._flight = Flight(scenario, int(flight_seed), full_frames=self.full_frames)
+        self._judge, self._outcome, self.imu = AttemptJudge(self._attempts), None, None
         self._fly(ReceiverCommand())
         return self.observation(), self._info()
 
@@ -165,19 +165,21 @@ class Episodes(gymnasium.Env[Obs, NDArray[np.float32]], Generic[Obs]):
     def _fly(self, command: ReceiverCommand) -> int:
         """Fly one control tick; return how many attempts failed in it that are not the last."""
         assert self._flight is not None
+        attempt = self._flight.referee.attempt
         self._tick = tick = self._flight.step(command)
+        self.imu = tick.imu[-1] if tick.imu else self.imu
         self.note(tick)
         if self.render_mode == "human":
             self._viewer = self._viewer or LiveViewer()
             self._viewer.show(self._flight, tick)
         if self._until_clear:
             self._outcome = tick.outcome
-            return 0
-        failed, self._outcome = self._judge.watch(tick.truth)
+            return self._flight.referee.attempt - attempt  # that another begins says that the last one failed
+        failed, self._outcome = self._judge.watch(tick.truth, tick.touched)
         if tick.outcome in (Outcome.COLLISION, Outcome.DIVERGED):
             self._outcome = tick.outcome
         elif self._outcome is None and tick.truth.time_s >= self._flight.scenario.flight.duration_s:
-            self._outcome = Outcome.TIMEOUT
+            self._outcome = self._judge.unfinished or Outcome.TIMEOUT
         return int(failed and self._outcome is None)
 
     def chosen_scenario(self, options: Mapping[str, Any]) -> Scenario:
@@ -187,6 +189,10 @@ class Episodes(gymnasium.Env[Obs, NDArray[np.float32]], Generic[Obs]):
         if unknown:
             raise DockairError("options", expected="a known key", got=unknown[0], exists=exists)
         source, settings = options.get("scenario", self._source), options.get("set", {})
+        if not isinstance(settings, Mapping):
+            raise DockairError("options.set", expected="a dictionary of dotted key -> value", got=settings)
+        if not isinstance(source, (str, Path, Scenario)):
+            raise DockairError("scenario", expected="a name, a path or a Scenario", got=source)
         if not isinstance(source, Scenario):
             scenario = load_scenario(source, settings)
         elif settings:
@@ -195,7 +201,9 @@ class Episodes(gymnasium.Env[Obs, NDArray[np.float32]], Generic[Obs]):
             scenario = source
         if self.sensing is None:
             return scenario
-        return scenario.model_copy(update={"camera": scenario.camera.model_copy(update={"sensing": self.sensing})})
+        camera = scenario.camera.model_copy(update={"sensing": self.sensing})
+        changed = scenario.model_copy(update={"camera": camera})
+        return Scenario.model_validate(changed.model_dump(exclude_unset=True))  # a copy alone is not checked
 
     def _command(self, action: NDArray[np.float32]) -> ReceiverCommand:
         values = np.asarray(action, dtype=np.float64)
@@ -220,7 +228,7 @@ class Episodes(gymnasium.Env[Obs, NDArray[np.float32]], Generic[Obs]):
         return {
             "is_success": outcome is Outcome.CONTACT and self._docked_well(),
             "outcome": outcome.value if outcome is not None else "",
-            "attempt": self._judge.number,
+            "attempt": self._flight.referee.attempt if self._until_clear else self._judge.number,
             "phase": tick.solution.phase,
             "truth": truth_info(tick.truth, self._distance_m(tick.truth), self._flight.referee.contact),
         }
@@ -228,6 +236,13 @@ class Episodes(gymnasium.Env[Obs, NDArray[np.float32]], Generic[Obs]):
     def _docked_well(self) -> bool:
         assert self._flight is not None and self._tick is not None
         return succeeded(self._flight.referee.attempt_log(self._tick.truth.time_s, self._outcome))
+
+
+def check_integer(name: str, value: Any, least: int) -> int:
+    """Return a whole number as an int; refuse what is none, or less than the least."""
+    if isinstance(value, (int, np.integer)) and not isinstance(value, bool) and value >= least:
+        return int(value)
+    raise DockairError(name, expected=f"an integer from {least} on", got=value)
 
 
 def check_choice(name: str, value: str | None, exists: tuple[str | None, ...]) -> None:

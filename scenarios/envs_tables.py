@@ -97,7 +97,7 @@ def action_cost(velocity_m_s: Array, acceleration_m_s2: Array, step_s: float) ->
     return float(_ACTION_COST_1_S * step_s * np.mean(deflection**2))
 
 
-def observation_from(solution: NavSolution, imu: Sequence[ImuSample]) -> Array:
+def observation_from(solution: NavSolution, imu: ImuSample | None) -> Array:
     """(n,) values of OBSERVATION before they are clipped to its limits.
 
     A standard deviation that is not known (NaN) is infinite, and so ends at its limit.
@@ -113,7 +113,7 @@ def observation_from(solution: NavSolution, imu: Sequence[ImuSample]) -> Array:
         sigmas,
         [age_s if np.isfinite(age_s) else FRAME_AGE_LIMIT_S],
         [np.isfinite(solution.led_pixels_px[:, 0]).sum()],
-        imu[-1].angular_rate_rad_s if imu else np.zeros(3),
+        np.zeros(3) if imu is None else imu.angular_rate_rad_s,
         solution.command.velocity_m_s,
         solution.command.acceleration_m_s2,
         [solution.time_stamp_s],

@@ -5,6 +5,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+from uuid import uuid4
 
 import numpy as np
 
@@ -55,8 +56,8 @@ class LiveViewer:
 
         self._flight, self._next_s = flight, 0.0
         self._episode += 1
-        name = f"{flight.scenario.name}, episode {self._episode}"
-        self._recording = rr.RecordingStream("dockair", recording_id=name, send_properties=False)
+        self._recording = rr.RecordingStream("dockair", recording_id=uuid4(), send_properties=False)
+        self._recording.send_recording_name(f"{flight.scenario.name}, episode {self._episode}")
         self._recording.set_log_time_enabled(False)  # the timelines are the flight's
         self._sink(self._recording)
         self._recording.send_blueprint(blueprint(flight.sheets.camera))

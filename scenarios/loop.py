@@ -37,6 +37,7 @@ class Tick:
     solution: NavSolution
     outcome: Outcome | None
     announcement: TankerAnnouncement | None = None
+    touched: bool = False  #: the probe touched the drogue at one of the tick's physics ticks; most touches are shorter
 
 
 class Flight:
@@ -78,7 +79,7 @@ class Flight:
         """
         self._command = self._next_command if command is None else command
         imu: list[ImuSample] = []
-        diverged, truth = False, self.world.truth
+        diverged, touched, truth = False, False, self.world.truth
         for _ in range(self._periods.control):
             try:
                 truth = self.world.step(self._command)
@@ -86,6 +87,7 @@ class Flight:
                 diverged = True
                 break
             self.referee.watch(truth)
+            touched |= truth.probe_touches_drogue
             if truth.tick % self._periods.gyro == 0:
                 imu += self._sampled(truth)
             if self.camera is not None and truth.tick % self._periods.camera == 0:
@@ -109,7 +111,13 @@ class Flight:
         if diverged:
             outcome = Outcome.DIVERGED
         return Tick(
-            truth=truth, imu=tuple(imu), frame=frame, solution=solution, outcome=outcome, announcement=announcement
+            truth=truth,
+            imu=tuple(imu),
+            frame=frame,
+            solution=solution,
+            outcome=outcome,
+            announcement=announcement,
+            touched=touched,
         )
 
     def close(self) -> None:

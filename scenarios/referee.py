@@ -117,6 +117,11 @@ class Referee:
         return (*self._over, self._open.settled(now_s, bool(self.collided_with)))
 
     @property
+    def attempt(self) -> int:
+        """The number of the attempt that goes on or was the last, from 1; 1 before the first."""
+        return 1 if self._open is None else self._open.number
+
+    @property
     def unsafe(self) -> tuple[str, ...]:
         """What was unsafe; empty when all was safe."""
         unsafe, departed_s = list(self._unsafe), self._departure.time_s

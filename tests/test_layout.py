@@ -80,6 +80,7 @@ def test_the_world_loads_neither_navigation_nor_scenarios():
         "import dockair, gymnasium",
         "import dockair.nav; from gymnasium.envs import registration",
         "import gymnasium.spaces, dockair",
+        "import dockair, importlib.util; importlib.util.find_spec('gymnasium')",
     ],
 )
 def test_the_environments_are_registered_whichever_is_imported_first(imports):

@@ -28,7 +28,7 @@ def _register_environments() -> None:
 
 
 class _RegisterWhenGymnasiumIsImported(MetaPathFinder):
-    """Finds `gymnasium` as usual, once, and registers our environments after it has been executed.
+    """Finds `gymnasium` as usual and registers our environments after it has been executed.
 
     Importing gymnasium here instead would load it into every process that only wants `dockair.nav`.
     """
@@ -38,13 +38,14 @@ class _RegisterWhenGymnasiumIsImported(MetaPathFinder):
     ) -> ModuleSpec | None:
         if fullname != "gymnasium":
             return None
-        sys.meta_path.remove(self)
         spec = PathFinder.find_spec(fullname, path, target)
         if spec is None or spec.loader is None:
             return None
         execute = spec.loader.exec_module
 
         def execute_and_register(module: ModuleType) -> None:
+            if self in sys.meta_path:  # stays until then: a spec may be asked for and never executed
+                sys.meta_path.remove(self)
             execute(module)
             _register_environments()
 

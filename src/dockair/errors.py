@@ -11,16 +11,27 @@ class DockairError(Exception):
         expected: what would have been right.
         got: what was there instead.
         exists: the allowed names, if there is a list of them.
+
+    With `where` alone, that is the whole line: this is how pickle and gymnasium's vector environments make again what
+    another process has raised.
     """
 
     exit_code = 2
 
-    def __init__(self, where: str, *, expected: str, got: object, exists: Iterable[str] = ()) -> None:
-        self.where, self.expected, self.got, self.exists = where, expected, got, tuple(exists)
-        text = f"{where}: expected {expected}, got {got!r}" if got is not None else f"{where}: expected {expected}"
+    def __init__(
+        self, where: object, *, expected: str | None = None, got: object = None, exists: Iterable[str] = ()
+    ) -> None:
+        self.where, self.expected, self.got, self.exists = str(where), expected or "", got, tuple(exists)
+        text = self.where
+        if expected is not None:
+            text += f": expected {expected}, got {got!r}" if got is not None else f": expected {expected}"
         if self.exists:
             text += f"; exists: {', '.join(self.exists)}"
         super().__init__(text)
+
+    def __reduce__(self) -> tuple[type["DockairError"], tuple[str, ...]]:
+        """Pickle the line alone: `got` may be anything, and what cannot be pickled would be lost without a word."""
+        return type(self), (str(self),)
 
 
 class MachineError(DockairError):
@@ -28,6 +39,7 @@ class MachineError(DockairError):
 
     exit_code = 3
 
-    def __init__(self, where: str, *, expected: str, remedy: str) -> None:
-        super().__init__(where, expected=expected, got=None)
-        self.args = (f"{where}: expected {expected}; {remedy}",)
+    def __init__(self, where: object, *, expected: str | None = None, remedy: str = "") -> None:
+        super().__init__(where, expected=expected)
+        if remedy:
+            self.args = (f"{self}; {remedy}",)

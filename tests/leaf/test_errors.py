@@ -1,3 +1,7 @@
+import pickle
+
+import pytest
+
 from dockair.errors import DockairError, MachineError
 
 
@@ -17,3 +21,19 @@ def test_machine_error_says_the_remedy_and_leaves_with_3():
     assert str(error) == "EGL: expected an off-screen context; apt install libegl1"
     assert error.exit_code == 3
     assert isinstance(error, DockairError)
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        DockairError("n", expected="a number", got=lambda: None),  # which cannot be pickled
+        MachineError("EGL", expected="an off-screen context", remedy="apt install libegl1"),
+    ],
+)
+def test_another_process_raises_the_same_line(error):
+    """Gymnasium's vector environments hand over the error and raise its type with it as the only argument."""
+    received = pickle.loads(pickle.dumps(error))
+    again = type(received)(received)
+    assert type(again) is type(error)
+    assert str(again) == str(received) == str(error)
+    assert again.exit_code == error.exit_code

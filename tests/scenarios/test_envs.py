@@ -222,6 +222,7 @@ def test_the_receiver_goes_along_where_the_tanker_has_announced_to_turn():
 
 
 def test_an_observation_is_finite_and_inside_its_space_when_the_navigation_knows_nothing(hand_made, env):
+    env.imu = None
     truth, _, _, solution = hand_made.tick(1)
     blind = replace(solution, valid=False, covariance=np.full((9, 9), np.nan), led_pixels_px=np.full((8, 2), np.nan))
     env._tick = Tick(truth=truth, imu=(), frame=None, solution=blind, outcome=None)
@@ -237,7 +238,7 @@ def test_an_observation_is_finite_and_inside_its_space_when_the_navigation_knows
 def test_the_observation_is_made_of_the_solution_and_the_gyro(hand_made, env):
     """It is not given the truth."""
     _, imu, _, solution = hand_made.tick(2)
-    observation = clipped(observation_from(solution, imu), env.observation_space)
+    observation = clipped(observation_from(solution, imu[-1]), env.observation_space)
     named = dict(zip([entry.name for entry in OBSERVATION], observation, strict=True))
     assert [named[f"gyro_{axis}"] for axis in "xyz"] == list(imu[-1].angular_rate_rad_s)
     assert named["v_PD_B_x"] == solution.v_PD_B[0]
@@ -294,9 +295,13 @@ def test_wrong_arguments_say_what_exists():
         ({"reward": "shaped"}, "exists: dense, sparse"),
         ({"attempts": 0}, "from 1 on"),
         ({"ticks_per_step": 0}, "from 1 on"),
+        ({"ticks_per_step": 1.5}, "ticks_per_step: expected an integer from 1 on, got 1.5"),
+        ({"attempts": "2"}, "attempts: expected an integer from 1 on, got '2'"),
+        ({"attempts": True}, "from 1 on"),
+        ({"scenario": 3}, "scenario: expected a name, a path or a Scenario, got 3"),
     ):
         with pytest.raises(DockairError, match=exists):
-            DockEnv(QUICK, **arguments)
+            DockEnv(**{"scenario": QUICK} | arguments)
     with pytest.raises(DockairError, match="exists: ring, sensor"):
         DockPixelsEnv(view="crop")
     with pytest.raises(DockairError, match="one that looks through the camera"):
@@ -305,6 +310,67 @@ def test_wrong_arguments_say_what_exists():
         DockEnv("no_such_scenario")
     with pytest.raises(DockairError, match="options: .*'scenari'.*exists: scenario, seed, set"):
         DockEnv(QUICK).reset(options={"scenari": "default"})
+
+
+@pytest.mark.parametrize(
+    ("options", "line"),
+    [
+        ({"set": "turbulence.sigma_m_s=1"}, "options.set: expected a dictionary"),
+        ({"seed": -1}, "options.seed: expected an integer from 0 on, got -1"),
+        ({"seed": 2.9}, "options.seed: expected an integer from 0 on, got 2.9"),
+        ({"seed": "x"}, "options.seed: expected an integer"),
+    ],
+)
+def test_a_wrong_option_is_refused_and_the_flight_goes_on(env, options, line):
+    env.reset(seed=0)
+    with pytest.raises(DockairError, match=line):
+        env.reset(options=options)
+    assert env.step(np.zeros(6, np.float32))[4]["outcome"] == ""
+
+
+def test_the_fast_environment_refuses_what_needs_pictures():
+    with pytest.raises(DockairError, match=r"navigation\.heading: expected false"):
+        DockFastEnv(load_scenario("default", {"navigation.heading": True}))
+
+
+def test_an_attempt_that_goes_on_when_time_is_over_has_failed_and_one_that_did_not_begin_has_not(env):
+    for trying, outcome, ends in ((True, "miss", (True, False)), (False, "timeout", (False, True))):
+        env.reset(seed=0, options={"set": {"flight.duration_s": 0.05}})
+        env._judge._trying = trying
+        *_, terminated, truncated, info = env.step(np.zeros(6, np.float32))
+        assert (info["outcome"], (terminated, truncated)) == (outcome, ends)
+
+
+def test_a_touch_between_two_control_ticks_begins_an_attempt(env, monkeypatch):
+    """Touches last a few milliseconds, a control tick ten."""
+    env.reset(seed=0)
+    world, ticks = env._flight.world, iter(range(1000))
+    step = world.step
+    monkeypatch.setattr(world, "step", lambda command: replace(step(command), probe_touches_drogue=next(ticks) == 3))
+    *_, info = env.step(np.zeros(6, np.float32))
+    assert not env.tick.truth.probe_touches_drogue
+    assert info["outcome"] == "rim_strike"  # four metres behind: over as soon as it has begun
+
+
+def test_until_clear_an_attempt_has_failed_when_the_next_begins(monkeypatch):
+    flown = DockEnv(QUICK, until_clear=True, reward="sparse")
+    flown.reset(seed=0)
+    referee, phases = flown._flight.referee, iter(["approach", "approach", "breakaway", "pre_contact", "approach"])
+    judge = referee.judge
+    monkeypatch.setattr(referee, "judge", lambda truth, phase, *rest, **more: judge(truth, next(phases), *rest, **more))
+    returned = [flown.step(np.zeros(6, np.float32)) for _ in range(5)]
+    flown.close()
+    assert [reward for _, reward, *_ in returned] == [0.0, 0.0, 0.0, 0.0, -1.0]
+    assert [info["attempt"] for *_, info in returned] == [1, 1, 1, 1, 2]
+
+
+def test_the_newest_sample_is_observed_until_the_next(env):
+    env.reset(seed=0, options={"set": {"faults": [{"kind": "gyro_drop_out", "start_s": 0.02, "stop_s": 9.0}]}})
+    for _ in range(3):
+        observation, *_ = env.step(np.zeros(6, np.float32))
+    named = dict(zip([entry.name for entry in OBSERVATION], observation, strict=True))
+    assert env.tick.imu == ()
+    assert [named[f"gyro_{axis}"] for axis in "xyz"] == list(env.imu.angular_rate_rad_s) != [0.0, 0.0, 0.0]
 
 
 @pytest.mark.slow
@@ -320,6 +386,19 @@ def test_the_third_persons_view_is_a_picture_of_the_world(env):
     assert not np.shares_memory(picture, again)
     seen.close()
     assert env.render() is None
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:.*ERROR")  # gymnasium tells of the error itself, too
+def test_what_a_vector_environments_process_raises_comes_back_as_one_line():
+    made = gymnasium.make_vec(
+        "dockair/Dock-v0", num_envs=1, vectorization_mode="async", vector_kwargs={"context": "spawn"}, scenario=QUICK
+    )
+    try:
+        with pytest.raises(DockairError, match="options: expected a known key, got 'sett'; exists: scenario"):
+            made.reset(seed=1, options={"sett": {}})
+    finally:
+        made.close()
 
 
 @pytest.mark.slow

@@ -4,6 +4,7 @@ import importlib
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -52,6 +53,19 @@ def test_the_scripted_policy_is_the_flight_of_the_same_seed(example):
 def test_the_controller_of_ones_own_docks(example, capsys):
     example("own_controller").main("still_air", "1", "dockair/DockFast-v0")
     assert capsys.readouterr().out.startswith("contact after")
+
+
+def test_the_controller_of_ones_own_holds_its_velocity_while_there_is_nothing_to_steer_to(example):
+    module = example("own_controller")
+    controller, blind = module.Controller(0.01), np.zeros(len(module.INDEX))
+    seen = blind.copy()
+    seen[module.INDEX["valid"]], seen[module.INDEX["p_PD_B_x"]] = 1.0, 6.0
+    before = module.action_for(controller, seen)
+    for _ in range(500):
+        action = module.action_for(controller, blind)
+    assert before[0] > 0.0
+    np.testing.assert_array_equal(action, [*before[:3], 0.0, 0.0, 0.0])
+    assert not controller.closing
 
 
 def test_the_navigator_of_ones_own_docks_and_is_judged_by_the_truth(example, capsys):

@@ -8,10 +8,9 @@ from dockair.scenarios.envs_judge import AttemptJudge
 from dockair.scenarios.referee import Outcome
 
 
-def _watch(judge: AttemptJudge, *xs: float, touches: bool = False, latched: bool = False):
+def _watch(judge: AttemptJudge, *xs: float, aside: float = 0.0, touches: bool = False, latched: bool = False):
     for x in xs:
-        truth = SimpleNamespace(p_DP=(x, 0.0, 0.0), probe_touches_drogue=touches, latched=latched)
-        failed, outcome = judge.watch(truth)
+        failed, outcome = judge.watch(SimpleNamespace(p_DP=(x, 0.6 * aside, 0.8 * aside), latched=latched), touches)
     return failed, outcome
 
 
@@ -29,6 +28,22 @@ def test_a_tip_that_flies_past_has_missed_a_metre_ahead():
     judge = AttemptJudge(1)
     assert _watch(judge, -0.1, 0.99) == (False, None)
     assert _watch(judge, 1.01) == (True, Outcome.MISS)
+
+
+def test_a_tip_that_goes_aside_has_missed_a_metre_off_the_axis():
+    judge = AttemptJudge(1)
+    assert _watch(judge, -0.1, 0.2, aside=0.99) == (False, None)
+    assert _watch(judge, 0.2, aside=1.01) == (True, Outcome.MISS)
+
+
+@pytest.mark.parametrize(("touches", "outcome"), [(True, Outcome.RIM_STRIKE), (False, Outcome.MISS)])
+def test_an_attempt_that_goes_on_when_time_is_over_has_failed(touches, outcome):
+    judge = AttemptJudge(1)
+    assert judge.unfinished is None
+    _watch(judge, -0.1, 0.1, touches=touches)
+    assert judge.unfinished is outcome
+    _watch(judge, -0.6)
+    assert judge.unfinished is None
 
 
 def test_a_probe_that_touched_and_went_back_struck_the_rim():

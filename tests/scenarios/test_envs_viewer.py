@@ -56,8 +56,15 @@ def _rows(path) -> dict[str, list]:
     return rows
 
 
+def _recording_id(path) -> str:
+    from rerun.chunk import RrdReader
+
+    return RrdReader(path).recordings()[0].recording_id
+
+
 def test_each_episode_is_a_recording_with_truth_and_belief_at_the_viewers_rate(shown, hand_made):
     assert len(shown) == 2
+    assert len({_recording_id(path) for path in shown}) == 2
     for path in shown:
         rows = _rows(path)
         ranges = [value[0] for value in rows["/plots/range/belief:Scalars:scalars"]]
