@@ -87,7 +87,7 @@ class Guidance:
         self._reckoning.step(middle, self._controller.steady_drift_m_s, self._u)
         self._count(state, ring, rate, coupling)
         self._change_phase(self._situation(ring, rate, coupling))
-        u_dot = self._follow(ring) if self._follows(state, ring) else self._hold_course()
+        u_dot = self._follow(ring) if self._follows(state, ring) else self._hold_course(ring)
         limit = np.array(self._settings.acceleration_limit_m_s2)
         change = self._dt * np.array(self._settings.jerk_limit_m_s3)
         if self._is_patient:
@@ -110,7 +110,7 @@ class Guidance:
     def _observe(self, state: RelativeState, ring: Array, rate: Array) -> None:
         """Show the drogue to the controller, and its distance from the probe's line to the prediction of the miss."""
         change = np.full(3, np.nan) if self._path.is_announced else self._axes.R_NB @ state.dv_WP_B
-        touches = self.phase in _TOUCHING or (self.phase is Phase.APPROACH and ring[0] <= 0.0)
+        touches = self.phase in _TOUCHING or (self.phase in (Phase.APPROACH, *_RETREATING) and ring[0] <= 0.0)
         if not state.usable or touches:  # a drogue that is pushed about by the probe would lead it astray
             self._controller.observe(None, change)
             return
@@ -196,6 +196,7 @@ class Guidance:
             lateral_m=float(np.hypot(ring[1], ring[2])),
             entered_m=self._entered_m,
             closing_m_s=-float(rate[0]),
+            committed=self._closure.committed,
             pushed_in_m=self._pushed_in_m,
             attempts=self._attempts,
         )
@@ -267,12 +268,13 @@ class Guidance:
         speeds = self._closure.speed_m_s, s.closure_speed_m_s
         return time_to_contact_s(s.closing, distance_m, *speeds, s.closure_acceleration_m_s2)
 
-    def _hold_course(self) -> Array:
+    def _hold_course(self, ring: Array) -> Array:
         """(3,) du/dt toward the drogue's drift, plus the speed along that the phase asks for."""
+        about_it = self.phase in _RETREATING and ring[0] <= 0.0  # it may come along: its drift would be one's own
         s, steady, touching = self._settings, self._controller.steady_drift_m_s, self.phase in _TOUCHING
         lost = self._unusable_s > 0.0 and not touching
         target = self._reckoning.believed(steady) if lost else self._controller.drift_m_s
-        if touching:
+        if touching or about_it:
             target[0] = steady[0]
         if self._path.is_announced and touching:  # the drogue has come along
             target += self._axes.turned(np.array([self._pushed_in_m, 0.0, 0.0]))

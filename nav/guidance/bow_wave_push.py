@@ -12,10 +12,11 @@ Not modelled: the push along the way, the turning of the source with the body, t
 Source: potential flow about a Rankine half-body; c from the swing, omega^2 times the hose's length.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from dockair.nav.guidance.drogue_motion import frequency_ratio
 from dockair.rotations import Array
 
 
@@ -25,9 +26,14 @@ class BowWavePush:
 
     source_from_tip_m: tuple[float, float, float] = (-1.575, 0.9, -0.65)  # of the probe, body axes
     radius_m: float = 0.0  # R; 0: no bow wave
-    side_acceleration_m_s2: float = 60.0  # c: (2 pi 0.32 Hz)^2 times 15 m
+    side_acceleration_m_s2: float = 60.0  # c: (2 pi 0.32 Hz)^2 times 15 m, at 180 m/s and 6000 m
     learning_share: float = 0.4  # of a miss that the next attempt corrects; the rest is taken for chance
     learnt_max_m: float = 0.15  # a miss beyond this was not the bow wave's
+
+    def at_pressure(self, dynamic_pressure_pa: float) -> "BowWavePush":
+        """Return the same for another dynamic pressure [Pa]: c goes with the square of the swing's frequency."""
+        c = self.side_acceleration_m_s2 * frequency_ratio(dynamic_pressure_pa) ** 2
+        return replace(self, side_acceleration_m_s2=c)
 
     def at(self, p_PD_m: Array) -> Array:
         """(..., 3) b with the ring's centre at p_PD (..., 3) from the probe's tip, forward left up [m/s^2]."""

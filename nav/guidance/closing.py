@@ -13,7 +13,7 @@ Within d of the ring it cannot be called back any more (`closure`).
 """
 
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -24,7 +24,7 @@ class ClosingSettings:
 
     swing_s: float = 3.0  # the drogue's period at 0.33 Hz
     error_time_s: float = 0.4  # T_e: an error of the following is another one half a response and a half swing later
-    deceleration_m_s2: float = 0.6  # a: with idle thrust a fighter slows by 0.8
+    deceleration_m_s2: float = 0.6  # a: of a fighter, whose flight control is asked for 0.76 at most
     response_s: float = 0.45  # tau along, engine and all
     hopeful: float = 1.7  # times radius and swing while running up: within a second it may become good
     run_up_m_s: float = 0.9  # c until committed: quick enough to gain 1.2 m/s on the rest, and stopped within 0.7 m
@@ -33,6 +33,15 @@ class ClosingSettings:
     wait_at_m: float = 2.8  # from the ring: room to gain the speed of the run-up before the last moment
     retreat_m_s: float = 0.8  # to that place: walking pace, a second try within a few swings
     margin_m: float = 0.7  # short of the ring, at rest: half of it goes as drogue and receiver come together by gusts
+
+    def braked_at(self, deceleration_m_s2: float) -> "ClosingSettings":
+        """Return the same for an airframe that brakes less: it runs up so that it stops within the same room."""
+        a, tau = deceleration_m_s2, self.response_s
+        if a >= self.deceleration_m_s2:
+            return self
+        room_m = room_to_stop_m(self, self.run_up_m_s) - self.margin_m
+        run_up_m_s = float(np.sqrt((a * tau) ** 2 + 2.0 * a * room_m) - a * tau)  # (2) for c
+        return replace(self, deceleration_m_s2=a, run_up_m_s=run_up_m_s)
 
 
 class PredictedMiss:

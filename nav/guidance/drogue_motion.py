@@ -36,6 +36,7 @@ from dockair.rotations import Array
 
 _FIRST = 2  # of the states: m and d, then place and rate of each mode, then g
 _FITTED_AT_PA = 10_690.0  # dynamic pressure at 180 m/s and 6000 m
+_FITTED_STEP_S = 0.01
 _STIFFENS = 0.4  # frequencies over dynamic pressure: at 120 m/s and 3000 m, 0.61 of it, 0.83 foretells best
 
 
@@ -80,18 +81,24 @@ class SwingSettings:
     drift_kept_sigma_m_s: float = 0.1  # of d where the swing alone is begun anew: it has not changed much meanwhile
     learning_s: float = 12.0  # after which the gains stay the same: drift and swing are told apart within a few periods
     drift_density: float = 0.03  # of d' [m/s^2/sqrt(Hz)]: the inertial velocity's drift, gusts far below the swing
-    #: Of the place, and of its rate. The camera knows the place across to a millimetre, but for what does not change;
-    #: the fusion's rate is as good as its own model of the drogue, 0.05 m/s left and 0.08 m/s up in error.
+    #: Of the place, and of its rate, in a tick of 0.01 s; at other rates the same white noise. The camera knows the
+    #: place across to a millimetre, but for what does not change; the fusion's rate is as good as its own model of the
+    #: drogue, 0.05 m/s left and 0.08 m/s up in error.
     position_sigma_m: tuple[float, float, float] = (0.02, 0.002, 0.002)
     rate_sigma_m_s: tuple[float, float, float] = (0.05, 0.12, 0.12)
     rate_lag_s: float = 0.015  # tau_v: half a frame, its way here, and what the fusion's own filter needs
 
     def at(self, dynamic_pressure_pa: float) -> "SwingSettings":
         """Return the same for another dynamic pressure [Pa], which stretches the hose more or less across."""
-        k = (dynamic_pressure_pa / _FITTED_AT_PA) ** _STIFFENS
+        k = frequency_ratio(dynamic_pressure_pa)
         across = ((mode.frequency_hz[0], k * mode.frequency_hz[1], k * mode.frequency_hz[2]) for mode in self.modes)
         modes = (replace(mode, frequency_hz=f) for mode, f in zip(self.modes, across, strict=True))
         return replace(self, modes=tuple(modes))
+
+
+def frequency_ratio(dynamic_pressure_pa: float) -> float:
+    """Return the modes' frequencies across at a dynamic pressure [Pa], of those that the settings have."""
+    return float((dynamic_pressure_pa / _FITTED_AT_PA) ** _STIFFENS)
 
 
 class DrogueMotion:
@@ -325,6 +332,7 @@ def _gains(settings: SwingSettings, axis: int, step_s: float, drift_sigma_m_s: f
     loan = expm(np.block([[-A, drive], [np.zeros_like(A), A.T]]) * step_s)
     F = loan[n:, n:].T
     Q, R = F @ loan[:n, n:], np.diag([settings.position_sigma_m[axis], settings.rate_sigma_m_s[axis]]) ** 2
+    R *= _FITTED_STEP_S / step_s
     P, gains = np.zeros((n, n)), []
     P[_FIRST:, _FIRST:] = solve_continuous_lyapunov(A[_FIRST:, _FIRST:], -drive[_FIRST:, _FIRST:])  # any moment
     P[0, 0], P[1, 1] = P[_FIRST, _FIRST], drift_sigma_m_s**2

@@ -77,6 +77,7 @@ class Situation:
     lateral_m: float  #: ring centre off the probe's line
     entered_m: float  #: the same where the tip came past the ring's plane, 0 before it
     closing_m_s: float  #: rate at which `ring_ahead_m` shrinks
+    committed: bool  #: too near to be called back
     pushed_in_m: float  #: way flown toward the tanker since the coupling was reached
     attempts: int  #: approaches begun
 
@@ -84,12 +85,17 @@ class Situation:
 _Condition = Callable[[PhaseLimits, Situation], bool]
 
 
+def _is_close(limits: PhaseLimits, s: Situation) -> bool:
+    """Within the range by what is believed; also where that runs away from a receiver that is committed, or is NaN."""
+    return s.committed or not s.ahead_m >= limits.lost_range_m
+
+
 def _lost(limits: PhaseLimits, s: Situation) -> bool:
-    return s.track_lost_s > limits.lost_s and s.ahead_m < limits.lost_range_m
+    return s.track_lost_s > limits.lost_s and _is_close(limits, s)
 
 
 def _doubtful(limits: PhaseLimits, s: Situation) -> bool:
-    return s.doubtful_s > limits.lost_s and s.ahead_m < limits.lost_range_m
+    return s.doubtful_s > limits.lost_s and _is_close(limits, s)
 
 
 def _off_axis(limits: PhaseLimits, s: Situation) -> bool:
@@ -102,11 +108,12 @@ def _beside(limits: PhaseLimits, s: Situation) -> bool:
 
 
 def _left(limits: PhaseLimits, s: Situation) -> bool:
-    return abs(s.ahead_m) > limits.come_along_m or s.unusable_s > limits.lost_s
+    return abs(s.ahead_m) > limits.come_along_m or s.track_lost_s > limits.lost_s
 
 
 def _far_enough(limits: PhaseLimits, s: Situation) -> bool:
-    return (s.ring_ahead_m >= limits.clear_m and s.unusable_s == 0.0) or s.in_phase_s >= limits.breakaway_s
+    seen_clear = s.unusable_s == 0.0 and s.ring_ahead_m >= limits.clear_m and s.closing_m_s <= 0.0
+    return seen_clear or s.in_phase_s >= limits.breakaway_s
 
 
 @dataclass(frozen=True, slots=True)

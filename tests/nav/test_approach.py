@@ -336,6 +336,35 @@ def test_a_lost_track_close_in_is_a_breakaway():
     assert phases[:3] == [Phase.PRE_CONTACT, Phase.APPROACH, Phase.BREAKAWAY]
 
 
+@pytest.mark.parametrize("place_m", [(1.8, 0.0, 0.0), (float("nan"),) * 3])
+def test_a_committed_receiver_breaks_away_wherever_it_believes_the_lost_drogue_to_be(place_m):
+    """A belief that runs away from the receiver, or is none, had let it fly on for 20 s."""
+    guidance, plant = Guidance(SETTINGS, RATE_HZ), Plant()
+    now = plant.step(ReceiverCommand())
+    while not guidance._closure.committed:
+        now = plant.step(guidance.step(now))
+    for k in range(RATE_HZ):
+        lost = state(np.add(place_m, [0.5 * k / RATE_HZ, 0.0, 0.0]), [0.5, 0.0, 0.0], usable=False)
+        guidance.step(dataclasses.replace(lost, contact_usable=False))
+        if guidance.phase is not Phase.APPROACH:
+            break
+    assert (guidance.phase, guidance.phase_reason) == (Phase.BREAKAWAY, "track lost")
+    assert k / RATE_HZ == pytest.approx(SETTINGS.limits.lost_s, abs=2.1 / RATE_HZ)
+
+
+def test_a_retreat_from_a_drogue_that_comes_along_gains_no_speed():
+    """Followed, it would drift as fast as the receiver itself goes back, and that would be added to what is flown."""
+    guidance, plant = Guidance(SETTINGS, RATE_HZ), Plant()
+    now = plant.step(ReceiverCommand())
+    while not guidance._closure.committed:
+        now = plant.step(guidance.step(now))
+    guidance.phase, guidance._in_phase_s = Phase.BACK_OFF, 0.0
+    back = [guidance.step(state([-0.15, 0.0, 0.0])).velocity_m_s[0] for _ in range(6 * RATE_HZ)]
+    assert guidance.phase is Phase.BACK_OFF
+    assert back[-1] == pytest.approx(-SETTINGS.back_off_speed_m_s, abs=0.05)
+    assert min(back) > -1.1 * SETTINGS.back_off_speed_m_s
+
+
 @pytest.mark.parametrize("settings", [SETTINGS, PID])
 def test_commands_respect_their_limits(settings):
     guidance = Guidance(settings, RATE_HZ)

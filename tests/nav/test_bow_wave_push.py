@@ -33,3 +33,10 @@ def test_a_share_of_a_miss_is_learnt_and_never_more_than_the_bow_wave_could_do()
         aim = PUSH.learnt(aim, np.array([3.0, 4.0]))
     assert np.hypot(*aim) == pytest.approx(PUSH.learnt_max_m)
     np.testing.assert_allclose(aim / np.hypot(*aim), [0.6, 0.8], atol=1e-3)
+
+
+def test_where_the_drogue_swings_more_slowly_it_is_pushed_less():
+    """c = omega^2 L: at 0.61 of the dynamic pressure the swing has 0.61^0.4 of its frequency."""
+    push = BowWavePush(radius_m=0.9)
+    at = np.array([1.0, 0.0, 0.0])
+    np.testing.assert_allclose(push.at_pressure(0.61 * 10_690.0).at(at), 0.61**0.8 * push.at(at), rtol=1e-12)

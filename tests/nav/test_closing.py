@@ -48,6 +48,18 @@ def test_a_receiver_that_brakes_after_its_response_time_stops_the_margin_short()
     assert room_to_stop_m(SETTINGS, 0.0) == room_to_stop_m(SETTINGS, -0.5) == SETTINGS.margin_m
 
 
+@pytest.mark.parametrize("deceleration", [0.2, 0.3, 0.5])
+def test_an_airframe_that_brakes_less_runs_up_so_that_it_stops_within_the_same_room(deceleration):
+    weak = SETTINGS.braked_at(deceleration)
+    assert weak.deceleration_m_s2 == deceleration
+    assert weak.run_up_m_s < SETTINGS.run_up_m_s
+    assert room_to_stop_m(weak, weak.run_up_m_s) == pytest.approx(room_to_stop_m(SETTINGS, SETTINGS.run_up_m_s))
+
+
+def test_an_airframe_that_brakes_more_runs_up_no_faster():
+    assert SETTINGS.braked_at(5.0) == SETTINGS
+
+
 @pytest.mark.parametrize("closure", [0.0, 0.5, 1.2])
 @pytest.mark.parametrize("distance", [0.1, 1.0, 2.5])
 def test_time_to_contact_is_that_of_the_ramp_flown_a_response_time_later(closure, distance):

@@ -12,14 +12,14 @@ SETTINGS, STEP_S, FULL_M_S, RAMP_M_S2 = ClosingSettings(), 0.01, 1.2, 0.6
 LAG_S, BRAKES_M_S2 = 0.3, 0.75
 
 
-def _flown(moment, seconds=60.0, settings=SETTINGS, start_m=4.0, blown_m_s=0.0):
+def _flown(moment, seconds=60.0, settings=SETTINGS, start_m=4.0, blown_m_s=0.0, brakes=BRAKES_M_S2):
     """Distance and speed tick by tick of a tip with a first-order lag; `moment(t, distance)` says miss and unrest."""
     closure, distance, speed, out = Closure(settings, FULL_M_S, RAMP_M_S2, STEP_S), start_m, blown_m_s, []
     for i in range(round(seconds / STEP_S)):
         miss, unrest = moment(i * STEP_S, distance)
         closure.step(distance, speed, known=np.isfinite(miss), miss=miss, unrest=unrest)
         wanted = (closure.speed_m_s + blown_m_s - speed) / LAG_S
-        speed += STEP_S * float(np.clip(wanted, -BRAKES_M_S2, BRAKES_M_S2))
+        speed += STEP_S * float(np.clip(wanted, -brakes, brakes))
         distance -= STEP_S * speed
         out.append((distance, speed, closure.committed))
         if distance <= 0.0:
@@ -75,3 +75,18 @@ def test_a_tip_that_is_blown_closer_is_called_back_earlier():
     assert min(near) > SETTINGS.margin_m
     deaf = dataclasses.replace(SETTINGS, margin_m=SETTINGS.margin_m - 0.4)
     assert _flown(lambda t, d: (1.3, 0.5), 9.0, deaf)[:, 0].min() < near[0] - 0.3
+
+
+def test_an_airframe_that_brakes_half_as_well_is_called_back_short_of_the_ring_too():
+    """And still closes at full speed. With the other's run-up it comes twice as near."""
+    brakes = 0.38
+    settings = SETTINGS.braked_at(0.8 * brakes)
+    near, nearer = (
+        _flown(lambda t, d: (1.3, 0.5), 9.0, each, brakes=brakes, blown_m_s=0.2)[:, 0].min()
+        for each in (settings, SETTINGS)
+    )
+    assert near > SETTINGS.margin_m
+    assert nearer < near - 0.2
+    path = _flown(lambda t, d: (0.5, 0.5), settings=settings, brakes=brakes)
+    assert path[-1, 0] <= 0.0
+    assert path[-1, 1] == pytest.approx(FULL_M_S, abs=0.1)

@@ -3,10 +3,11 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from dockair.nav.guidance.drogue_motion import DrogueMotion, HoseMode, SwingSettings, _dynamics
+from dockair.nav.guidance.drogue_motion import DrogueMotion, HoseMode, SwingSettings, _dynamics, _place_row
 
 STEP_S, LEAD_S = 0.01, np.array([0.4, 0.17, 0.14])
 CALM = STILL = np.zeros(3)
@@ -251,3 +252,17 @@ def test_the_middle_of_the_swing_is_told_from_the_place():
     for seconds in np.arange(30.0, 34.0, 0.4):  # at any moment of the swing
         _, motion = follow(lambda t: 1.0 + 0.4 * np.sin(omega * t), lambda t: 0.4 * omega * np.cos(omega * t), seconds)
         assert np.abs(motion.middle_m - 1.0)[1:].max() < 0.4 / 3.0
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_the_filter_answers_as_fast_at_another_control_rate(axis):
+    """Poles of its error, (I - K H) F, as rates [1/s]: the noise of what is seen is white, not one of ticks."""
+
+    def poles_1_s(hz):
+        motion = DrogueMotion(SwingSettings(), 1.0 / hz, LEAD_S, 0.1)
+        H = np.stack([_place_row(9), motion._seen_rate[axis]])
+        error = (np.eye(9) - motion._K[-1, axis] @ H) @ motion._F[axis]
+        return np.sort(np.abs(np.log(np.linalg.eigvals(error)) * hz))
+
+    for hz in (50, 180):
+        np.testing.assert_allclose(poles_1_s(hz), poles_1_s(100), rtol=0.01)
