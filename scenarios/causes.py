@@ -15,6 +15,7 @@ not flown. The largest share names the cause. Rules, the first that holds:
 | diverged         | the simulation broke down during the attempt                                                     |
 | departed         | the receiver departed from controlled flight before the attempt ended                            |
 | out_of_time      | the flight's time ran out during the attempt                                                     |
+| collision        | the coupling held the probe in the attempt, and then the receiver struck something               |
 | detection        | the solution was not valid for half of the last second                                           |
 | integrity        | it was valid, and marked as not to be flown into contact for half of the last second             |
 | outside_limits   | the tip entered the basket inside the capture radius and was held, too fast or at too wide an    |
@@ -55,11 +56,11 @@ from dockair.sim.truth import Truth
 
 #: Causes that faults of LEDs, camera and IMU can bring about, and those of the reel.
 _OF_SENSORS = ("detection", "integrity", "ambiguity", "navigation_error", "called_off", "never_steady")
-_OF_REEL = ("gust", "bow_wave", "control_limit", "outside_limits", "not_held", "never_steady")
+_OF_REEL = ("gust", "bow_wave", "control_limit", "outside_limits", "not_held", "collision", "never_steady")
 
 CAUSES = (
-    "diverged", "departed", "out_of_time", "detection", "integrity", "outside_limits", "not_held", "called_off",
-    "ambiguity", "navigation_error", "gust", "bow_wave", "control_limit", "fault", "never_steady",
+    "diverged", "departed", "out_of_time", "collision", "detection", "integrity", "outside_limits", "not_held",
+    "called_off", "ambiguity", "navigation_error", "gust", "bow_wave", "control_limit", "fault", "never_steady",
 )  # fmt: skip
 
 
@@ -130,7 +131,8 @@ def with_cause(attempt: Attempt, flown: Flown, rules: CauseRules | None = None) 
     if is_good_contact(attempt, rules.limits):
         return attempt
     cause = _cause(attempt, flown, rules)
-    return replace(attempt, cause=_or_fault(cause, attempt.begun_s, attempt.decided_s, flown))
+    until_s = flown.truths[-1].time_s if cause == "collision" else attempt.decided_s  # what ends a hold comes later
+    return replace(attempt, cause=_or_fault(cause, attempt.begun_s, until_s, flown))
 
 
 def cause_of_flight(attempts: Sequence[Attempt], flown: Flown, rules: CauseRules | None = None) -> str:
@@ -170,6 +172,8 @@ def _cause(attempt: Attempt, flown: Flown, rules: CauseRules) -> str:
         return "departed"
     if attempt.outcome == AttemptOutcome.TIMEOUT.value:
         return "out_of_time"
+    if attempt.outcome == AttemptOutcome.COLLISION.value and _was_held(attempt, flown):
+        return "collision"
     called_off = attempt.outcome in (AttemptOutcome.GIVEN_UP.value, AttemptOutcome.BREAKAWAY.value)
     k = flown.tick_at(attempt.ended_s if called_off else attempt.decided_s)
     last = range(max(k + 1 - _ticks(rules.look_back_s, flown), 0), k + 1)
@@ -185,6 +189,11 @@ def _cause(attempt: Attempt, flown: Flown, rules: CauseRules) -> str:
             return "outside_limits"
         return "called_off" if called_off else "not_held"
     return _largest_share(k, miss, flown, rules)
+
+
+def _was_held(attempt: Attempt, flown: Flown) -> bool:
+    """Whether the coupling held the probe since a collision's attempt began: the flight ends with the collision."""
+    return any(truth.latched for truth in flown.truths[flown.tick_at(attempt.begun_s) :])
 
 
 def _largest_share(k: int, miss: Array, flown: Flown, rules: CauseRules) -> str:

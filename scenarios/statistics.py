@@ -11,6 +11,7 @@ Source: (1), (2) [Wilson 1927, J. Am. Stat. Assoc. 22, 209].
 
 import math
 
+import numpy as np
 from scipy.special import bdtr, ndtri
 
 CONFIDENCE = 0.95  #: of the intervals that are shown
@@ -53,3 +54,17 @@ def largest_rejected_count(trials: int, rate: float, false_alarm: float) -> int:
     while count + 1 < trials and probability_of_at_most(count + 1, trials, rate) < false_alarm:
         count += 1
     return count
+
+
+def trials_to_reject_none(rate: float, false_alarm: float) -> float:
+    """Return the smallest n with (1 - p)^n < false_alarm, Eq. (3) of no success; a float, for it may be infinite.
+
+    Args:
+        rate: p, above 0.
+        false_alarm: below 1.
+    """
+    if rate >= 1.0:
+        return 1.0
+    about = float(np.ceil(math.log(false_alarm) / math.log1p(-rate)))
+    # where the quotient is a whole number, rounding and "<" decide which of three it is
+    return next((n for n in (about - 1.0, about) if n >= 1.0 and (1.0 - rate) ** n < false_alarm), about + 1.0)

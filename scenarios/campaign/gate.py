@@ -4,11 +4,15 @@ A rate p is asked, K of n flights have succeeded. The test fails if so few are t
 
     P(K <= k | n, p) < false_alarm / m                                               (1)
 
-m being the number of such tests in the campaign: a build whose true rates are those asked, or better, fails with a
-probability below false_alarm in all (the union bound), whatever the flights of one seed have in common with another
-scenario's. A flight that ends in an error is no success. Unsafe contacts and errors are counted, not tested.
+m being the number of such tests in the campaign: a build whose true rates are those asked, or better, fails one of them
+with a probability below false_alarm in all (the union bound), whatever the flights of one seed have in common with
+another scenario's. Within a test flights must be independent, so that no seed may occur twice there: its flights share
+gusts and hardware. A flight that ends in an error is no success.
+
+Unsafe contacts and errors are counted, not tested: the bound says nothing of these limits.
 """
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -16,7 +20,7 @@ from typing import Any
 from dockair.errors import DockairError
 from dockair.scenarios.campaign.plan import Gate
 from dockair.scenarios.report.groups import Group, groups_of
-from dockair.scenarios.statistics import largest_rejected_count, probability_of_at_most
+from dockair.scenarios.statistics import largest_rejected_count, probability_of_at_most, trials_to_reject_none
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,7 +42,7 @@ class Verdict:
     """What the gate says."""
 
     passed: bool
-    false_alarm: float  #: of all tests together, at most
+    false_alarm: float  #: of all tests of rates together, at most
     tests: tuple[RateTest, ...]
     unsafe: int
     errors: int
@@ -80,7 +84,7 @@ def judge(gate: Gate, rows: Sequence[Mapping[str, Any]]) -> Verdict:
 
 
 def require_power(gate: Gate, rows: Sequence[Mapping[str, Any]], where: str) -> None:
-    """Refuse a gate that would pass a build that never docks.
+    """Refuse a gate that would pass a build that never docks, or one whose probability of a false alarm is not known.
 
     Args:
         gate: what is asked.
@@ -88,16 +92,26 @@ def require_power(gate: Gate, rows: Sequence[Mapping[str, Any]], where: str) -> 
         where: the gate's place, to be named.
 
     Raises:
-        DockairError: too few flights for a rate.
+        DockairError: too few flights for a rate, or a seed twice among those it is tested on.
     """
-    verdict = judge(gate, rows)
-    for test in verdict.tests:
+    asked = _asked(gate, rows)
+    for group, name, _ in asked:
+        _require_each_seed_once(group, f"{where}.{name}")
+    false_alarm = gate.false_alarm / max(len(asked), 1)
+    for group, name, rate in asked:
+        test = _test(group, name, rate, false_alarm)
         if test.passed:
-            needed = test.flights
-            while probability_of_at_most(0, needed, test.asked) >= gate.false_alarm / len(verdict.tests):
-                needed += 1
-            expected = f"{needed} flights or more, or another false_alarm: with fewer it never fails"
-            raise DockairError(f"{where}.{test.rate}", expected=expected, got=f"{test.flights} ({test.group})")
+            needed = trials_to_reject_none(rate, false_alarm)
+            expected = f"{needed:.0f} flights or more, or another false_alarm: with fewer it never fails"
+            raise DockairError(f"{where}.{name}", expected=expected, got=f"{test.flights} ({test.group})")
+
+
+def _require_each_seed_once(group: Group, where: str) -> None:
+    """Refuse flights that are not independent: Eq. (1) would fail a good build more often than it says."""
+    seed, times = Counter(row["seed"] for row in group.rows).most_common(1)[0]
+    if times > 1:
+        expected = "every seed once among the flights of a test, for flights of one seed share gusts and hardware"
+        raise DockairError(where, expected=expected, got=f"seed {seed} {times} times ({group.title})")
 
 
 def _asked(gate: Gate, rows: Sequence[Mapping[str, Any]]) -> list[tuple[Group, str, float]]:

@@ -9,7 +9,7 @@ import numpy as np
 from dockair.rotations import Array
 from dockair.scenarios.accept import Accept
 from dockair.scenarios.campaign.jobs import Job
-from dockair.scenarios.report.groups import Group, Share, groups_of
+from dockair.scenarios.report.groups import Group, Row, Share, groups_of
 
 
 def summary_of(rows: Sequence[Mapping[str, Any]], jobs: Sequence[Job]) -> list[dict[str, Any]]:
@@ -19,10 +19,14 @@ def summary_of(rows: Sequence[Mapping[str, Any]], jobs: Sequence[Job]) -> list[d
         rows: of all flights.
         jobs: likewise; their scenarios say what is claimed, where the plan changes nothing of them.
     """
-    claims: dict[tuple[str, str], Accept] = {
-        (job.scenario.name, job.scenario.sensing): job.scenario.accept for job in jobs if job.as_written
-    }
-    return [_group(group, claims.get((group.scenario, group.sensing))) for group in groups_of(rows)]
+    claims = {(job.scenario_hash, job.seed): job.scenario.accept for job in jobs if job.as_written}
+    return [_group(group, _claimed(group.rows, claims)) for group in groups_of(rows)]
+
+
+def _claimed(rows: Sequence[Row], claims: Mapping[tuple[str, int], Accept]) -> Accept | None:
+    """Return what all of a group's flights claim; None where one of them is not as written, or they differ."""
+    found = [claims.get((row["scenario_hash"], row["seed"])) for row in rows]
+    return found[0] if all(claim == found[0] for claim in found) else None
 
 
 def _group(group: Group, claimed: Accept | None) -> dict[str, Any]:
@@ -32,10 +36,13 @@ def _group(group: Group, claimed: Accept | None) -> dict[str, Any]:
         "navigator": group.navigator,
         "controller": group.controller,
         "flights": len(group.rows),
+        "seeds": group.seeds,
+        "independent": group.independent,
         "first_attempt": _share(group.first_attempt),
         "success": _share(group.success),
         "outcomes": dict(Counter(row["outcome"] for row in group.rows).most_common()),
         "causes": dict(group.causes),
+        "causes_of_flights_without_attempt": dict(group.causes_without_attempt),
         "unsafe": len(group.unsafe),
         "errors": len(group.failed_to_fly),
         "shortfalls": None if claimed is None else claimed.judge(group.rows),

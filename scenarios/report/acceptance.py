@@ -1,19 +1,23 @@
-"""What a group's scenario claims, and what it lacks of the figures that it is held to."""
+"""What a group's scenario claims, and what it lacks of the figures that it is held to.
+
+Both are of the library's scenarios alone, and of flights as these are written: with no key set, and so neither of
+perfect navigation in place of the camera nor of another controller. A file of one's own may have changed since it was
+flown, or be another one from here; its campaign's summary says what it claims.
+"""
 
 import shlex
 from collections.abc import Sequence
 
-from dockair.errors import DockairError
-from dockair.scenarios.report.groups import Group
+from dockair.scenarios.report.groups import Group, Row
+from dockair.scenarios.scenario_file import scenario_names
 from dockair.scenarios.schema import Scenario, load_scenario
 
 
 def scenario_of(group: Group) -> Scenario | None:
-    """Return the scenario as its file says it; None where that file is not to be found any more."""
-    try:
-        return load_scenario(shlex.split(group.rows[0]["command"])[2])
-    except DockairError:
-        return None
+    """Return the library's scenario that all of the group's flights flew as it is written, None if there is none."""
+    names = {_flown_as_written(row) for row in group.rows}
+    name = names.pop() if len(names) == 1 else ""
+    return load_scenario(name) if name in scenario_names() else None
 
 
 def claim_of(group: Group) -> str:
@@ -23,13 +27,14 @@ def claim_of(group: Group) -> str:
 
 
 def shortfalls_of(group: Group) -> Sequence[str] | None:
-    """Return what the group lacks; None where nothing is asked of it.
-
-    A scenario's figures are asked of flights as it is written: with no key set, and so neither of perfect navigation
-    in place of its camera nor of another controller.
-    """
+    """Return what the group lacks; None where nothing is asked of it."""
     scenario = scenario_of(group)
     if scenario is None or not scenario.accept.claims_figures:
         return None
-    as_written = not any(" --set " in row["command"] for row in group.rows)
-    return scenario.accept.judge(group.rows) if as_written else None
+    return scenario.accept.judge(group.rows)
+
+
+def _flown_as_written(row: Row) -> str:
+    """Return the scenario's name or path from the flight's command; "" where a key is set."""
+    _, _, name, _, _, *settings = shlex.split(row["command"])
+    return "" if settings else name

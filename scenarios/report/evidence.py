@@ -9,9 +9,9 @@ import numpy as np
 from dockair.rotations import Array
 from dockair.scenarios.report.acceptance import shortfalls_of
 from dockair.scenarios.report.folders import Campaign
-from dockair.scenarios.report.groups import Group, Share, groups_of, paired
+from dockair.scenarios.report.groups import Group, Paired, Share, groups_of, paired
 
-_MANIFEST = ("plan", "flights", "seeds", "commit", "uncommitted_changes", "code", "versions", "begun")
+_MANIFEST = ("plan", "flights", "seeds", "commit", "uncommitted_changes", "code", "plug_ins", "versions", "begun")
 
 
 def evidence_of(campaigns: Sequence[Campaign]) -> dict[str, Any]:
@@ -37,6 +37,8 @@ def _group(group: Group, groups: Sequence[Group]) -> dict[str, Any]:
         "navigator": group.navigator,
         "controller": group.controller,
         "flights": len(group.rows),
+        "seeds": group.seeds,
+        "independent": group.independent,
         "errors": len(group.failed_to_fly),
         "first_attempt": _share(group.first_attempt),
         "success": _share(group.success),
@@ -48,12 +50,16 @@ def _group(group: Group, groups: Sequence[Group]) -> dict[str, Any]:
         "unsafe_seeds": [row["seed"] for row in group.unsafe],
         "outcomes": dict(group.outcomes),
         "causes_of_failed_attempts": dict(group.causes),
+        "causes_of_flights_without_attempt": dict(group.causes_without_attempt),
         "failed_seeds": [row["seed"] for row in group.flown if not row["first_attempt"]],
-        "beside_perfect_navigation": None
-        if pair is None
-        else {"seeds": pair.seeds, "ours": pair.ours, "perfect": pair.truth, "ratio": _finite(pair.ratio)},
+        "beside_perfect_navigation": None if pair is None else _pair(pair),
         "shortfalls": None if shortfalls is None else list(shortfalls),
     }
+
+
+def _pair(pair: Paired) -> dict[str, Any]:
+    counts = {"flights": pair.flights, "seeds": pair.seeds, "ours": pair.ours, "perfect": pair.truth}
+    return counts | {"ratio": _finite(pair.ratio)}
 
 
 def _share(share: Share) -> dict[str, Any]:

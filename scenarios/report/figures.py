@@ -3,7 +3,7 @@
 import io
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import matplotlib as mpl
@@ -12,10 +12,15 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
+from dockair.rotations import Array
 from dockair.scenarios.report.groups import CAPTURE_M, CLOSING_BAND_M_S, Group, Share
 
 RIM_M = 0.25  # the LED ring's radius
 CLOSING_LIMIT_M_S = 2.6
+_FRAME_M = 0.6  # half the side of the picture of where tips went
+_CLOSING_AXIS_M_S = 2.8
+#: Outcomes of attempts whose tip never crossed the ring's plane; of a collision or a strike it may have, or not.
+_NOT_CROSSED = ("breakaway", "given_up", "timeout", "diverged")
 _TIMELINES = 40  # flights whose phases are drawn
 _PHASE_COLOURS = {
     "join_up": "#d9d9d9",
@@ -47,7 +52,7 @@ def overview(groups: Sequence[Group]) -> str:
         for k, group in enumerate(groups):
             _share(ax, k - 0.13, group.success, "tab:blue", "o", "any attempt" if k == 0 else None)
             _share(ax, k + 0.13, group.first_attempt, "tab:orange", "s", "first attempt" if k == 0 else None)
-        ax.set_yticks(range(len(groups)), [f"{g.scenario} ({g.sensing}, {g.controller})" for g in groups])
+        ax.set_yticks(range(len(groups)), [g.label + g.mark for g in groups])
         ax.invert_yaxis()
         ax.set_xlim(-2.0, 102.0)
         ax.set_xlabel("contact inside the limits [%], 95 % interval")
@@ -77,30 +82,58 @@ def _share(ax: Axes, y: float, share: Share, colour: str, marker: str, label: st
 
 
 def _scatter(ax: Axes, group: Group) -> None:
-    ax.set_title("where the tip crossed the ring's plane")
-    for outcome, colour, label in (("contact", "tab:blue", "contact"), (None, "tab:red", "no contact")):
-        chosen = [a for a in group.attempts if (a["outcome"] == "contact") == (outcome is not None)]
-        places = np.array([[_number(a.get("left_m")), _number(a.get("up_m"))] for a in chosen]).reshape(-1, 2)
-        ax.scatter(-places[:, 0], places[:, 1], s=12, color=colour, alpha=0.6, linewidths=0, label=label)
+    ax.set_title("the tip in the ring's plane, or where it came nearest")
+    contacts, others, short = _by_crossing(group.attempts)
+    kinds = (
+        (contacts, "o", "tab:blue", "contact"),
+        (others, "o", "tab:red", "no contact"),
+        (short, "x", "tab:red", "plane not crossed"),
+    )
+    for chosen, marker, colour, label in kinds:
+        right, up = _places(chosen).clip(-_FRAME_M, _FRAME_M).T
+        ax.scatter(
+            right, up, s=12, marker=marker, color=colour, alpha=0.6, linewidths=float(marker == "x"), label=label,
+            clip_on=False,
+        )  # fmt: skip
+    outside = int((np.abs(_places(group.attempts)) > _FRAME_M).any(axis=1).sum())
     ax.add_patch(Circle((0.0, 0.0), CAPTURE_M, fill=False, color="tab:green", linestyle="--"))
     ax.add_patch(Circle((0.0, 0.0), RIM_M, fill=False, color="black"))
-    ax.set(xlim=(-0.6, 0.6), ylim=(-0.6, 0.6), aspect="equal", xlabel="right [m], seen from behind", ylabel="up [m]")
+    frame = (-_FRAME_M, _FRAME_M)
+    beyond = f"; {outside} beyond, on the frame" if outside else ""
+    ax.set(xlim=frame, ylim=frame, aspect="equal", xlabel=f"right [m], seen from behind{beyond}", ylabel="up [m]")
     ax.legend(loc="upper right", frameon=False)
+
+
+def _by_crossing(attempts: Sequence[Mapping[str, Any]]) -> tuple[list[Any], list[Any], list[Any]]:
+    """Return the contacts, what else may have crossed the ring's plane, and what has not."""
+    contacts = [a for a in attempts if a["outcome"] == "contact"]
+    short = [a for a in attempts if a["outcome"] in _NOT_CROSSED]
+    return contacts, [a for a in attempts if a["outcome"] not in ("contact", *_NOT_CROSSED)], short
+
+
+def _places(attempts: Sequence[Mapping[str, Any]]) -> Array:
+    """(n, 2) right and up of the drogue's axis [m], of those that have a place."""
+    places = np.array([[-_number(a.get("left_m")), _number(a.get("up_m"))] for a in attempts]).reshape(-1, 2)
+    return np.asarray(places[np.isfinite(places).all(axis=1)])
 
 
 def _closing(ax: Axes, group: Group) -> None:
     ax.set_title("closing speed of the contacts")
     ax.axvspan(*CLOSING_BAND_M_S, color="tab:green", alpha=0.12)
     ax.axvline(CLOSING_LIMIT_M_S, color="tab:red", linestyle="--")
-    ax.hist(group.closing_m_s, bins=list(np.arange(0.0, 2.85, 0.05)), color="tab:blue")
-    ax.set(xlabel="[m/s]; band of practice, limit", ylabel="contacts", xlim=(0.0, 2.8))
+    speeds = group.closing_m_s
+    outside = int(((speeds < 0.0) | (speeds > _CLOSING_AXIS_M_S)).sum())
+    bins = np.linspace(0.0, _CLOSING_AXIS_M_S, 57)
+    ax.hist(speeds.clip(0.0, _CLOSING_AXIS_M_S), bins=list(bins), color="tab:blue")
+    beyond = f"; {outside} beyond, in the end bins" if outside else ""
+    ax.set(xlabel=f"[m/s]; band of practice, limit{beyond}", ylabel="contacts", xlim=(0.0, _CLOSING_AXIS_M_S))
 
 
 def _by_attempt(ax: Axes, group: Group) -> None:
-    ax.set_title("contact inside the limits within n attempts")
+    ax.set_title("contact inside the limits within n attempts" + group.mark)
     most = max((row["attempts"] for row in group.flown), default=1)
     for n in range(1, max(most, 1) + 1):
-        share = group.first_attempt if n == 1 else group.within(n)
+        share = group.within(n)
         low, high = share.interval
         ax.plot([n, n], [100 * low, 100 * high], color="tab:blue")
         ax.plot(n, 100 * share.value, "o", color="tab:blue")
@@ -128,14 +161,25 @@ def _navigation(ax: Axes, group: Group) -> None:
 
 
 def _causes(ax: Axes, group: Group) -> None:
-    ax.set_title("why attempts failed")
-    if not group.causes:
+    ax.set_title("why attempts failed, and why flights began none")
+    if not group.causes and not group.causes_without_attempt:
         _say(ax, "none failed")
         return
-    names, counts = zip(*reversed(group.causes), strict=True)
-    bars = ax.barh([name.replace("_", " ") for name in names], counts, color="tab:red", alpha=0.7)
-    ax.bar_label(bars, padding=2)
-    ax.set_xlabel("attempts")
+    counted = (
+        (group.causes, "tab:red", "attempts"),
+        (group.causes_without_attempt, "tab:purple", "flights without one"),
+    )
+    names: list[str] = []
+    for causes, colour, label in counted:
+        if causes:
+            places = range(len(names), len(names) + len(causes))
+            bars = ax.barh(places, [count for _, count in causes], color=colour, alpha=0.7, label=label)
+            ax.bar_label(bars, padding=2)
+            names += [name.replace("_", " ") for name, _ in causes]
+    ax.set_yticks(range(len(names)), names)
+    ax.invert_yaxis()
+    ax.set_xlabel("number")
+    ax.legend(ncols=2, frameon=False, fontsize=7, loc="upper center", bbox_to_anchor=(0.5, -0.16))
 
 
 def _timelines(ax: Axes, group: Group) -> None:

@@ -1,20 +1,23 @@
 """Flights that may be pooled: same scenario, same sensing, same navigator, same controller.
 
 Perfect navigation, the measurement model and the camera never share a group: what one shows says nothing of the other
-until both stand side by side. Where a group on the truth has flown the same seeds, `paired` puts it there.
+until both stand side by side. Where a group on the truth has flown the same flights, `paired` puts it there.
 """
 
 import json
 import math
+import shlex
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from os.path import normpath
 from typing import Any
 
 import numpy as np
 
 from dockair.rotations import Array
+from dockair.scenarios.crew_tables import OUR_NAVIGATOR
 from dockair.scenarios.statistics import wilson_interval
 
 Row = Mapping[str, Any]
@@ -22,6 +25,7 @@ Row = Mapping[str, Any]
 CLOSING_BAND_M_S = (1.0, 1.5)  # service practice
 CAPTURE_M = 0.15  # of the tip from the ring's centre, inside which a contact is asked for
 SENSING_IN_WORDS = {"camera": "camera", "measurements": "measurement model", "truth": "perfect navigation"}
+_SEES = ("navigation.navigator", "camera.sensing")  # keys that say what the navigation sees, and nothing of the world
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,12 +65,43 @@ class Group:
     @property
     def anchor(self) -> str:
         """Its id on the page."""
-        return "-".join([self.scenario, self.sensing, self.controller, self.navigator.rpartition(":")[2]])
+        return "-".join([self.scenario, self.sensing, self.controller, self.navigator])
+
+    @property
+    def own_navigator(self) -> str:
+        """Name of a navigator that is neither Dockair's own nor the truth; "" of these two."""
+        return "" if self.navigator in (OUR_NAVIGATOR, "truth") else self.navigator
 
     @property
     def title(self) -> str:
         """What it is, in words."""
-        return f"{self.scenario}: {SENSING_IN_WORDS.get(self.sensing, self.sensing)}, {self.controller} controller"
+        words = f"{self.scenario}: {SENSING_IN_WORDS.get(self.sensing, self.sensing)}, {self.controller} controller"
+        return words + (f", navigator {self.own_navigator}" if self.own_navigator else "")
+
+    @property
+    def label(self) -> str:
+        """What it is, short, for a picture's axis."""
+        return f"{self.scenario} ({', '.join(filter(None, [self.sensing, self.controller, self.own_navigator]))})"
+
+    @cached_property
+    def seeds(self) -> int:
+        """Number of different seeds."""
+        return len({row["seed"] for row in self.rows})
+
+    @property
+    def independent(self) -> bool:
+        """Whether no seed occurs twice; else intervals, which take flights for independent, are too narrow."""
+        return self.seeds == len(self.rows)
+
+    @property
+    def flights_in_words(self) -> str:
+        """How many flights, and of how many seeds where there are fewer."""
+        return f"{len(self.rows)} flights" + ("" if self.independent else f" of {self.seeds} seeds")
+
+    @property
+    def mark(self) -> str:
+        """Stands behind an interval that is too narrow."""
+        return "" if self.independent else " †"
 
     @cached_property
     def flown(self) -> list[Row]:
@@ -130,15 +165,20 @@ class Group:
         return [attempt for row in self.flown for attempt in json.loads(row["attempt_log"])]
 
     def within(self, count: int) -> Share:
-        """Contact inside the limits within so many attempts."""
-        good = sum(bool(row["success"]) and row["attempts"] <= count for row in self.flown)
+        """Contact inside the limits within so many attempts; a flight may go on after it, if the drogue was lost."""
+        good = sum(any(map(_is_good, json.loads(row["attempt_log"])[:count])) for row in self.flown)
         return Share(good, len(self.rows))
 
     @cached_property
     def causes(self) -> list[tuple[str, int]]:
         """Causes of the attempts that failed, a contact outside the limits among them; the most frequent first."""
-        failed = [a["cause"] for a in self.attempts if a["cause"] or a["outcome"] != "contact"]
-        return Counter(cause or "not said" for cause in failed).most_common()
+        return _counted(attempt["cause"] for attempt in self.attempts if not _is_good(attempt))
+
+    @cached_property
+    def causes_without_attempt(self) -> list[tuple[str, int]]:
+        """Causes of the flights that began no attempt, "error" of those that were not flown to their end."""
+        idle = [row["cause"] for row in self.flown if not row["attempts"]]
+        return _counted([*idle, *("error" for _ in self.failed_to_fly)])
 
     @cached_property
     def by_range(self) -> list[dict[str, float]]:
@@ -157,12 +197,13 @@ def groups_of(rows: Sequence[Row]) -> list[Group]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Paired:
-    """A group beside perfect navigation on the same seeds."""
+    """A group beside perfect navigation on the same flights: same seed, same draw, same settings."""
 
-    seeds: int
+    flights: int  #: that both have flown
+    seeds: int  #: different ones among them
     ours: int  #: successes
     truth: int
-    only_ours: int  #: seeds at which only ours succeeded
+    only_ours: int  #: flights at which only ours succeeded
     only_truth: int
 
     @property
@@ -172,18 +213,50 @@ class Paired:
 
 
 def paired(group: Group, groups: Sequence[Group]) -> Paired | None:
-    """Return the comparison at the first attempt, None where the truth has not flown these seeds."""
+    """Return the comparison at the first attempt, None where the truth has not flown any of these flights.
+
+    A flight that one of both has twice by the same command (a file that has changed meanwhile) is in no pair.
+    """
     for other in groups:
-        if other.sensing == "truth" != group.sensing and other.scenario == group.scenario:
-            truth = {row["seed"]: bool(row["first_attempt"]) for row in other.rows if not row["error"]}
-            both = [(bool(r["first_attempt"]), truth[r["seed"]]) for r in group.flown if r["seed"] in truth]
-            if both and other.controller == group.controller:
-                a, b = np.array(both).T
+        if other.sensing == "truth" != group.sensing and _docks_alike(other, group):
+            mine, truth = _by_conditions(group.rows), _by_conditions(other.rows)
+            both = [c for c in mine if len(mine[c]) == len(truth.get(c, ())) == 1]
+            if both:
+                a, b = np.array([(_docked_at_once(mine[c][0]), _docked_at_once(truth[c][0])) for c in both]).T
                 return Paired(
-                    seeds=len(both), ours=int(a.sum()), truth=int(b.sum()),
+                    flights=len(both), seeds=len({mine[c][0]["seed"] for c in both}),
+                    ours=int(a.sum()), truth=int(b.sum()),
                     only_ours=int((a & ~b).sum()), only_truth=int((~a & b).sum()),
                 )  # fmt: skip
     return None
+
+
+def _docks_alike(a: Group, b: Group) -> bool:
+    return (a.scenario, a.controller) == (b.scenario, b.controller)
+
+
+def _docked_at_once(row: Row) -> bool:
+    """Whether the first attempt succeeded; a flight that ended in an error is none."""
+    return bool(row["first_attempt"]) and not row["error"]
+
+
+def _by_conditions(rows: Sequence[Row]) -> dict[tuple[str, ...], list[Row]]:
+    """Return the rows by what decides the flight but for what the navigation sees: file, seed, values set and drawn."""
+    found: dict[tuple[str, ...], list[Row]] = {}
+    for row in rows:
+        _, _, file, _, seed, *options = shlex.split(row["command"])
+        settings = [text for text in options[1::2] if text.partition("=")[0] not in _SEES]
+        found.setdefault((normpath(file), seed, *sorted(settings)), []).append(row)
+    return found
+
+
+def _is_good(attempt: Mapping[str, Any]) -> bool:
+    """Whether it ended in a contact inside the limits: one outside them has a cause."""
+    return attempt["outcome"] == "contact" and not attempt["cause"]
+
+
+def _counted(causes: Iterable[str]) -> list[tuple[str, int]]:
+    return Counter(cause or "not said" for cause in causes).most_common()
 
 
 def _numbers(rows: Sequence[Row], name: str) -> Array:

@@ -7,7 +7,11 @@ import pytest
 
 from dockair.errors import DockairError
 from dockair.scenarios.campaign.gate import judge, require_power
+from dockair.scenarios.campaign.jobs import jobs_of
 from dockair.scenarios.campaign.plan import Gate
+from dockair.scenarios.campaign.plan_file import PlanFile
+from dockair.scenarios.campaign.row import row_of
+from dockair.scenarios.campaign.worker import Answer
 
 
 def rows(docked: int, flights: int, scenario: str = "light", **changes):
@@ -88,3 +92,33 @@ def test_a_gate_that_could_never_fail_is_refused_with_the_flights_it_needs():
     with pytest.raises(DockairError, match="gate.success_rate: expected 4 flights or more"):
         require_power(gate, rows(0, 3), "gate")
     require_power(gate, rows(0, 4), "gate")
+
+
+def test_a_gate_that_asks_for_next_to_nothing_is_refused_at_once():
+    with pytest.raises(DockairError, match="expected 6907755[0-9]{3} flights or more"):
+        require_power(Gate(success_rate=1e-9), rows(0, 20), "gate")
+
+
+def test_flights_of_one_seed_share_their_fate_and_a_gate_on_them_is_refused():
+    """20 points with 3 seeds, each of 0.95: the test would fail a good build in 1 of 7 cases instead of 1 of 1000."""
+    gate = Gate(success_rate=0.95, false_alarm=0.001)
+    shared = sum(chance(k, 3, 0.95) for k in range(4) if not judge(gate, rows(k, 3) * 20).passed)
+    assert shared == pytest.approx(0.143, abs=0.001)
+    with pytest.raises(DockairError, match=r"gate.success_rate: expected every seed once .* 'seed 0 20 times \(light"):
+        require_power(gate, rows(0, 3) * 20, "gate")
+
+
+def test_the_same_seeds_in_other_groups_or_where_no_rate_is_asked_are_no_matter():
+    gate = Gate.model_validate({"scenarios": {"severe": {"success_rate": 0.9}}})
+    require_power(gate, rows(0, 3) * 2 + rows(0, 12, "severe") + rows(0, 12, "severe", sensing="truth"), "gate")
+
+
+def test_a_test_names_the_navigator_that_is_neither_ours_nor_the_truth():
+    mine = rows(12, 12, navigator="mine:One") + rows(12, 12, navigator="mine:Two")
+    titles = [test.group for test in judge(Gate(success_rate=0.5), mine).tests]
+    assert [title.rpartition(" ")[2] for title in titles] == ["mine:One", "mine:Two"]
+
+
+def test_the_packaged_plan_with_a_gate_may_be_flown():
+    source = PlanFile("ci")
+    require_power(source.plan.gate, [row_of(job, Answer(columns=None)) for job in jobs_of(source)], "gate")

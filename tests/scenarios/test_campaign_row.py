@@ -9,6 +9,7 @@ from dockair.scenarios.attempts import Attempt
 from dockair.scenarios.campaign.jobs import jobs_of
 from dockair.scenarios.campaign.plan_file import PlanFile
 from dockair.scenarios.campaign.row import COLUMNS, column_names, columns_of, row_of
+from dockair.scenarios.campaign.summary import summary_of
 from dockair.scenarios.campaign.table import read_table, write_table
 from dockair.scenarios.campaign.worker import Answer
 from dockair.scenarios.metrics import NavigationFigures
@@ -104,3 +105,37 @@ def test_a_drawn_keys_column_has_the_kind_of_its_values(job, tmp_path, values, k
     write_table(rows, tmp_path)
     back = [row["set.start.aft_m"] for row in read_table(tmp_path)]
     assert [(type(value), value) for value in back] == [(type(value), value) for value in kept]
+
+
+PLAN = """name = "p"
+seeds = {seeds}
+scenarios = [{scenarios}]
+"""
+
+
+def claims(tmp_path, scenarios):
+    """Return the shortfalls of each group of a plan in which nothing docks."""
+    path = tmp_path / "p.toml"
+    path.write_text(PLAN.format(seeds=3, scenarios=scenarios))
+    jobs = jobs_of(PlanFile(path))
+    failed = columns_of(result(contact=None, outcome="miss", success=False, cause="never_steady", attempt_log=()))
+    rows = [row_of(job, Answer(columns=failed | {"attempts": 0})) for job in jobs]
+    return {(g["scenario"], g["controller"]): g for g in summary_of(rows, jobs)}
+
+
+def test_a_claim_is_held_against_a_group_whose_flights_are_all_as_the_scenario_is_written(tmp_path):
+    changed = '{ scenario = "default", set = { "turbulence.sigma_m_s" = 3.0 } }'
+    pid = '{ scenario = "default", set = { "guidance.controller" = "pid" } }'
+    alone = claims(tmp_path, f'"default", {pid}')
+    assert alone["default", "predictive"]["shortfalls"] != []
+    assert alone["default", "pid"]["shortfalls"] is None
+    pooled = claims(tmp_path, f'"default", {changed}, {pid}')["default", "predictive"]
+    assert (pooled["flights"], pooled["seeds"], pooled["independent"]) == (6, 3, False)
+    assert pooled["shortfalls"] is None
+
+
+def test_the_summary_counts_why_flights_began_no_attempt(tmp_path):
+    group = claims(tmp_path, '"default"')["default", "predictive"]
+    assert group["causes"] == {}
+    assert group["causes_of_flights_without_attempt"] == {"never_steady": 3}
+    assert group["independent"]

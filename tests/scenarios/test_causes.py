@@ -1,5 +1,7 @@
 """Why an attempt failed, on histories of which each is wrong in one thing alone."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -34,7 +36,7 @@ def flight(make_truth):
     def make(
         drogue=lambda t: (0.0, 0.0), rate=lambda t: (0.0, 0.0), tip=lambda t: (0.0, 0.0), error=lambda t: (0.0, 0.0),
         wind=lambda t: (0.0, 0.0), valid=lambda t: True, usable=lambda t: True, turn=(0.0, 0.0, 0.0),
-        attitude=(0.0, 0.0, 0.0), faults=(),
+        attitude=(0.0, 0.0, 0.0), faults=(), held=lambda t: False,
     ):  # fmt: skip
         truths, solutions = [], []
         R_BD = exp(np.array(attitude))
@@ -42,6 +44,7 @@ def flight(make_truth):
             truth = make_truth(
                 t, R_WD=R_BD, p_WD=np.array([0.0, *drogue(t)]), v_WD=np.array([0.0, *rate(t)]),
                 p_WP=np.array([1.2 * (t - END_S), *tip(t)]), gust_D_m_s=np.array([0.0, *wind(t)]),
+                latched=held(t),
             )  # fmt: skip
             believed = truth.p_PD_B + np.array([0.0, *error(t)])
             truths.append(truth)
@@ -170,6 +173,23 @@ def test_a_tip_inside_the_basket_that_was_not_held_and_one_that_was_called_off_o
     assert cause(flight(tip=lambda t: (0.0, -0.16)), outcome="given_up") == "control_limit"
 
 
+def test_a_receiver_that_was_held_and_then_struck_something_has_collided_and_one_that_was_not_held_has_not_been(flight):
+    held = dict(held=lambda t: END_S <= t < 4.5)
+    assert cause(flight(**held), outcome="collision") == "collision"
+    assert cause(flight(**held, **MISLED), outcome="collision") == "collision"  # it was held all the same
+    assert cause(flight(), outcome="collision") == "not_held"
+    assert cause(flight(**BEHIND), outcome="collision") == "control_limit"
+    earlier = flight(held=lambda t: t < 0.5)  # of the attempt before
+    assert cause(earlier, outcome="collision") == "not_held"
+
+
+def test_a_reel_that_died_while_the_probe_was_held_is_the_fault_of_the_collision(flight):
+    held = dict(held=lambda t: END_S <= t < 4.8)
+    assert cause(flight(**held, faults=[DeadReel(start_s=4.2)]), outcome="collision") == "fault"
+    assert cause(flight(faults=[DeadReel(start_s=4.2)]), outcome="collision") == "not_held"
+    assert cause(flight(**held, faults=[LedOff()]), outcome="collision") == "collision"
+
+
 def test_one_called_off_is_judged_by_the_worst_of_its_last_second_and_not_where_it_had_come_nearest(flight):
     """The tip was on the line at its nearest, 0.3 m off at 4.3 s, on the line again when the navigation gave up."""
     late = flight(tip=lambda t: (0.0, -0.3 if 4.29 < t < 4.31 else 0.0))
@@ -229,6 +249,12 @@ def test_every_cause_is_in_the_modules_table_and_every_one_there_is_known():
 
     rows = [line.split("|")[1].strip() for line in causes.__doc__.splitlines() if line.startswith("| ")]
     assert {row for row in rows if row and row != "cause"} | {"never_steady"} == set(CAUSES)
+
+
+def test_every_cause_is_on_the_page_of_results():
+    page = (Path(__file__).parents[2] / "docs/results.md").read_text(encoding="utf-8")
+    said = page[page.index("### Causes") : page.index("## result.json")]
+    assert [cause for cause in CAUSES if f"`{cause}`" not in said] == []
 
 
 def test_the_nose_stands_in_the_plane_of_symmetry_ahead_of_the_centre_of_gravity(hand_made):

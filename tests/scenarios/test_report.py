@@ -11,7 +11,9 @@ from dockair.errors import DockairError
 from dockair.scenarios.campaign import manifest as manifests
 from dockair.scenarios.campaign import table
 from dockair.scenarios.campaign.row import COLUMNS
+from dockair.scenarios.report.acceptance import claim_of, shortfalls_of
 from dockair.scenarios.report.evidence import evidence_of
+from dockair.scenarios.report.figures import panels
 from dockair.scenarios.report.folders import Campaign, read_campaigns
 from dockair.scenarios.report.groups import Share, groups_of, paired
 from dockair.scenarios.report.page import page
@@ -28,18 +30,41 @@ def _attempt(number, outcome="contact", offset_m=0.05, cause=""):
     }  # fmt: skip
 
 
+def _good(attempt):
+    return attempt["outcome"] == "contact" and not attempt["cause"]
+
+
+_SENSING = {
+    "camera": {},
+    "truth": {"navigation.navigator": "truth"},
+    "measurements": {"camera.sensing": "measurements"},
+}
+
+
+def _command(scenario, seed, **settings):
+    changes = [f"--set '{key}={json.dumps(value)}'" for key, value in settings.items()]
+    return " ".join([f"dockair fly {scenario} --seed {seed}", *changes])
+
+
+def _without_attempt(seed, cause, **changes):
+    """A flight that began no attempt."""
+    nothing = {"attempts": 0, "attempt_log": "[]", "first_attempt": False, "success": False, "radial_offset_m": None}
+    return _row(seed) | nothing | {"outcome": "abort", "cause": cause} | changes
+
+
 def _row(seed, *, scenario="light_gusts", sensing="camera", attempts=None, **changes):
     log = attempts or [_attempt(1)]
     held = log[-1]["outcome"] == "contact"
     values = {
         "scenario": scenario, "seed": seed, "sensing": sensing,
         "navigator": "truth" if sensing == "truth" else OUR_NAVIGATOR, "controller": "predictive",
-        "outcome": log[-1]["outcome"], "attempts": len(log), "first_attempt": held and len(log) == 1, "success": held,
+        "outcome": log[-1]["outcome"], "attempts": len(log), "first_attempt": _good(log[0]),
+        "success": any(map(_good, log)),
         "unsafe": "", "cause": log[0]["cause"], "contact_time_s": 30.0 if held else None,
         "radial_offset_m": log[-1]["radial_offset_m"] if held else None, "closure_speed_m_s": 1.2 if held else None,
         "angle_deg": 3.0, "duration_s": 60.0, "error": "", "attempt_log": json.dumps(log), "timeline": "[]",
         "nav_by_range": "[]", "scenario_hash": f"{scenario}-{sensing}",
-        "command": f"dockair fly {scenario} --seed {seed}" + " --set x=1" * (sensing != "camera"),
+        "command": _command(scenario, seed, **_SENSING[sensing]),
     }  # fmt: skip
     return dict.fromkeys(COLUMNS) | values | changes
 
@@ -92,8 +117,100 @@ def test_what_vision_costs_is_counted_on_common_seeds_only():
     truth = [_row(0, sensing="truth"), _row(1, sensing="truth"), _row(2, sensing="truth", attempts=bad)]
     groups = groups_of(camera + truth)
     pair = paired(groups[0], groups)
-    assert (pair.seeds, pair.ours, pair.truth, pair.only_ours, pair.only_truth) == (3, 2, 2, 1, 1)
+    assert (pair.seeds, pair.flights, pair.ours, pair.truth, pair.only_ours, pair.only_truth) == (3, 3, 2, 2, 1, 1)
     assert paired(groups[1], groups) is None
+
+
+@pytest.mark.parametrize("sensing", ["camera", "measurements"])
+def test_perfect_navigation_is_compared_on_the_same_draws_and_settings(sensing):
+    """Seed 0 at two draws: the truth docks at the first, ours at the second."""
+    bad = [_attempt(1, "miss", 0.4, "gust")]
+
+    def drawn(kind, value, attempts=None):
+        command = _command("light_gusts", 0, **{"turbulence.sigma_m_s": value}, **_SENSING[kind])
+        return _row(0, sensing=kind, attempts=attempts, command=command, scenario_hash=f"{kind}-{value}")
+
+    ours = [drawn(sensing, 0.5, bad), drawn(sensing, 1.5), drawn(sensing, 2.5)]  # the last is the truth's never
+    groups = groups_of([*ours, drawn("truth", 0.5), drawn("truth", 1.5, bad)])
+    pair = paired(groups[0], groups)
+    assert (pair.flights, pair.seeds, pair.ours, pair.truth) == (2, 1, 1, 1)
+    assert (pair.only_ours, pair.only_truth) == (1, 1)
+    assert paired(groups[0], [groups[0], groups_of([drawn("truth", 3.5)])[0]]) is None
+
+
+def test_an_error_beside_perfect_navigation_is_a_flight_that_has_not_docked():
+    camera = [_row(0), _without_attempt(1, "", error="ValueError: x", outcome="error")]
+    groups = groups_of(camera + [_row(seed, sensing="truth") for seed in (0, 1)])
+    pair = paired(groups[0], groups)
+    assert (pair.flights, pair.ours, pair.truth, pair.only_truth, pair.ratio) == (2, 1, 2, 1, 0.5)
+
+
+def test_flights_that_began_no_attempt_are_counted_by_their_causes_and_errors_with_them():
+    idle = [_without_attempt(k, "never_steady") for k in range(3)] + [_without_attempt(3, "detection")]
+    broken = _without_attempt(4, "", error="ValueError: x", outcome="error")
+    tried = _row(5, attempts=[_attempt(1, "miss", 0.4, "gust")])
+    (group,) = groups_of([*idle, broken, tried])
+    assert group.causes == [("gust", 1)]
+    assert group.causes_without_attempt == [("never_steady", 3), ("detection", 1), ("error", 1)]
+    (evidence,) = evidence_of([_campaign(group.rows)])["groups"]
+    assert evidence["causes_of_flights_without_attempt"] == {"never_steady": 3, "detection": 1, "error": 1}
+    (idle_only,) = groups_of(idle)
+    assert "none failed" not in panels(idle_only) and "never steady" in panels(idle_only)
+    assert "none failed" in panels(groups_of([_row(0)])[0])
+
+
+def test_a_flight_that_lost_the_drogue_after_a_good_contact_had_docked_by_then():
+    """Good at the first of three attempts, the drogue lost before refuelling, and tried again."""
+    went_on = _row(0, attempts=[_attempt(1), _attempt(2, "miss", 0.4, "gust"), _attempt(3, "given_up", 0.3, "gust")])
+    wide_first = _row(2, attempts=[_attempt(1, "contact", 0.2, "gust"), _attempt(2)])
+    (group,) = groups_of([went_on, _row(1), wide_first])
+    assert [group.within(n).count for n in (1, 2, 3)] == [2, 3, 3]
+    assert group.within(1) == group.first_attempt and group.within(3) == group.success
+
+
+def test_a_seed_that_occurs_twice_is_said_and_marks_the_intervals():
+    twice = [_row(seed, scenario_hash=f"point {k}") for seed in range(3) for k in range(20)]
+    text = page("made", [_campaign(twice)])
+    assert "60 flights of 3 seeds" in text and "= 100.0 % (94.0–100.0) †" in text
+    (group,) = evidence_of([_campaign(twice)])["groups"]
+    assert (group["flights"], group["seeds"], group["independent"]) == (60, 3, False)
+    once = [_row(seed) for seed in range(60)]
+    assert "†" not in page("made", [_campaign(once)])
+    assert evidence_of([_campaign(once)])["groups"][0]["independent"]
+
+
+def test_two_navigators_of_the_same_class_name_have_each_their_own_section():
+    bad = [_attempt(1, "miss", 0.4, "gust")]
+    rows = [_row(0, navigator="mine_v1:Navigator", attempts=bad), _row(0, navigator="mine_v2:Navigator")]
+    one, two = groups_of(rows)
+    assert one.anchor != two.anchor and one.title != two.title and one.label != two.label
+    text = page("made", [_campaign(rows)])
+    first, second = text.split("<h2 id=")[1:]
+    assert "0.40 m off (gust)" in first and "0.40 m off (gust)" not in second
+    assert OUR_NAVIGATOR not in groups_of([_row(0)])[0].title
+
+
+def test_only_the_librarys_scenarios_as_they_are_written_are_held_to_their_claims(tmp_path, monkeypatch):
+    bad = [_attempt(1, "miss", 0.4, "gust")]
+    (written,) = groups_of([_row(seed, attempts=bad) for seed in range(3)])
+    assert shortfalls_of(written) and claim_of(written)
+    changed = _row(9, attempts=bad, command=_command("light_gusts", 9, **{"turbulence.sigma_m_s": 3}))
+    (mixed,) = groups_of([*written.rows, changed])
+    assert shortfalls_of(mixed) is None and claim_of(mixed) == ""
+    text = 'name = "mine"\nclaim = "it docks"\n[accept]\noutcome = "contact"\n'
+    (tmp_path / "mine.toml").write_text(text)
+    monkeypatch.chdir(tmp_path)
+    (own,) = groups_of([_row(0, scenario="mine", attempts=bad, command="dockair fly mine.toml --seed 0")])
+    assert shortfalls_of(own) is None and claim_of(own) == ""
+
+
+def test_what_is_outside_a_pictures_axes_is_counted_and_shown_at_its_edge():
+    far = [_attempt(1, "miss", 0.9, "gust"), _attempt(2, "given_up", 2.0, "gust"), _attempt(3)]
+    rows = [_row(0, attempts=far), _row(1, closure_speed_m_s=3.4)]
+    text = panels(groups_of(rows)[0])
+    assert "seen from behind; 2 beyond, on the frame" in text
+    assert "limit; 1 beyond, in the end bins" in text
+    assert "beyond" not in panels(groups_of([_row(0)])[0])
 
 
 def test_errors_by_range_are_pooled_by_their_squares():

@@ -6,7 +6,12 @@ import numpy as np
 import pytest
 from scipy.special import ndtri
 
-from dockair.scenarios.statistics import largest_rejected_count, probability_of_at_most, wilson_interval
+from dockair.scenarios.statistics import (
+    largest_rejected_count,
+    probability_of_at_most,
+    trials_to_reject_none,
+    wilson_interval,
+)
 
 
 @pytest.mark.parametrize(
@@ -49,6 +54,19 @@ def test_the_rejected_count_is_the_last_that_is_too_unlikely():
                 assert probability_of_at_most(count, trials, rate) < false_alarm
                 assert count == trials - 1 or probability_of_at_most(count + 1, trials, rate) >= false_alarm
     assert largest_rejected_count(3, 0.7, 0.02) == -1  # 0.3 ** 3 is 0.027: three failures of three are no proof
+
+
+@pytest.mark.parametrize("rate", [1e-3, 0.3, 0.5, 0.9, 0.999, 1.0])
+@pytest.mark.parametrize("false_alarm", [0.4, 0.05, 1e-3, 1e-9])
+def test_the_trials_that_reject_no_success_are_the_fewest_that_do(rate, false_alarm):
+    needed = int(trials_to_reject_none(rate, false_alarm))
+    assert probability_of_at_most(0, needed, rate) < false_alarm
+    assert needed == 1 or probability_of_at_most(0, needed - 1, rate) >= false_alarm
+
+
+def test_the_trials_of_a_rate_near_nothing_are_told_at_once():
+    assert trials_to_reject_none(1e-9, 1e-3) == pytest.approx(math.log(1e3) * 1e9, rel=1e-8)
+    assert trials_to_reject_none(5e-324, 1e-3) == math.inf
 
 
 def test_ninety_five_of_a_hundred_intervals_hold_the_rate():
