@@ -12,6 +12,7 @@ Reading imports the classes that the file names, and refuses anything that is ne
 
 import importlib
 import math
+import traceback
 from dataclasses import fields, is_dataclass
 from enum import Enum
 from typing import Any
@@ -30,16 +31,28 @@ def import_by_name(name: str) -> Any:
     """Return the class called "module:Class".
 
     Raises:
-        DockairError: there is none.
+        DockairError: there is none, or its module raises an exception.
     """
     module, _, path = name.partition(":")
+    expected = 'an importable "module:Class"'
     try:
         found: Any = importlib.import_module(module)
         for part in path.split("."):
             found = getattr(found, part)
     except (ImportError, AttributeError, ValueError) as error:
-        raise DockairError(name, expected='an importable "module:Class"', got=str(error)) from None
+        raise DockairError(name, expected=expected, got=str(error)) from None
+    except (Exception, SystemExit) as error:  # somebody's own module may raise anything, and may end the process
+        raise DockairError(name, expected=expected, got=_said(error)) from error
     return found
+
+
+def _said(error: BaseException) -> str:
+    """Return what an exception says, and where it was raised, in one line."""
+    said = " ".join(f"{type(error).__name__}: {error}".split())
+    if isinstance(error, SyntaxError):  # it names the place itself
+        return said
+    raised = traceback.extract_tb(error.__traceback__)[-1]
+    return f"{said} ({raised.filename}, line {raised.lineno})"
 
 
 def encode(value: Any) -> Any:

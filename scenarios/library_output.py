@@ -17,7 +17,7 @@ def show_scenarios(scenarios: Sequence[Scenario]) -> None:
         table.add_column(heading)
     for scenario in scenarios:
         table.add_row(scenario.name, scenario.claim, scenario.accept.in_words)
-    Console(highlight=False).print(table)
+    Console(highlight=False, markup=False).print(table)
 
 
 def show_scenario(name: str, scenario: Scenario) -> None:

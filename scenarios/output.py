@@ -12,6 +12,7 @@ import numpy as np
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
+from rich.text import Text
 
 if TYPE_CHECKING:  # the progress of a flight is told in these; importing them here would slow `--help` down
     from dockair.messages import NavSolution
@@ -51,7 +52,7 @@ class FlightProgress:
         self._console = console or Console(stderr=True, highlight=False)
         self._duration_s, self._next_s = duration_s, 0.0
         self._bar = Progress(
-            TextColumn("{task.description:<12}"),
+            TextColumn("{task.description:<12}", markup=False),
             BarColumn(),
             TaskProgressColumn("{task.completed:5.1f} of {task.total:.0f} s"),
             TextColumn("range {task.fields[range_m]:6.2f} m"),
@@ -80,7 +81,7 @@ class FlightProgress:
             self._bar.update(self._task, completed=truth.time_s, description=solution.phase, range_m=range_m)
         else:
             self._next_s = truth.time_s + _PLAIN_INTERVAL_S
-            self._console.print(f"{truth.time_s:6.1f} s  {solution.phase:<12} range {range_m:6.2f} m")
+            self._console.print(f"{truth.time_s:6.1f} s  {solution.phase:<12} range {range_m:6.2f} m", markup=False)
 
 
 def show_result(result: Mapping[str, Any], shortfalls: Sequence[str] | None, folder: Path) -> None:
@@ -91,12 +92,11 @@ def show_result(result: Mapping[str, Any], shortfalls: Sequence[str] | None, fol
         shortfalls: what the scenario's `accept` asks for and the flight did not show; None when it asks for nothing.
         folder: where the flight was written.
     """
-    console = Console(highlight=False)
+    console = _plain_console()
     colour = "green" if result["outcome"] == "contact" else "yellow"
     mark = "  (perfect navigation: the truth in place of the camera)" if result.get("truth_navigation") else ""
-    console.print(
-        f"[bold {colour}]{result['outcome']}[/]  {result['scenario']}, seed {result['seed']}{mark}", soft_wrap=True
-    )
+    flown = f"  {result['scenario']}, seed {result['seed']}{mark}"
+    console.print(Text.assemble((result["outcome"], f"bold {colour}"), flown), soft_wrap=True)
     for attempt in result.get("attempt_log", ()):
         if attempt["cause"]:
             console.print(_failed_attempt(attempt), style="yellow", soft_wrap=True)
@@ -112,7 +112,7 @@ def show_result(result: Mapping[str, Any], shortfalls: Sequence[str] | None, fol
     if shortfalls is not None:
         console.print("; ".join(shortfalls) or "as the scenario claims", style="yellow" if shortfalls else "green")
     for path in sorted(folder.iterdir()):
-        console.print(f"  {path}  [dim]{path.stat().st_size / 1e6:.2f} MB[/]", soft_wrap=True)
+        console.print(Text.assemble(f"  {path}  ", (f"{path.stat().st_size / 1e6:.2f} MB", "dim")), soft_wrap=True)
     if (folder / "episode.rrd").exists():
         viewer = os.path.relpath(Path(sys.executable).parent / "rerun")
         console.print(f"look at it: {viewer} --bind 127.0.0.1 {folder / 'episode.rrd'}", soft_wrap=True)
@@ -127,10 +127,11 @@ def _failed_attempt(attempt: Mapping[str, Any]) -> str:
 
 def show_checks(checks: Sequence["Check"], versions: Mapping[str, str]) -> None:
     """Print what the doctor found."""
-    console = Console(highlight=False)
+    console = _plain_console()
     table = Table(show_header=False, box=None, padding=(0, 1))
     for check in checks:
-        word = "[green]ok[/]" if check.ok else "[red]missing[/]" if check.needed else "[yellow]note[/]"
+        said = ("ok", "green") if check.ok else ("missing", "red") if check.needed else ("note", "yellow")
+        word = Text(said[0], style=said[1])
         table.add_row(word, check.name, check.found if check.ok else f"{check.found}; {check.remedy}")
     console.print(table)
     console.print(", ".join(f"{name} {version}" for name, version in versions.items()), style="dim")
@@ -139,7 +140,7 @@ def show_checks(checks: Sequence["Check"], versions: Mapping[str, str]) -> None:
 def show_bench(report: "BenchReport") -> None:
     """Print where a flight's time goes."""
     figures = report.to_json()
-    console = Console(highlight=False)
+    console = _plain_console()
     console.print(
         f"{figures['frames_per_second']:.1f} frames per second, {figures['real_time_factor']:.2f} of real time"
     )
@@ -164,13 +165,13 @@ def show_reproductions(titles: Mapping[str, str]) -> None:
         table.add_column(heading)
     for name, title in titles.items():
         table.add_row(name, title)
-    Console(highlight=False).print(table)
+    _plain_console().print(table)
 
 
 def show_reproduction(reproduction: Mapping[str, Any], picture: Path) -> None:
     """Print ours beside the reference's, one line a figure, and where the picture is."""
-    console = Console(highlight=False)
-    console.print(f"[bold]{reproduction['id']}[/]  {reproduction['source']}", soft_wrap=True)
+    console = _plain_console()
+    console.print(Text.assemble((reproduction["id"], "bold"), f"  {reproduction['source']}"), soft_wrap=True)
     table = Table(box=None, padding=(0, 1))
     for heading in ("case", "figure", "ours", "reference"):
         table.add_column(heading, justify="right" if heading in ("ours", "reference") else "left")
@@ -193,7 +194,7 @@ def _figure(value: Any) -> str:
 
 def show_stages_bench(figures: Mapping[str, Any]) -> None:
     """Print the times of the stages, their ratios, and what each of them found."""
-    console = Console(highlight=False)
+    console = _plain_console()
     if "flights" in figures:
         flights = figures["flights"].items()
         console.print(_bench_table({what: {key: f"{x:.2f}" for key, x in row.items()} for what, row in flights}))
@@ -227,6 +228,11 @@ def _bench_table(rows: Mapping[str, Mapping[str, str]]) -> Table:
     for what, row in rows.items():
         table.add_row(what, *row.values())
     return table
+
+
+def _plain_console() -> Console:
+    """Return stdout without markup: paths and what others say are printed as they are, brackets too."""
+    return Console(highlight=False, markup=False)
 
 
 def _at(table: Mapping[str, Any], key: str) -> Any:

@@ -7,8 +7,7 @@ from dockair.scenarios.campaign import journal, manifest, table
 from dockair.scenarios.campaign.whole_file import PART
 
 SUMMARY, TIMING = "summary.json", "timing.json"
-FILES = (manifest.FILE_NAME, journal.FILE_NAME, table.FILE_NAME, SUMMARY, TIMING)
-_PARTS = tuple(name + PART for name in FILES)  # left by a campaign that was killed while it wrote
+RESULTS = (table.FILE_NAME, SUMMARY, TIMING)  #: written at the end
 
 
 def default_folder(plan_name: str) -> Path:
@@ -16,27 +15,49 @@ def default_folder(plan_name: str) -> Path:
     return Path("out") / "campaigns" / plan_name
 
 
-def prepare(folder: Path) -> None:
-    """Make the folder, or refuse it; remove what was half written.
+def make(folder: Path) -> None:
+    """Make the folder, or refuse it; what is in it stays as it is.
+
+    Other programs, too, write a manifest.json or a summary.json. A campaign's folder is known by its journal, which is
+    there before any other file.
 
     Raises:
-        DockairError: a file, a folder with other files and no campaign, or one that cannot be written.
+        DockairError: a file, a folder with other files and no campaign, or one that cannot be made.
     """
-    where, expected = f"--out {folder}", "a new or empty folder, or one with an earlier campaign"
+    where = f"--out {folder}"
+    expected = f"a new or empty folder, or one with the {journal.FILE_NAME} of an earlier campaign"
     if folder.exists() and not folder.is_dir():
         raise DockairError(where, expected=expected, got="a file")
     try:
         folder.mkdir(parents=True, exist_ok=True)
         present = sorted(path.name for path in folder.iterdir())
-        if present and not set(present) & {*FILES, *_PARTS}:
+        if present and journal.FILE_NAME not in present:
             raise DockairError(where, expected=expected, got=f"a folder with {present[0]}")
-        for name in _PARTS:
-            (folder / name).unlink(missing_ok=True)
-        probe = folder / (manifest.FILE_NAME + PART)
-        probe.touch()
-        probe.unlink()
+        if present and not journal.begins_like_one(folder / journal.FILE_NAME):
+            raise DockairError(where, expected=expected, got=f"a folder with another {journal.FILE_NAME}")
     except OSError as error:
         raise DockairError(where, expected="a folder that can be written", got=error.strerror) from None
+
+
+def remove_parts(folder: Path) -> None:
+    """Remove what a campaign that was killed has half written; only for who holds the journal's lock.
+
+    Raises:
+        DockairError: the folder cannot be written.
+    """
+    parts = [folder / (name + PART) for name in (manifest.FILE_NAME, *RESULTS)]
+    try:
+        parts[0].touch()  # can files be made here? better asked now than after the flights
+        for part in parts:
+            part.unlink(missing_ok=True)
+    except OSError as error:
+        raise DockairError(f"--out {folder}", expected="a folder that can be written", got=error.strerror) from None
+
+
+def remove_results(folder: Path) -> None:
+    """Remove table, summary and timing, which are of other flights than the journal will be; `rows_of` reads that."""
+    for name in RESULTS:
+        (folder / name).unlink(missing_ok=True)
 
 
 def rows_of(folder: Path) -> list[dict[str, object]]:

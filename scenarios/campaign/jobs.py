@@ -6,6 +6,7 @@ that is done is known again when the plan has grown.
 
 import json
 import os
+import re
 import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -21,6 +22,10 @@ from dockair.scenarios.schema import Scenario, load_scenario
 
 MOST_JOBS = 200_000
 _SAYS_NOTHING_OF_THE_FLIGHT = {"seed", "claim", "accept"}  # of a scenario's keys; the seed is the job's
+_BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
+
+#: Where the keys were written ("{key}" stands for each), and what they are set to; the later hold.
+Layers = Sequence[tuple[str, Mapping[str, Any]]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +48,7 @@ class Job:
     @property
     def command(self) -> str:
         """What flies this flight again."""
-        changes = [f"--set {shlex.quote(f'{key}={as_toml(value)}')}" for key, value in self.settings.items()]
+        changes = [f"--set {shlex.quote(f'{key}={as_toml(value, key)}')}" for key, value in self.settings.items()]
         return " ".join(["dockair fly", shlex.quote(self.file), f"--seed {self.seed}", *changes])
 
     @property
@@ -51,20 +56,29 @@ class Job:
         """What decides the flight."""
         return f"{self.scenario_hash}:{self.seed}"
 
+    @property
+    def plug_in(self) -> str:
+        """Module of the navigator where that is one's own, "" where Dockair navigates, or the truth."""
+        navigation = self.scenario.navigation
+        module = navigation.navigator.partition(":")[0]
+        return "" if navigation.is_truth or module.partition(".")[0] == "dockair" else module
+
 
 def jobs_of(source: PlanFile) -> list[Job]:
     """Return the plan's jobs in the order of the table.
 
     Raises:
-        DockairError: a scenario that cannot be flown as the plan says; a navigator that cannot be imported; two jobs
-            that are the same flight; too many.
+        DockairError: a scenario that cannot be flown as the plan says; a drawn key that is not flown as drawn; a
+            navigator that cannot be imported; two jobs that are the same flight; too many.
     """
     jobs: list[Job] = []
     for index, entry in enumerate(source.plan.scenarios):
         seeds = [source.plan.first_seed + seed for seed in entry.seeds or source.plan.seeds]
         for point, seeds_there in _points(source.plan, seeds):
-            settings = source.plan.set | entry.set | point | source.settings
-            file, scenario = _scenario(source, index, entry, point)
+            layers = _layers(source, index, entry, point)
+            settings = _merged(layers)
+            file, scenario = _scenario(source, index, entry, layers, settings)
+            _require_as_drawn(source, scenario, point)
             digest = scenario_hash(scenario)
             jobs += [
                 Job(len(jobs) + k, scenario, digest, seed, point, file, settings) for k, seed in enumerate(seeds_there)
@@ -116,29 +130,84 @@ def _points(plan: Plan, seeds: Sequence[int]) -> list[tuple[Point, list[int]]]:
     return [(point, [seed]) for point, seed in zip(points, seeds, strict=True)]
 
 
-def _scenario(source: PlanFile, index: int, entry: Entry, point: Point) -> tuple[str, Scenario]:
-    own_file = entry.scenario.lower().endswith(".toml") or os.sep in entry.scenario
-    name = str(source.folder / entry.scenario) if own_file else entry.scenario
-    layers: tuple[tuple[str, Mapping[str, Any]], ...] = (
+def _layers(source: PlanFile, index: int, entry: Entry, point: Point) -> Layers:
+    return (
         (source.place("set.{key}"), source.plan.set),
         (source.place(f"scenarios[{index}].set.") + "{key}", entry.set),
         (source.place('draw."{key}"'), point),
         ("--set {key}", source.settings),
     )
-    settings = {key: value for _, layer in layers for key, value in layer.items()}
+
+
+def _merged(layers: Layers) -> dict[str, Any]:
+    """Return what is set, the later last: of two keys that exclude each other the last one is flown."""
+    settings: dict[str, Any] = {}
+    for _, layer in layers:
+        for key, value in layer.items():
+            settings.pop(key, None)  # a key that is set again would keep its place otherwise
+            settings[key] = value
+    return settings
+
+
+def _scenario(
+    source: PlanFile, index: int, entry: Entry, layers: Layers, settings: Mapping[str, Any]
+) -> tuple[str, Scenario]:
+    own_file = entry.scenario.lower().endswith(".toml") or os.sep in entry.scenario
+    name = str(source.folder / entry.scenario) if own_file else entry.scenario
     try:
-        return name, load_scenario(name, {key: as_toml(value) for key, value in settings.items()})
+        return name, load_scenario(name, {key: as_toml(value, f"--set {key}") for key, value in settings.items()})
     except DockairError as error:
         where = _blamed(error.where, layers, source.place(f"scenarios[{index}]"))
         raise DockairError(where, expected=error.expected, got=error.got, exists=error.exists) from None
 
 
-def as_toml(value: Any) -> str:
-    """Return a value as TOML writes it, so that a text stays a text; `--set` reads it."""
-    return json.dumps(value, ensure_ascii=False)
+def _require_as_drawn(source: PlanFile, scenario: Scenario, point: Point) -> None:
+    """Refuse a drawn key that decides nothing or that another setting replaces: its column would be of no flight."""
+    for key, drawn in point.items():
+        where, flown = source.place(f'draw."{key}"'), _value_at(scenario, key)
+        if key.partition(".")[0] in _SAYS_NOTHING_OF_THE_FLIGHT:
+            raise DockairError(where, expected="a key that decides the flight", got=key)
+        if flown != drawn:
+            expected = "a key in whose place nothing else is set or drawn"
+            raise DockairError(where, expected=expected, got=f"{flown} flown, {drawn} drawn")
 
 
-def _blamed(where: str, layers: Sequence[tuple[str, Mapping[str, Any]]], otherwise: str) -> str:
+def _value_at(scenario: Scenario, key: str) -> Any:
+    value: Any = scenario
+    for name in key.split("."):
+        value = value.get(name) if isinstance(value, Mapping) else getattr(value, name, None)
+    return value
+
+
+def as_toml(value: Any, where: str) -> str:
+    """Return a value as TOML writes it in one line, so that a text stays a text; `--set` reads it.
+
+    Args:
+        value: that the plan or the command line sets.
+        where: its place, to be named.
+
+    Raises:
+        DockairError: a date or a time, which no key takes.
+    """
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")  # TOML's strings, but for this one
+    if isinstance(value, int | float):
+        return repr(value)
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(as_toml(entry, where) for entry in value)}]"
+    if isinstance(value, dict):
+        pairs = (f"{_toml_key(key)} = {as_toml(entry, where)}" for key, entry in value.items())
+        return f"{{{', '.join(pairs)}}}"
+    raise DockairError(where, expected="a number, a text, true or false, a list or a table", got=str(value))
+
+
+def _toml_key(key: str) -> str:
+    return key if _BARE_KEY.fullmatch(key) else as_toml(key, key)
+
+
+def _blamed(where: str, layers: Layers, otherwise: str) -> str:
     """Return the place in the plan, or on the command line, of what `load_scenario` says of a `--set`."""
     wrong = where.removeprefix("--set ")
     if wrong == where:

@@ -4,7 +4,6 @@ A line that was being written when the power went is the last one and not whole:
 again. A line that could not be written (no room) is cut off likewise. One process writes at a time.
 """
 
-import errno
 import fcntl
 import json
 import os
@@ -13,9 +12,10 @@ from types import TracebackType
 from typing import Any, Self
 
 from dockair.errors import DockairError, MachineError
+from dockair.scenarios.campaign.whole_file import NO_ROOM
 
 FILE_NAME = "journal.jsonl"
-_NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+_BEGINS = b'{"key": "'  # every entry, as `append` is given it
 
 Entry = dict[str, Any]  #: key, row, wall_time_s, traceback
 
@@ -64,7 +64,7 @@ class Journal:
             os.fsync(self._file)
         except OSError as error:
             os.ftruncate(self._file, self._size)
-            if error.errno not in _NO_ROOM:
+            if error.errno not in NO_ROOM:
                 raise
             remedy = f"make some and give the same command again, {len(self.entries)} flights are kept"
             raise MachineError(str(self.path), expected="room to write", remedy=remedy) from None
@@ -82,6 +82,13 @@ class Journal:
         except OSError:
             expected = "a folder in which no campaign is running"
             raise DockairError(str(self.path.parent), expected=expected, got="another process at work") from None
+
+
+def begins_like_one(path: Path) -> bool:
+    """Whether a file may be a journal: empty, or beginning as every entry does as far as it was written."""
+    with path.open("rb") as file:
+        head = file.read(len(_BEGINS))
+    return _BEGINS.startswith(head.rstrip(b"\0"))
 
 
 def read(path: Path) -> tuple[dict[str, Entry], int]:

@@ -10,12 +10,12 @@ import platform
 import subprocess
 from collections.abc import Sequence
 from datetime import UTC, datetime
-from hashlib import blake2b
 from pathlib import Path
 from typing import Any
 
 import dockair
 from dockair.errors import DockairError
+from dockair.scenarios.campaign.code import Code
 from dockair.scenarios.campaign.jobs import Job
 from dockair.scenarios.campaign.plan import Plan
 from dockair.scenarios.campaign.whole_file import write_whole
@@ -24,22 +24,17 @@ from dockair.scenarios.result import versions
 FILE_NAME = "manifest.json"
 SCHEMA_VERSION = 1
 
-#: Beginnings of names in `scenarios` whose files show, compare or plan flights and do not fly them; library and plans
-#: are in the jobs' keys.
-_NOT_FLOWN = tuple(
-    "allan bench campaign cli design_ring doctor library output parameters_page picture plans recording replay report "
-    "reproduce statistics".split()
-)
 _SAME = ("code", "versions", "background")
 
 
-def manifest_of(plan: Plan, jobs: Sequence[Job], flight: str) -> dict[str, Any]:
+def manifest_of(plan: Plan, jobs: Sequence[Job], flight: str, code: Code) -> dict[str, Any]:
     """Return the manifest of a campaign that begins now.
 
     Args:
         plan: as flown, the command line's changes included.
         jobs: of the plan.
         flight: name of the function that flies a job.
+        code: that flies them.
     """
     commit, changed = commit_of_the_code()
     asked = plan.model_dump(mode="json", exclude_unset=True)
@@ -54,7 +49,8 @@ def manifest_of(plan: Plan, jobs: Sequence[Job], flight: str) -> dict[str, Any]:
         "scenarios": _hashes(jobs),
         "flight": flight,
         "background": _background(jobs),
-        "code": code_digest(),
+        "code": code.digest,
+        "plug_ins": code.plug_ins,
         "commit": commit,
         "uncommitted_changes": changed,
         "versions": versions(),
@@ -74,12 +70,16 @@ def require_same(earlier: dict[str, Any], now: dict[str, Any], done: set[str], j
         where: the folder, as its user would write it.
 
     Raises:
-        DockairError: code, versions or background have changed, or flights are no longer part of the plan.
+        DockairError: code, versions or background have changed, or the navigator of a flight that is done, or flights
+            are no longer part of the plan.
     """
     expected = "the campaign that was begun there (--fresh begins it anew, another --out keeps both)"
     for name in _SAME:
         if earlier.get(name) != now[name] and (name != "background" or earlier["background"] and now["background"]):
             raise DockairError(where, expected=expected, got=_difference(name, earlier, now))
+    for module in sorted({job.plug_in for job in jobs if job.plug_in and job.key in done}):
+        if earlier.get("plug_ins", {}).get(module) != now["plug_ins"][module]:
+            raise DockairError(where, expected=expected, got=f"another code of the navigator in {module}")
     strangers = len(done - {job.key for job in jobs})
     if strangers:
         got = f"another plan: {strangers} of {len(done)} flights that are done are not part of it"
@@ -111,19 +111,6 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     except ValueError as error:
         raise DockairError(str(path), expected="the manifest of a campaign", got=str(error)) from None
     return table
-
-
-def code_digest() -> str:
-    """Return a digest of every file that decides a flight: world, sensors, navigation, loop, parameters."""
-    package = Path(dockair.__file__).parent
-    digest = blake2b(digest_size=8)
-    for folder in (package, *(package / name for name in ("sim", "nav", "scenarios", "assets"))):
-        for path in sorted(folder.glob("*.py") if folder == package else folder.rglob("*")):
-            name = path.relative_to(folder).as_posix()
-            shown = folder.name == "scenarios" and name.startswith(_NOT_FLOWN)
-            if path.is_file() and path.suffix not in (".pyc", ".nbi", ".nbc", ".md") and not shown:
-                digest.update(f"{folder.name}/{name}".encode() + path.read_bytes())
-    return digest.hexdigest()
 
 
 def commit_of_the_code() -> tuple[str | None, bool | None]:

@@ -11,7 +11,7 @@ import pickle
 import signal
 import time
 from collections import Counter, deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
@@ -20,7 +20,7 @@ from typing import Self
 
 from dockair.errors import DockairError
 from dockair.scenarios.campaign.jobs import Job
-from dockair.scenarios.campaign.worker import FLIGHT, READY, Answer, Order, work
+from dockair.scenarios.campaign.worker import READY, Answer, Order, work
 
 DEATHS_OF_A_JOB = 2
 FLIGHTS_OF_A_PROCESS = 25  # then another begins: what libraries do not give back of the memory, the system takes
@@ -101,10 +101,11 @@ class Pool:
         workers: how many at most.
         timeout_s: wall time that a job may take.
         flight: "module:function" from an order to the columns of its row.
+        check: called before a process begins; what it raises ends the campaign.
     """
 
-    def __init__(self, workers: int, timeout_s: float, flight: str = FLIGHT) -> None:
-        self._most, self._timeout_s, self._flight = workers, timeout_s, flight
+    def __init__(self, workers: int, timeout_s: float, flight: str, check: Callable[[], None]) -> None:
+        self._most, self._timeout_s, self._flight, self._check = workers, timeout_s, flight, check
         self._workers: list[_Worker] = []
         self._deaths: Counter[int] = Counter()
         self._environment: dict[str, str | None] = {}
@@ -126,7 +127,7 @@ class Pool:
         """Fly the jobs; yield each as it is done, and None now and then while nothing is.
 
         Raises:
-            DockairError: the flight function cannot be imported.
+            DockairError: the flight function cannot be imported; what `check` raises.
         """
         waiting = deque(jobs)
         while waiting or any(worker.job for worker in self._workers):
@@ -140,6 +141,7 @@ class Pool:
         idle = [worker for worker in self._workers if worker.job is None]
         while waiting and (idle or len(self._workers) < self._most):
             if not idle:
+                self._check()
                 self._workers.append(_Worker(self._flight))
                 idle.append(self._workers[-1])
             idle.pop().take(waiting.popleft())

@@ -28,10 +28,10 @@ class CampaignProgress:
     def __init__(self, console: Console | None = None) -> None:
         self._console = console or Console(stderr=True, highlight=False)
         columns = (
-            TextColumn("{task.description}"),
+            TextColumn("{task.description}", markup=False),
             BarColumn(),
             MofNCompleteColumn(),
-            TextColumn("{task.fields[said]}"),
+            TextColumn("{task.fields[said]}", markup=False),
         )
         self._bars = Progress(*columns, console=self._console, transient=True)
         self._tasks: dict[tuple[str, str], Any] = {}
@@ -47,10 +47,10 @@ class CampaignProgress:
             self._bars.stop()
         done = self._earlier + self._now
         if kind is KeyboardInterrupt:
-            self._console.print(f"{done} of {self._total} flights are done and kept; the same command goes on")
+            self._say(f"{done} of {self._total} flights are done and kept; the same command goes on")
 
     def begin(self, jobs: list[Job], entries: dict[str, Any]) -> "CampaignProgress":
-        """Take the jobs, and the journal's entries of those that are done."""
+        """Take the jobs, and the journal's entries of those that are not flown again."""
         self._total = len(jobs)
         for job in jobs:
             key = (job.scenario.name, job.scenario.sensing)
@@ -63,7 +63,7 @@ class CampaignProgress:
                 self._earlier += 1
                 self._count(entries[job.key]["row"])
         if self._earlier:
-            self._console.print(f"{self._earlier} of {self._total} flights were done before")
+            self._say(f"{self._earlier} of {self._total} flights were done before")
         self._overall = self._bars.add_task("all", total=self._total, completed=self._earlier, said="")
         if self._console.is_terminal:
             self._bars.start()
@@ -77,13 +77,16 @@ class CampaignProgress:
             self._now += 1
             self._count(row)
             if row["error"]:
-                self._console.print(f"{row['scenario']}, seed {row['seed']}: {row['error']}", soft_wrap=True)
+                self._say(f"{row['scenario']}, seed {row['seed']}: {row['error']}")
         said = self._pace()
         self._bars.update(self._overall, completed=self._earlier + self._now, said=said)
         if not self._console.is_terminal and time.monotonic() >= self._next_s:
             self._next_s = time.monotonic() + _LINE_INTERVAL_S
             done = self._earlier + self._now
-            self._console.print(f"{done} of {self._total} flights, {said}; {self._rates()}", soft_wrap=True)
+            self._say(f"{done} of {self._total} flights, {said}; {self._rates()}")
+
+    def _say(self, text: str) -> None:
+        self._console.print(text, markup=False, soft_wrap=True)  # an error may say anything, brackets too
 
     def _count(self, row: Row) -> None:
         key = (row["scenario"], row["sensing"])
@@ -113,7 +116,7 @@ def docked(successes: int, flights: int) -> str:
 
 def show_campaign(table: Mapping[str, Any]) -> None:
     """Print what `dockair campaign --json` would."""
-    console = Console(highlight=False)
+    console = Console(highlight=False, markup=False)
     if not console.is_terminal:
         console.width = _FILE_WIDTH
     shown = Table(box=None, padding=(0, 1))

@@ -3,11 +3,13 @@
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from dockair.errors import DockairError
 from dockair.scenarios.campaign import folder as campaign_folder
+from dockair.scenarios.campaign.code import code_of
 from dockair.scenarios.campaign.gate import Verdict, judge, require_power
 from dockair.scenarios.campaign.jobs import Job, jobs_of, with_background
 from dockair.scenarios.campaign.journal import Journal
@@ -66,25 +68,36 @@ def run(
         flight: "module:function" that flies an order in a process of its own; see `worker`.
 
     Raises:
-        DockairError: the plan cannot be flown, or the folder holds something else.
+        DockairError: the plan cannot be flown, the folder holds something else, or the code has changed meanwhile; what
+            was flown is kept.
         MachineError: there is no room; what was flown is kept.
     """
     jobs = jobs_of(source)
     if source.plan.asked is not None:
         require_power(source.plan.asked, [row_of(job, Answer(columns=None)) for job in jobs], source.place("gate"))
-    now = manifest_of(source.plan, jobs, flight)
-    campaign_folder.prepare(out)
-    with Journal(out) as journal:
-        _begin(journal, out, now, jobs, fresh=fresh)
+    code = code_of(jobs)
+    check = partial(code.require_unchanged, f"--out {out}")
+    now = manifest_of(source.plan, jobs, flight, code)
+    campaign_folder.make(out)
+    with Journal(out) as journal:  # from here on the folder is ours alone
+        campaign_folder.remove_parts(out)
+        if fresh:
+            campaign_folder.remove_results(out)  # first: they must never be of other flights than the journal's
+            journal.clear()
+        now = _begun_once(journal, out, now, jobs)
         done = {key for key, entry in journal.entries.items() if not (retry_errors and entry["row"]["error"])}
         left = _seed_by_seed([with_background(job, now["background"]) for job in jobs if job.key not in done])
-        told = watch(jobs, journal.entries) if watch is not None else _silent
+        if left:
+            campaign_folder.remove_results(out)  # they are of fewer flights than the manifest will say
+        write_json(now, out / FILE_NAME)
+        told = watch(jobs, {key: journal.entries[key] for key in done}) if watch is not None else _silent
         begun = time.perf_counter()
-        with Pool(min(workers, max(len(left), 1)), source.plan.timeout_s, flight) as pool:
+        with Pool(min(workers, max(len(left), 1)), source.plan.timeout_s, flight, check) as pool:
             for outcome in pool.done(left):
                 if outcome is None:
                     told(None, 0.0)
                 else:
+                    check()  # what was flown while a file changed is nobody's row
                     entry = _entry(outcome)
                     journal.append(entry)
                     told(entry["row"], outcome.answer.wall_time_s)
@@ -92,22 +105,15 @@ def run(
         return _finish(source, out, jobs, [journal.entries[job.key] for job in jobs], timing)
 
 
-def _begin(journal: Journal, out: Path, now: dict[str, Any], jobs: Sequence[Job], *, fresh: bool) -> None:
-    """Write the manifest of a new campaign, or of an earlier one that goes on and may have grown."""
-    if fresh:
-        journal.clear()
-        for name in campaign_folder.FILES:
-            if name != journal.path.name:
-                (out / name).unlink(missing_ok=True)
-    if journal.entries:
-        if not (out / FILE_NAME).exists():
-            raise DockairError(
-                f"--out {out}", expected=f"{FILE_NAME} beside {journal.path.name}", got="none (or --fresh)"
-            )
-        earlier = read_manifest(out)
-        require_same(earlier, now, set(journal.entries), jobs, f"--out {out}")
-        now = now | {"begun": earlier["begun"]}
-    write_json(now, out / FILE_NAME)
+def _begun_once(journal: Journal, out: Path, now: dict[str, Any], jobs: Sequence[Job]) -> dict[str, Any]:
+    """Return the manifest of a new campaign, or of an earlier one that goes on and may have grown."""
+    if not journal.entries:
+        return now
+    if not (out / FILE_NAME).exists():
+        raise DockairError(f"--out {out}", expected=f"{FILE_NAME} beside {journal.path.name}", got="none (or --fresh)")
+    earlier = read_manifest(out)
+    require_same(earlier, now, set(journal.entries), jobs, f"--out {out}")
+    return now | {"begun": earlier["begun"]}
 
 
 def _seed_by_seed(jobs: list[Job]) -> list[Job]:

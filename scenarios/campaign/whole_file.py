@@ -1,9 +1,11 @@
 """Writes a file whole or not at all, whenever the process is killed."""
 
+import errno
 import os
 from pathlib import Path
 
 PART = ".part"  #: ends the name of a file that is being written
+NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)  #: of an OSError, where the disk is to blame
 
 
 def write_whole(path: Path, data: bytes) -> None:

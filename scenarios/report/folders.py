@@ -24,7 +24,8 @@ def read_campaigns(folders: Sequence[Path]) -> list[Campaign]:
     """Return the campaigns in the folders' order.
 
     Raises:
-        DockairError: no campaign there, no flight done yet, or the same flight in two of them.
+        DockairError: no campaign there, no flight done yet, two that were not flown by the same code, or the same
+            flight in two of them.
     """
     campaigns = []
     for folder in folders:
@@ -33,8 +34,28 @@ def read_campaigns(folders: Sequence[Path]) -> list[Campaign]:
         if not rows:
             raise DockairError(str(folder), expected="a campaign with at least one flight done", got="none")
         campaigns.append(Campaign(name=str(manifest["plan"]["name"]), manifest=manifest, rows=rows))
+    _require_one_code(folders, campaigns)
     _refuse_twins(campaigns)
     return campaigns
+
+
+def _require_one_code(folders: Sequence[Path], campaigns: Sequence[Campaign]) -> None:
+    """Rows of two codes are no group, and to hold one beside the other would be to compare the codes."""
+    seen: dict[str, tuple[str, Path]] = {}
+    for folder, campaign in zip(folders, campaigns, strict=True):
+        for what, value in _flown_by(campaign.manifest).items():
+            earlier, where = seen.setdefault(what, (value, folder))
+            if value != earlier:
+                expected = "campaigns of the same code; others have a report of their own"
+                got = f"{what} {earlier} in {where}, {value} in {folder}"
+                raise DockairError("FOLDER...", expected=expected, got=got)
+
+
+def _flown_by(manifest: Mapping[str, Any]) -> dict[str, str]:
+    """Return what must not differ; a background only where the scenarios left it to the machine."""
+    plug_ins = {f"navigator {module}": digest for module, digest in manifest.get("plug_ins", {}).items()}
+    found = {"code": manifest.get("code"), "background": manifest.get("background")} | plug_ins
+    return {what: value for what, value in found.items() if value}
 
 
 def _refuse_twins(campaigns: Sequence[Campaign]) -> None:

@@ -2,6 +2,7 @@
 
 import json
 import math
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,9 @@ import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
+from dockair.errors import DockairError, MachineError
 from dockair.rotations import Array
+from dockair.scenarios.campaign.whole_file import NO_ROOM, write_whole
 from dockair.scenarios.report import figures
 from dockair.scenarios.report.acceptance import claim_of, shortfalls_of
 from dockair.scenarios.report.folders import Campaign
@@ -91,7 +94,23 @@ def _quantile(values: Array, share: float) -> str:
 
 
 def write_text(text: str, path: Path) -> Path:
-    """Write a file and return its path."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(text, encoding="utf-8")
+    """Write a file whole or not at all, and return its path.
+
+    Raises:
+        DockairError: it cannot be written there.
+        MachineError: there is no room.
+    """
+    where, expected = str(path), "a file that can be written"
+    try:
+        if path.is_dir():
+            raise DockairError(where, expected=expected, got="a folder")
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if path.exists() and not path.is_file():  # /dev/null or a pipe takes text, but nothing may be put in its place
+            path.write_text(text, encoding="utf-8")
+        else:
+            write_whole(Path(os.path.realpath(path)), text.encode())  # a link stays one
+    except OSError as error:
+        if error.errno in NO_ROOM:
+            raise MachineError(where, expected="room to write", remedy="make some") from None
+        raise DockairError(where, expected=expected, got=error.strerror) from None
     return path

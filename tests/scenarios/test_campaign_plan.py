@@ -1,14 +1,16 @@
 """Plans: what is flown, in which order, over what; and what is refused with one line."""
 
+import shlex
 from pathlib import Path
 
 import pytest
 
 from dockair.errors import DockairError
-from dockair.scenarios.campaign.jobs import jobs_of, scenario_hash
+from dockair.scenarios.campaign.jobs import as_toml, jobs_of, scenario_hash
 from dockair.scenarios.campaign.plan_file import PlanFile, plan_names
 from dockair.scenarios.scenario_file import scenario_names
 from dockair.scenarios.schema import load_scenario
+from dockair.scenarios.toml_files import toml_value
 
 
 @pytest.fixture
@@ -62,6 +64,60 @@ values = [1.5]
         2.0,
     )
     assert (second.flight.duration_s, second.start.aft_m, second.guidance.hold_s) == (20.0, 5.0, 2.0)
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "command_line", "flown"),
+    [
+        ("intensity", "sigma_m_s", "intensity", (None, "light")),
+        ("sigma_m_s", "intensity", "sigma_m_s", (0.7, None)),
+        ("intensity", "sigma_m_s", None, (2.5, None)),
+        ("intensity", "intensity", "sigma_m_s", (0.7, None)),
+    ],
+)
+def test_of_two_keys_that_exclude_each_other_the_later_holds(plan, first, second, command_line, flown):
+    values = {"intensity": ['"severe"', '"moderate"', '"light"'], "sigma_m_s": ["1.5", "2.5", "0.7"]}
+    text = f"""
+scenarios = [{{ scenario = "default", set = {{ "turbulence.{second}" = {values[second][1]} }} }}]
+[set]
+"turbulence.{first}" = {values[first][0]}
+"""
+    settings = {f"turbulence.{command_line}": values[command_line][2]} if command_line else {}
+    (job,) = jobs_of(plan(text, settings=settings))
+    assert (job.scenario.turbulence.sigma_m_s, job.scenario.turbulence.intensity) == flown
+    assert flown_again(job) == job.scenario
+
+
+def flown_again(job):
+    """The scenario that a job's command flies."""
+    _, _, file, _, _, *options = shlex.split(job.command)
+    return load_scenario(file, dict(option.split("=", 1) for option in options[1::2]))
+
+
+def test_lists_of_tables_and_whatever_toml_knows_can_be_set(plan):
+    text = """
+scenarios = ["default"]
+[set]
+faults = [{ kind = "dead_reel", start_s = 1.5 }, { kind = "led_dim", leds = [1, 2], factor = 0.25 }]
+gusts = [{ at_s = 1e-3, length_m = 1e3, velocity_m_s = [0.0, -1.0, 2.0] }]
+claim = 'a "quoted" path, ä'
+"turbulence" = { sigma_m_s = 0.3, model = "dryden" }
+"wake.present" = false
+"""
+    (job,) = jobs_of(plan(text))
+    assert [fault.kind for fault in job.scenario.faults] == ["dead_reel", "led_dim"]
+    assert job.scenario.gusts[0].velocity_m_s == (0.0, -1.0, 2.0)
+    assert job.scenario.wake.present is False
+    assert flown_again(job) == job.scenario
+
+
+@pytest.mark.parametrize(
+    "value",
+    [True, 3, -0.0, 1e16, 1e-5, 'a "b" \\ \n \x7f ä', [], [[1], ["x"]], {"a b": {"c": [1.5]}, "d-e": {}, "": 0}],
+)
+def test_a_value_comes_back_from_its_toml(value):
+    assert toml_value(as_toml(value, "key")) == value
+    assert "\n" not in as_toml(value, "key")
 
 
 def test_a_text_of_the_plan_stays_a_text(plan):
@@ -196,6 +252,24 @@ def test_every_packaged_plan_can_be_flown_and_says_what_for(name):
             'scenarios = ["default"]\n[set]\n"navigation.navigator" = "dockair.messages:Mine"',
             'navigation.navigator: expected an importable "module:Class"',
         ),
+        (
+            'scenarios = ["default"]\n[set]\n"start.aft_m" = 2020-01-01',
+            "p.toml: set.start.aft_m: expected a number, a text, true or false, a list or a table, got '2020-01-01'",
+        ),
+        (
+            'scenarios = [{ scenario = "default", set = { faults = [{ kind = "dead_reel", start_s = 07:32:00 }] } }]',
+            "p.toml: scenarios[0].set.faults: expected a number, a text",
+        ),
+        ('scenarios = ["default"]\n[set]\n"start.aft_m" = nan', "p.toml: set.start.aft_m: expected a number from 0.5"),
+        (
+            'scenarios = ["default"]\n[draw."turbulence.sigma_m_s"]\nvalues = [0.5]\n'
+            '[draw."turbulence.intensity"]\nvalues = ["light"]',
+            'p.toml: draw."turbulence.sigma_m_s": expected a key in whose place nothing else is set or drawn',
+        ),
+        (
+            'scenarios = ["default"]\nseeds = 2\n[draw.seed]\nvalues = [5, 6]',
+            'p.toml: draw."seed": expected a key that decides the flight',
+        ),
         ("scenarios = [", "p.toml: expected TOML"),
     ],
 )
@@ -209,6 +283,36 @@ def test_what_the_command_line_asks_in_vain_is_said_to_be_its_own(plan):
     )
     text = 'scenarios = ["default"]\n[draw."start.aft_m"]\nvalues = [3.0]'
     assert "expected a key that the plan does not draw" in refusal_of(plan, text, settings={"start.aft_m": "3"})
+    assert refusal_of(plan, 'scenarios = ["default"]', settings={"start.aft_m": "2020-01-01"}).startswith(
+        "--set start.aft_m: expected a number, a text"
+    )
+
+
+@pytest.mark.parametrize("setting", [{"turbulence.intensity": "light"}, {"turbulence": "{ sigma_m_s = 0.3 }"}])
+def test_what_is_drawn_is_flown_or_refused(plan, setting):
+    """The column of a drawn key would hold values that no flight had."""
+    text = 'scenarios = ["default"]\nseeds = 3\n[draw."turbulence.sigma_m_s"]\nlow = 1.0\nhigh = 3.0'
+    said = refusal_of(plan, text, settings=setting)
+    assert said.startswith(f'{plan(text)._shown}: draw."turbulence.sigma_m_s": expected a key in whose place nothing')
+    assert all(job.scenario.turbulence.sigma_m_s == job.drawn["turbulence.sigma_m_s"] for job in jobs_of(plan(text)))
+
+
+@pytest.mark.parametrize(
+    ("source", "said"),
+    [
+        ("def step(:", "SyntaxError: invalid syntax (own_broken.py, line 1)"),
+        ("gain = 1\nhalf = gain / 0", "ZeroDivisionError: division by zero (/"),
+        ("raise SystemExit(0)", "SystemExit: 0 (/"),
+        ("raise KeyError('two\\nlines')", "KeyError: "),
+    ],
+)
+def test_a_navigator_whose_module_fails_is_refused_with_what_it_said(plan, tmp_path, monkeypatch, source, said):
+    monkeypatch.syspath_prepend(str(tmp_path))
+    (tmp_path / "own_broken.py").write_text(source)
+    text = 'scenarios = ["default"]\n[set]\n"navigation.navigator" = "own_broken:Navigator"'
+    refused = refusal_of(plan, text)
+    assert 'navigation.navigator: expected an importable "module:Class"' in refused
+    assert said in refused
 
 
 def test_a_plan_that_does_not_exist_lists_those_that_do():

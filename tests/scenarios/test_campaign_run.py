@@ -1,6 +1,8 @@
 """Campaigns run, broken off, gone on with: nothing is lost, nothing is flown twice, nobody else's files are touched."""
 
 import errno
+import importlib
+import io
 import json
 import os
 import random
@@ -12,16 +14,20 @@ from collections import Counter
 from pathlib import Path
 
 import pytest
+from rich.console import Console
 
 from dockair.errors import DockairError, MachineError
 from dockair.scenarios import campaign_command, cli
 from dockair.scenarios.campaign import manifest
 from dockair.scenarios.campaign import run as run_module
+from dockair.scenarios.campaign.code import Code, plug_in_files
 from dockair.scenarios.campaign.folder import rows_of
+from dockair.scenarios.campaign.jobs import jobs_of
 from dockair.scenarios.campaign.journal import Journal
 from dockair.scenarios.campaign.manifest import read_manifest
 from dockair.scenarios.campaign.plan_file import PlanFile
-from dockair.scenarios.campaign.pool import Done
+from dockair.scenarios.campaign.pool import Done, Pool
+from dockair.scenarios.campaign.progress import CampaignProgress, show_campaign
 from dockair.scenarios.campaign.run import run
 from dockair.scenarios.campaign.table import read_table
 from dockair.scenarios.campaign.whole_file import write_whole
@@ -61,6 +67,9 @@ def deadly(job):
 def who(job):
     return {"outcome": "miss", "frames": os.getpid()}
 
+def never(job):
+    raise ValueError("not today")
+
 def sleeper(job):
     with open(os.environ["FLOWN"], "w") as file:
         file.write(f"{os.getpid()}\\n")
@@ -84,7 +93,7 @@ def fakes(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(str(folder))
     monkeypatch.setenv("FLOWN", str(tmp_path / "flown"))
     monkeypatch.setenv("PYTHONPATH", str(folder))
-    monkeypatch.setattr(manifest, "code_digest", lambda: "c0de")  # whoever edits the sources meanwhile
+    monkeypatch.setattr("dockair.scenarios.campaign.code.dockair_files", dict)  # whoever edits the sources meanwhile
     monkeypatch.setattr(manifest, "commit_of_the_code", lambda: ("abc", False))
     return tmp_path / "flown"
 
@@ -95,7 +104,7 @@ def here(fakes, monkeypatch):
     import fake_flights
 
     class Here:
-        def __init__(self, workers, timeout_s, flight):
+        def __init__(self, workers, timeout_s, flight, check):
             self.fly = getattr(fake_flights, flight.rpartition(":")[2])
 
         def __enter__(self):
@@ -192,11 +201,14 @@ def test_another_plan_in_the_same_folder_is_refused_and_fresh_begins_anew(here, 
 
 @pytest.mark.parametrize(
     ("name", "value", "said"),
-    [("code_digest", "f00", "another code (of commit"), ("versions", {"numpy": "0.9"}, "other versions:")],
+    [
+        ("code.dockair_files", {"sim/air.py": Path(__file__)}, "another code (of commit"),
+        ("manifest.versions", {"numpy": "0.9"}, "other versions:"),
+    ],
 )
 def test_another_code_is_refused_for_its_rows_are_another_campaign(here, tmp_path, monkeypatch, name, value, said):
     fly(plan(tmp_path), tmp_path / "out")
-    monkeypatch.setattr(f"dockair.scenarios.campaign.manifest.{name}", lambda: value)
+    monkeypatch.setattr(f"dockair.scenarios.campaign.{name}", lambda: value)
     with pytest.raises(DockairError) as refused:
         fly(plan(tmp_path), tmp_path / "out")
     assert said in str(refused.value)
@@ -227,6 +239,8 @@ def test_a_background_left_to_the_machine_is_the_same_in_every_process(here, tmp
         ("scenarios/report/page.py", False),
         ("scenarios/library/still_air.toml", False),  # the job's key has it
         ("nav/README.md", False),
+        ("nav/.fusion.py.swp", False),  # somebody looks at it
+        ("nav/__pycache__/fusion.cpython-311.pyc.140", False),
     ],
 )
 def test_the_digest_of_the_code_is_of_what_decides_flights(tmp_path, monkeypatch, name, counts):
@@ -238,8 +252,128 @@ def test_the_digest_of_the_code_is_of_what_decides_flights(tmp_path, monkeypatch
     digests = []
     for text in ("one", "two"):
         path.write_text(text)
-        digests.append(manifest.code_digest())
+        digests.append(Code().digest)
     assert (digests[0] != digests[1]) is counts
+
+
+@pytest.fixture
+def own_navigator(fakes, monkeypatch):
+    """A module and a package with a navigator each; returns their folder."""
+    folder = fakes.parent / "modules"
+    (folder / "my_package/parts").mkdir(parents=True)
+    files = {
+        "my_module.py": "class Mine:\n    pass\n",
+        "my_package/__init__.py": "",
+        "my_package/gains.py": "gain = 1\n",
+    }
+    files |= {"my_package/parts/__init__.py": "", "my_package/parts/navigator.py": "class Mine:\n    pass\n"}
+    for name, text in files.items():
+        (folder / name).write_text(text)
+    importlib.invalidate_caches()
+    yield folder
+    for name in [name for name in sys.modules if name.partition(".")[0] in ("my_module", "my_package")]:
+        del sys.modules[name]
+
+
+def flown_by(*navigators: str) -> str:
+    """Return a plan's scenarios."""
+    table = '{{ scenario = "still_air", set = {{ "camera.sensing" = "measurements", "navigation.navigator" = "{}" }} }}'
+    return ", ".join(table.format(name) for name in navigators)
+
+
+@pytest.mark.parametrize(
+    ("navigator", "changed"),
+    [
+        ("my_module:Mine", "my_module.py"),
+        ("my_package.parts.navigator:Mine", "my_package/parts/navigator.py"),
+        ("my_package.parts.navigator:Mine", "my_package/gains.py"),
+    ],
+)
+def test_a_navigator_of_ones_own_is_part_of_the_code(here, own_navigator, tmp_path, navigator, changed):
+    scenarios, path = flown_by(navigator), own_navigator / changed
+    fly(plan(tmp_path, 2, scenarios=scenarios), tmp_path / "out")
+    assert len(fly(plan(tmp_path, 3, scenarios=scenarios), tmp_path / "out").rows) == 3
+    journal, as_it_was = (tmp_path / "out/journal.jsonl").read_bytes(), path.read_text()
+    path.write_text(as_it_was + "# other gains\n")
+    with pytest.raises(DockairError, match=f"another code of the navigator in {navigator.partition(':')[0]}"):
+        fly(plan(tmp_path, 4, scenarios=scenarios), tmp_path / "out")
+    assert (tmp_path / "out/journal.jsonl").read_bytes() == journal
+    path.write_text(as_it_was)
+    assert len(fly(plan(tmp_path, 4, scenarios=scenarios), tmp_path / "out").rows) == 4
+    assert len(lines(here)) == 4
+
+
+def test_another_navigator_may_come_and_one_that_has_not_flown_may_change(here, own_navigator, tmp_path):
+    fly(plan(tmp_path, 2, scenarios='"truth_navigation"'), tmp_path / "out")
+    both = f'"truth_navigation", {flown_by("my_module:Mine")}'
+    (own_navigator / "my_module.py").write_text("class Mine:\n    gain = 2\n")
+    assert len(fly(plan(tmp_path, 2, scenarios=both), tmp_path / "out").rows) == 4
+    assert list(read_manifest(tmp_path / "out")["plug_ins"]) == ["my_module"]
+
+
+def test_only_what_is_not_dockairs_is_a_navigator_of_ones_own(own_navigator, tmp_path):
+    scenarios = f'"truth_navigation", "still_air", {flown_by("my_module:Mine")}'
+    assert [job.plug_in for job in jobs_of(plan(tmp_path, 1, scenarios=scenarios))] == ["", "", "my_module"]
+    assert list(plug_in_files("my_module")) == ["my_module.py"]
+
+
+def test_code_that_changes_meanwhile_ends_the_campaign_and_restored_goes_on(here, own_navigator, tmp_path, monkeypatch):
+    import fake_flights
+
+    path, scenarios = own_navigator / "my_module.py", flown_by("my_module:Mine")
+    as_it_was, quick = path.read_text(), fake_flights.quick
+
+    def edited(job):
+        if job.seed == 2:
+            path.write_text(as_it_was.replace("pass", "halt"))  # as long as before
+        return quick(job)
+
+    monkeypatch.setattr(fake_flights, "quick", edited)
+    with pytest.raises(DockairError) as refused:
+        fly(plan(tmp_path, 5, scenarios=scenarios), tmp_path / "out")
+    assert refused.value.exit_code == 2 and "\n" not in str(refused.value)
+    assert "--fresh begins anew), got 'a change of my_module.py'" in str(refused.value)
+    assert [row["seed"] for row in rows_of(tmp_path / "out")] == [0, 1]  # 2 was flown while it changed
+    monkeypatch.setattr(fake_flights, "quick", quick)
+    path.write_text(as_it_was)
+    assert len(fly(plan(tmp_path, 5, scenarios=scenarios), tmp_path / "out").rows) == 5
+    assert [line[-2:] for line in lines(here)] == [":0", ":1", ":2", ":2", ":3", ":4"]
+
+
+def test_no_process_begins_on_another_code(fakes, tmp_path):
+    def changed():
+        raise DockairError("--out x", expected="the same code", got="another")
+
+    jobs = jobs_of(plan(tmp_path, 1))
+    with Pool(2, 1.0, "fake_flights:quick", changed) as pool, pytest.raises(DockairError, match="the same code"):
+        next(pool.done(jobs))
+    assert not lines(fakes)
+
+
+def test_a_change_is_seen_whatever_the_clock_of_the_file_says(tmp_path, monkeypatch):
+    monkeypatch.setattr("dockair.scenarios.campaign.code.dockair_files", dict)
+    path = tmp_path / "ring.toml"
+    path.write_text("a = 1")
+    os.utime(path, (1e9, 1e9))
+    code = Code(sheets=[str(path)])
+    code.require_unchanged("--out x")
+    path.write_text("a = 2")
+    os.utime(path, (1e9, 1e9))
+    with pytest.raises(DockairError, match="a change of .*ring.toml"):
+        code.require_unchanged("--out x")
+    path.unlink()
+    with pytest.raises(DockairError, match="a change of .*ring.toml"):
+        code.require_unchanged("--out x")
+
+
+def test_what_has_not_changed_is_not_read_again(tmp_path, monkeypatch):
+    path = tmp_path / "ring.toml"
+    path.write_text("a = 1")
+    monkeypatch.setattr("dockair.scenarios.campaign.code.dockair_files", dict)
+    monkeypatch.setattr("dockair.scenarios.campaign.code._SETTLED_NS", -1)
+    code = Code(sheets=[str(path)])
+    monkeypatch.setattr(Path, "read_bytes", lambda path: pytest.fail(f"{path} read again"))
+    code.require_unchanged("--out x")
 
 
 def test_the_commit_is_that_of_the_sources_and_none_outside_git(tmp_path, monkeypatch):
@@ -325,6 +459,98 @@ def test_other_peoples_files_are_refused_untouched(here, tmp_path):
     assert [path.name for path in folder.iterdir()] == ["thesis.tex"]
 
 
+@pytest.mark.parametrize(
+    ("files", "got"),
+    [
+        ({"main.js": "x", "manifest.json": '{"name": "an extension"}', "summary.json": "{}"}, "main.js"),
+        ({"manifest.json": '{"name": "an extension"}'}, "manifest.json"),
+        ({"flights.parquet": "departures"}, "flights.parquet"),
+        ({"journal.jsonl": '{"entry": "dear diary"}'}, "another journal.jsonl"),
+        ({"journal.jsonl": '{"entry": "dear diary"}\n', "manifest.json": "{}"}, "another journal.jsonl"),
+    ],
+)
+def test_a_name_that_others_use_too_makes_no_campaign(here, tmp_path, files, got):
+    folder = tmp_path / "theirs"
+    folder.mkdir()
+    for name, text in files.items():
+        (folder / name).write_text(text)
+    for options in ({}, {"fresh": True}):
+        with pytest.raises(DockairError, match=f"got 'a folder with {got}'"):
+            fly(plan(tmp_path), folder, **options)
+    assert {path.name: path.read_text() for path in folder.iterdir()} == files
+
+
+def test_what_one_campaign_is_writing_no_other_removes(here, tmp_path):
+    fly(plan(tmp_path), tmp_path / "out")
+    part = tmp_path / "out/flights.parquet.part"
+    with Journal(tmp_path / "out"):
+        part.write_text("half")
+        for options in ({}, {"fresh": True}):
+            with pytest.raises(DockairError, match="another process at work"):
+                fly(plan(tmp_path), tmp_path / "out", **options)
+        assert part.read_text() == "half"
+    fly(plan(tmp_path), tmp_path / "out")
+    assert not part.exists()
+
+
+@pytest.mark.parametrize("torn", [b"", b"\0" * 40, b'{"ke'])
+def test_a_campaign_that_ended_in_its_first_line_begins_again(here, tmp_path, torn):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out/journal.jsonl").write_bytes(torn)
+    assert len(fly(plan(tmp_path), tmp_path / "out").rows) == 4
+
+
+def stopped(source: PlanFile, out: Path, after: int, flight: str = "quick", **options) -> None:
+    """Run a campaign that somebody stops after some flights."""
+
+    def watch(jobs, entries):
+        flown = iter(range(1, after))
+
+        def told(row, wall_time_s):
+            if next(flown, None) is None:
+                raise KeyboardInterrupt
+
+        return told
+
+    with pytest.raises(KeyboardInterrupt):
+        fly(source, out, flight, watch=watch, **options)
+
+
+def results(out: Path) -> set[str]:
+    return {"flights.parquet", "summary.json", "timing.json"} & {path.name for path in out.iterdir()}
+
+
+def test_while_a_campaign_grows_its_rows_are_those_that_are_done(here, tmp_path):
+    fly(plan(tmp_path, 2), tmp_path / "out")
+    assert len(results(tmp_path / "out")) == 3
+    stopped(plan(tmp_path, 9), tmp_path / "out", 4)
+    assert read_manifest(tmp_path / "out")["flights"] == 9
+    assert [row["seed"] for row in rows_of(tmp_path / "out")] == [0, 1, 2, 3, 4, 5]
+    assert not results(tmp_path / "out")
+    assert len(fly(plan(tmp_path, 9), tmp_path / "out").rows) == 9
+    assert len(results(tmp_path / "out")) == 3
+
+
+def test_while_errors_are_flown_again_the_rows_are_the_newer_ones(here, tmp_path):
+    fly(plan(tmp_path, 3), tmp_path / "out", "never")
+    assert [bool(row["error"]) for row in rows_of(tmp_path / "out")] == [True] * 3
+    stopped(plan(tmp_path, 3), tmp_path / "out", 2, retry_errors=True)
+    assert [bool(row["error"]) for row in rows_of(tmp_path / "out")] == [False, False, True]
+
+
+def test_a_fresh_campaign_never_shows_the_rows_of_the_one_before(here, tmp_path, monkeypatch):
+    fly(plan(tmp_path, 2), tmp_path / "out")
+
+    def killed(journal):
+        assert not results(tmp_path / "out")  # they go before the rows that they are of
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Journal, "clear", killed)
+    with pytest.raises(KeyboardInterrupt):
+        fly(plan(tmp_path, 9), tmp_path / "out", fresh=True)
+    assert len(rows_of(tmp_path / "out")) == read_manifest(tmp_path / "out")["flights"] == 2
+
+
 def test_a_folder_that_cannot_be_written_is_refused(here, tmp_path):
     with pytest.raises(DockairError, match="--out /proc/campaign: expected a folder that can be written"):
         fly(plan(tmp_path), Path("/proc/campaign"))
@@ -394,6 +620,40 @@ def test_mistakes_are_one_line_and_status_two(command, here, tmp_path):
         assert err.startswith("dockair: ") and err.count("\n") == 1
 
 
+def test_whatever_an_error_says_is_said_as_it_is(command, here, tmp_path, monkeypatch):
+    """What looks like markup would be swallowed, or raise."""
+    import fake_flights
+
+    said = "OSError: no sheet in [/opt/sheets], [hose] [/]"
+
+    def fails(job):
+        raise OSError(said.partition(": ")[2])
+
+    monkeypatch.setattr(fake_flights, "quick", fails)
+    plan(tmp_path, 1)
+    status, out, err = command("p.toml", "--out", "[hose]")
+    assert status == 0
+    assert f"truth_navigation, seed 0: {said}" in err
+    assert "  [hose]\n" in out
+
+
+def test_a_reason_of_the_gate_is_printed_as_it_is(capsys):
+    show_campaign({"groups": [], "gate": {"passed": False, "reasons": ["[/] of [hose]"]}, "folder": "out"})
+    assert "gate failed: [/] of [hose]" in capsys.readouterr().out
+
+
+def test_flights_that_are_flown_again_count_once(here, tmp_path):
+    fly(plan(tmp_path, 4), tmp_path / "out", "never")
+    text = io.StringIO()
+    progress = CampaignProgress(Console(file=text, width=200))
+    fly(plan(tmp_path, 4), tmp_path / "out", watch=progress.begin, retry_errors=True)
+    bars = {task.description: (task.completed, task.total) for task in progress._bars.tasks}
+    assert bars == {"truth_navigation (truth)": (4, 4), "all": (4, 4)}
+    assert progress._pace().endswith(" 0 s left")
+    assert "2 of 4 docked" in progress._rates()
+    assert "were done before" not in text.getvalue()
+
+
 def test_the_samplers_of_the_command_line_are_those_of_the_plan():
     from typing import get_args
 
@@ -444,12 +704,12 @@ def test_a_function_that_cannot_be_imported_is_said_once(fakes, tmp_path):
 SERVER = """
 import os, sys
 from pathlib import Path
-from dockair.scenarios.campaign import manifest
+from dockair.scenarios.campaign import code
 from dockair.scenarios.campaign.plan_file import PlanFile
 from dockair.scenarios.campaign.run import run
 
 if __name__ == "__main__":
-    manifest.code_digest = lambda: "c0de"
+    code.dockair_files = dict
     for line in sys.stdin:
         child = os.fork()
         if child == 0:

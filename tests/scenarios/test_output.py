@@ -6,7 +6,8 @@ from types import SimpleNamespace
 import numpy as np
 from rich.console import Console
 
-from dockair.scenarios.output import FlightProgress, show_result
+from dockair.scenarios.doctor import Check
+from dockair.scenarios.output import FlightProgress, show_checks, show_reproduction, show_result
 
 
 def tick(time_s: float):
@@ -64,3 +65,29 @@ def test_every_failed_attempt_is_told_with_its_cause(capsys, tmp_path):
     assert lines[1] == "attempt 1: rim strike, 0.21 m off; cause: gust"
     assert lines[2] == "attempt 2: breakaway (track lost); cause: detection"
     assert not any("attempt 3" in line for line in lines)
+
+
+def test_what_others_say_is_printed_as_it_is(capsys, tmp_path):
+    """Markup would be swallowed, or raise: a folder's name, a reason of one's own navigator, what the machine lacks."""
+    folder = tmp_path / "[hose]" / "[/]"
+    folder.mkdir(parents=True)
+    (folder / "flight.png").touch()
+    failed = {"number": 1, "outcome": "miss", "radial_offset_m": None, "cause": "gust", "reason": "[/] lost"}
+    show_result({"outcome": "miss", "scenario": "mine", "seed": 1, "attempt_log": [failed]}, ["[/] short"], folder)
+    show_checks([Check("OpenGL", False, "[egl] none", "see [/]"), Check("disk", True, "[dev]")], {"numpy": "[2]"})
+    show_reproduction({"id": "a/b", "source": "[paper]", "rows": []}, folder / "picture.png")
+    out = capsys.readouterr().out
+    for said in ("attempt 1: miss ([/] lost)", "[/] short", f"  {folder}/flight.png  0.00 MB", "[egl] none; see [/]"):
+        assert said in out
+    for said in ("ok", "[dev]", "numpy [2]", "a/b  [paper]"):
+        assert said in out
+
+
+def test_a_phase_of_ones_own_navigator_is_no_markup():
+    truth, _ = tick(10.0)
+    for terminal in (True, False):
+        text = io.StringIO()
+        with FlightProgress(20.0, Console(file=text, width=120, force_terminal=terminal)) as progress:
+            progress(truth, SimpleNamespace(phase="[/hold]"))
+            progress._bar.refresh()
+            assert "[/hold]" in text.getvalue()
