@@ -84,7 +84,8 @@ class Guidance:
             self._follow_path(state, ring, rate)
         self._observe(state, ring, rate)
         middle = self._controller.middle_m if state.usable else None
-        self._reckoning.step(middle, self._controller.steady_drift_m_s, self._u)
+        bearable = self._controller.bears_the_gusts
+        self._reckoning.step(middle, self._controller.steady_drift_m_s, self._u, bearable=bearable)
         self._count(state, ring, rate, coupling)
         self._change_phase(self._situation(ring, rate, coupling))
         u_dot = self._follow(ring) if self._follows(state, ring) else self._hold_course(ring)

@@ -26,24 +26,26 @@ class DeadReckoning:
     def __init__(self, settings: GuidanceSettings, step_s: float) -> None:
         self._settings, self._step_s = settings, step_s
         self._place_m: Array = np.zeros(3)
+        self._most_m_s = settings.unseen_drift_m_s
 
-    def step(self, middle_m: Array | None, drift_m_s: Array, u_m_s: Array) -> None:
+    def step(self, middle_m: Array | None, drift_m_s: Array, u_m_s: Array, *, bearable: bool) -> None:
         """Advance by one control tick.
 
         Args:
             middle_m: (3,) p of a drogue that is seen, None out of view.
             drift_m_s: (3,) d, as learnt while it was in view.
             u_m_s: (3,) u.
+            bearable: whether the gusts can be borne.
         """
+        self._most_m_s = self._settings.unseen_drift_m_s if bearable else self._settings.unseen_drift_in_gusts_m_s
         if middle_m is not None:
             self._place_m = middle_m
         else:
             self._place_m = self._place_m + (self.believed(drift_m_s) - u_m_s) * self._step_s
 
     def believed(self, drift_m_s: Array) -> Array:
-        """(3,) of a drift that was learnt, what may be believed out of view: it may be half a swing."""
-        most = self._settings.unseen_drift_m_s
-        return np.clip(drift_m_s, -most, most)
+        """(3,) of a drift that was learnt, what may be believed out of view: it may be half a swing, or a gust's."""
+        return np.clip(drift_m_s, -self._most_m_s, self._most_m_s)
 
     def astern_m_s(self) -> Array:
         """(3,) velocity across to get astern of the drogue; none beside it."""

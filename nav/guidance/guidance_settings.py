@@ -31,7 +31,8 @@ class PredictiveSettings:
     excess_max: float = 1.5  # of that: three times what is bearable is severe turbulence
     bearing_s: float = 4.0  # over which that mean is taken: a swing and a half
     gusts_s: float = 30.0  # over which it is taken before an approach: a lull in severe turbulence is over too soon
-    steady_s: float = 6.0  # over which the drift is taken that is held on the probe: longer than a surge of the reel
+    #: Over which the drift is taken that is held on the probe: longer than a surge of the reel; less is a glimpse.
+    steady_s: float = 6.0
     unseen_s: float = 0.5  # after which the swing is begun anew: what has come of it would be taken for drift
     #: T_e of `own_path`: in moderate gusts the tip, astern, went on by 0.41, 0.36, 0.30 m in half a second for each m/s
     #: that it strayed at.
@@ -72,6 +73,7 @@ class GuidanceSettings:
     take_in_gain_1_s: float = 0.35  # speed into the refuelling range per metre to go; a third of the next: no overshoot
     course_gain_1_s: float = 1.2  # how fast a course without a view of the drogue is taken up
     unseen_drift_m_s: float = 0.5  # 2.5 sigma of an inertial velocity; a drogue keeps place behind its tanker
+    unseen_drift_in_gusts_m_s: float = 0.2  # 1 sigma where the gusts cannot be borne: what was learnt there is theirs
     reckoned_gain_1_s: float = 0.5  # back astern of a drogue that went out of view: half of its place off in 1.4 s
     funnel_s: float = 0.25  # from the ring to the coupling; what the drogue does after that is the probe's own doing
     levelling_s: float = 10.0  # of the stabilised axes: long beside the swing, short beside a turn

@@ -82,6 +82,7 @@ class Predictive:
         self._asked = _AT_FIRST * self._bearable  # mean square of the drogue's acceleration, left and up
         self._gusts: Array = np.zeros(2)  # the same over some swings more, beginning at nothing ...
         self._gusts_seen = 0.0  # ... so that this share of it has been seen
+        self._seen_s = 0.0  # how long the drogue has been in view since the drift was begun anew
         self._drift: Array = np.zeros(3)  # mean of the drift, beginning at nothing likewise
         self._drift_seen = 0.0
 
@@ -100,11 +101,10 @@ class Predictive:
         else:
             push = sight.push_m_s2
             place, velocity = sight.place_m + self._own.place_m, sight.rate_m_s + self._own.velocity_m_s
-            if np.isinf(self._unseen_s):
-                self._motion.start(place, velocity)
-            elif self._unseen_s > self._settings.unseen_s:
-                self._motion.resume(place)
+            if self._unseen_s > self._settings.unseen_s:
+                self._begin_anew(place, velocity)
             self._unseen_s = 0.0
+            self._seen_s += self._step_s
             self._motion.step(place, velocity, push[0], self._own.felt_change_m_s)
         self._ahead = self._motion.ahead(push[0], push[1])
         self._path = self._motion.path(push)
@@ -118,6 +118,15 @@ class Predictive:
             share = self._step_s / self._settings.steady_s
             self._drift = self._drift + share * (self._motion.drift_m_s - self._drift)
             self._drift_seen += share * (1.0 - self._drift_seen)
+
+    def _begin_anew(self, place_m: Array, velocity_m_s: Array) -> None:
+        """Take up a drogue that comes into view; a drift learnt from glimpses may be a gust's, and is forgotten."""
+        if self._seen_s >= self._settings.steady_s:
+            self._motion.resume(place_m)
+            return
+        self._motion.start(place_m, velocity_m_s)
+        self._seen_s = self._drift_seen = 0.0
+        self._drift = np.zeros(3)
 
     def given(self, velocity_m_s: Array, acceleration_m_s2: Array) -> None:
         """Take note of velocity and acceleration (3,) commanded for the next period."""

@@ -1,6 +1,7 @@
 """What the predictive controller says of the drogue where it is not looked at."""
 
 import numpy as np
+import pytest
 
 from dockair.nav.guidance.controller import Sight
 from dockair.nav.guidance.guidance_settings import GuidanceSettings
@@ -114,3 +115,16 @@ def test_a_gust_that_lifts_the_tip_says_where_the_drogue_will_go():
         ahead[felt_m_s] = controller._motion.path(np.zeros((5, 3)))[:, 2]
     assert np.abs(ahead[0.0]).max() < 1e-9
     assert np.abs(ahead[0.03]).max() > 0.01
+
+
+@pytest.mark.parametrize(("seconds", "kept"), [(2.0, False), (9.0, True)])
+def test_a_drift_learnt_from_a_glimpse_is_forgotten_where_the_drogue_comes_into_view_again(seconds, kept):
+    down = np.array([0.0, 0.0, -1.0])
+    controller = shown(lambda t: np.array([8.0, 0.0, 0.0]) + down * t, lambda _: down, seconds)
+    assert controller.drift_m_s[2] < -0.3
+    for _ in range(100):
+        controller.observe(None, NOT_FELT)
+    push = np.zeros((len(controller.looks_ahead_s), 3))
+    controller.observe(Sight(place_m=np.array([8.0, 0.0, 0.0]), rate_m_s=np.zeros(3), push_m_s2=push), NOT_FELT)
+    drift_up_m_s = controller.drift_m_s[2], controller.steady_drift_m_s[2]
+    assert (max(drift_up_m_s) < -0.3) if kept else (min(np.abs(drift_up_m_s)) < 0.01)
