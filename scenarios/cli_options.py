@@ -23,11 +23,12 @@ def overrides(settings: list[str] | None) -> dict[str, str]:
     Raises:
         DockairError: a setting without key or equals sign.
     """
-    found = {}
+    found: dict[str, str] = {}
     for setting in settings or ():
         key, equals, value = setting.partition("=")
         if not equals or not key.strip():
             raise DockairError("--set", expected="key=value, as in turbulence.sigma_m_s=1.1", got=setting)
+        found.pop(key.strip(), None)  # the later holds, also against another key that says the same thing
         found[key.strip()] = value.strip()
     return found
 

@@ -134,7 +134,7 @@ def show_campaign(table: Mapping[str, Any]) -> None:
     console.print(shown)
     for group in table["groups"]:
         for shortfall in group["shortfalls"] or ():
-            where = f"{group['scenario']} ({group['sensing']})"
+            where = f"{group['scenario']} ({group['sensing']}, {group['controller']})"
             console.print(f"not as claimed: {where}: {shortfall}", style="yellow", soft_wrap=True)
     _show_gate(console, table["gate"])
     console.print(f"  {table['folder']}", soft_wrap=True)

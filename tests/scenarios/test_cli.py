@@ -13,10 +13,12 @@ import pytest
 
 from dockair.errors import DockairError, MachineError
 from dockair.scenarios import cli, doctor
+from dockair.scenarios.cli_options import overrides
 from dockair.scenarios.metrics import NavigationFigures
 from dockair.scenarios.output_folder import prepare_output_folder
 from dockair.scenarios.referee import Contact
 from dockair.scenarios.result import Result
+from dockair.scenarios.schema import load_scenario
 from dockair.sim import opengl
 
 NAVIGATION = NavigationFigures(
@@ -338,3 +340,11 @@ def test_a_real_flight_through_the_command_line_prints_its_result_and_repeats_it
     assert results[0] == results[1]
     assert results[0]["outcome"] == "timeout"
     assert results[0]["truth_navigation"] is True
+
+
+def test_of_settings_that_are_repeated_the_last_holds_against_its_alternative_too():
+    """Gusts are given by sigma or by intensity: what is set last replaces what the other said before."""
+    settings = ["turbulence.intensity=light", "turbulence.sigma_m_s=2.5", "turbulence.intensity=severe"]
+    assert list(overrides(settings).items()) == [("turbulence.sigma_m_s", "2.5"), ("turbulence.intensity", "severe")]
+    turbulence = load_scenario("default", overrides(settings)).turbulence
+    assert (turbulence.intensity, turbulence.sigma_m_s) == ("severe", None)
