@@ -10,6 +10,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import typer
+from rich.text import Text
 
 from dockair.errors import DockairError, MachineError
 from dockair.scenarios import cli, doctor
@@ -307,6 +309,15 @@ def test_help_and_version_need_no_command(command):
     assert status == 0
     assert all(name in out for name in ("fly", "scenarios", "replay", "bench", "doctor"))
     assert command("--version")[1].strip() == cli.dockair.__version__
+
+
+def test_no_help_text_loses_words_in_brackets_as_markup():
+    group = typer.main.get_command(cli.app)
+    told = {(name, part.name): part.help for name, made in group.commands.items() for part in made.params}
+    told |= {(name, ""): made.help for name, made in group.commands.items()}
+    assert ("design-ring", "depth") in told and ("fly", "") in told
+    lost = {where: text for where, text in told.items() if text and Text.from_markup(text).plain != text}
+    assert lost == {}
 
 
 @pytest.mark.parametrize("arguments", [("--help",), ("fly", "--help"), ("scenarios",)])
