@@ -61,7 +61,6 @@ RESPONSE_S = {  # delay of the probe's tip forward, left, up, behind a command a
 #: off with frequency, and what it lacks does not die away: 7 of 8 first attempts docked so, 8 of 8 without (seeds 0-7,
 #: perfect navigation).
 STRAYING_LIMIT_M_S = {"fighter": 0.5, "unmanned": 0.0}
-BRAKED = 0.8  # of the commanded deceleration, reckoned with for the last moment: some goes into what gusts do along
 COMMANDED = 0.95  # of the accelerations that the flight control flies: what it cut off would be missing in guidance
 STAND_OFF_M = 4.0  # pre-contact: procedures say 3-5 m behind the drogue
 SUN_OVERHEAD = np.array([0.0, 0.0, 1.0])  # lights the scene of a scenario without Sun
@@ -212,7 +211,7 @@ def guidance_settings(scenario: Scenario) -> GuidanceSettings:
         stand_off_m=STAND_OFF_M,
         closure_speed_m_s=g.closure_speed_m_s,
         closure_acceleration_m_s2=min(nominal.closure_acceleration_m_s2, acceleration_limit[0]),
-        closing=nominal.closing.braked_at(BRAKED * acceleration_limit[0]),
+        closing=nominal.closing.braked_at(acceleration_limit[0]),
         response_s=RESPONSE_S[scenario.hardware.airframe],
         acceleration_limit_m_s2=acceleration_limit,
         jerk_limit_m_s3=_commanded(control.jerk_limit_m_s3),
