@@ -29,7 +29,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dockair.nav.belief_frame import Explanation, explanations
-from dockair.nav.belief_motion import CALIBRATION, ERRORS, HARDWARE, REST, RING, V
+from dockair.nav.belief_motion import (
+    CALIBRATION,
+    ERRORS,
+    HARDWARE,
+    PLACE,
+    REST,
+    RING,
+    SWING,
+    SWING_RATE,
+    VELOCITY,
+    V,
+)
 from dockair.nav.belief_sight import Apparent, Belief, Sight
 from dockair.nav.pose.difference import pose_difference
 from dockair.nav.pose.estimate import PoseEstimate
@@ -213,14 +224,27 @@ def rolled(belief: Belief, roll_rad: float, led_place_variance_m2: float) -> Bel
     return replace(belief, R_BD=R_BD, P=P, ring=np.zeros_like(belief.ring))
 
 
-def begun_again(belief: Belief, start: Belief, p_ID: Array) -> Belief:
+def begun_again(belief: Belief, start: Belief, p_ID: Array, turn_sigma_rad: float) -> Belief:
     """Return what is believed of a drogue that was lost and is seen at a place (3,) again.
 
-    Of the lost belief what is the receiver's own and the LEDs' stays; the drogue's attitude and motion are the start's.
+    Where it is and how it moves is the start's. Everything else stays, with what is known of it: the gyro has carried
+    the attitude on, but for what the drogue has turned meanwhile.
+
+    Args:
+        belief: that was lost.
+        start: that of the first message.
+        p_ID: where the drogue is seen.
+        turn_sigma_rad: what the drogue may have turned by on each axis.
     """
-    x = start.x.copy()
-    x[0], x[4:6] = p_ID, belief.x[4:6]
-    return replace(start, x=x, ring=belief.ring)
+    moving = np.r_[PLACE, VELOCITY, SWING, SWING_RATE]
+    P = belief.P.copy()
+    P[moving], P[:, moving] = 0.0, 0.0
+    P[np.ix_(moving, moving)] = start.P[np.ix_(moving, moving)]
+    P[range(3), range(3)] += turn_sigma_rad**2
+    x = belief.x.copy()
+    x[:4] = start.x[:4]
+    x[0] = p_ID
+    return replace(belief, x=x, P=P)
 
 
 def felt_first(belief: Belief, force_B: Array) -> Belief:

@@ -34,7 +34,7 @@ from dockair.nav.fusion_settings import motion_of, start_of, taking_of
 from dockair.nav.imu_record import ImuRecord, Stamps
 from dockair.nav.pose.estimate import PoseEstimate, PoseStatus
 from dockair.nav.pose.measurement import LinesOfSight, lines_of_sight_from_pixels
-from dockair.rotations import Array, skew
+from dockair.rotations import Array, log, skew
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -155,11 +155,21 @@ class RelativeFilter:
         self._renew_head()
 
     def begin_again(self, pose: PoseEstimate, time_s: float) -> None:
-        """Begin afresh at a time with the drogue where a converged pose has it: it had been lost."""
-        mounting = self._sheets.mounting
+        """Begin afresh at a time with the drogue where a converged pose has it: it had been lost.
+
+        Its LEDs were numbered without a belief, right up to the ring's symmetry: the attitude that the gyro has carried
+        on is turned by as many LEDs as brings it nearest to the pose's.
+        """
+        mounting, settings = self._sheets.mounting, self._settings
         p_ID = mounting.R_BC @ pose.p_CD + mounting.p_BC - mounting.p_BI
         lost = mixture(self._beliefs(time_s))
-        self._nodes, self._head = [_Node(time_s, None, [begun_again(lost, start, p_ID) for start in self._start])], None
+        apart_rad = 2.0 * np.pi / self._sheets.ring.count
+        turn = log(lost.R_BD.T @ mounting.R_BC @ pose.R_CD)
+        leds = round(float(turn[0]) / apart_rad)
+        if leds != 0:
+            lost = rolled(lost, leds * apart_rad, settings.led_place_sigma_m**2)
+        beliefs = [begun_again(lost, start, p_ID, settings.doubt_attitude_sigma_rad) for start in self._start]
+        self._nodes, self._head = [_Node(time_s, None, beliefs)], None
         self._coasted, self._refusals = None, 0
         self._renew_head()
 

@@ -86,7 +86,7 @@ class Navigator:
         self._heading = None if self._settings.heading is None else OwnHeading(sheets, self._settings.heading)
         self._points_D = sheets.ring.positions_D
         self._time_s = 0.0
-        self._used_time_s = self._posed_time_s = float("nan")
+        self._used_time_s = self._posed_time_s = self._begun_s = float("nan")
         self._felt_time_s = 0.0
         self._integrity: Integrity | None = None
         self._status = self._finder.status
@@ -108,17 +108,10 @@ class Navigator:
             centre_C = np.zeros(3) if asked is None else self._filter.predicted_pose(self._time_s)[1]
             self._heading.step(imu, asked, centre_C)
             frame = frame if asked is None else None
-        if isinstance(frame, CameraFrame):
-            time_s = frame.time_stamp_s
-            lost = self._lost(time_s)
-            seen = self._finder.find(frame, followed=self._followed(time_s), lost=lost)
-            self._candidates_px = self._finder.candidates_px
-            if lost and len(seen.led_numbers):
-                self._begin_again(seen)
-            self._status = self._use(seen) if len(seen.led_numbers) else self._nothing(self._finder.status)
-        elif frame is not None:
-            self._candidates_px = frame.centroids_px
-            self._status = self._use(frame) if len(frame.led_numbers) else self._nothing("ring not found")
+        if np.isnan(self._begun_s):
+            self._begun_s = self._time_s
+        if frame is not None:
+            self._status = self._look(frame)
         return self._solution()
 
     @property
@@ -131,8 +124,23 @@ class Navigator:
         return time_s - self._used_time_s <= self._settings.usable_age_s
 
     def _lost(self, time_s: float) -> bool:
-        """Whether the belief has followed the drogue, and not for so long that it says nothing of where it is."""
-        return time_s - self._used_time_s > self._settings.search_anew_s
+        """Whether the belief has followed no frame for so long that it says nothing of where the drogue is."""
+        since_s = self._begun_s if np.isnan(self._used_time_s) else self._used_time_s
+        return time_s - since_s > self._settings.search_anew_s
+
+    def _look(self, frame: CameraFrame | LedObservation) -> str:
+        """Frame to named LEDs to belief; what became of it is the status."""
+        time_s = frame.time_stamp_s
+        lost, nothing = self._lost(time_s), "ring not found"
+        if isinstance(frame, CameraFrame):
+            seen = self._finder.find(frame, followed=self._followed(time_s), lost=lost)
+            self._candidates_px, nothing = self._finder.candidates_px, self._finder.status
+        else:
+            seen = frame
+            self._candidates_px = seen.centroids_px
+        if lost and len(seen.led_numbers) >= _POSE_LEDS:
+            self._begin_again(seen)
+        return self._use(seen) if len(seen.led_numbers) else self._nothing(nothing)
 
     def _begin_again(self, seen: LedObservation) -> None:
         """Believe the drogue to be where LEDs show it, whatever was believed while it was lost."""

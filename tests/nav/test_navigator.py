@@ -311,6 +311,50 @@ def test_a_drogue_that_was_lost_is_found_wherever_it_comes_into_view_again(rende
         assert names_are_true(sky, solution)
 
 
+@pytest.mark.parametrize(("roll_deg", "pitch_deg"), [(15.0, 0.0), (-35.0, 0.0), (0.0, 8.0)])
+def test_a_receiver_that_stands_otherwise_when_it_sees_the_drogue_again_goes_on(render, roll_deg, pitch_deg):
+    """Turned by its gyro while it saw nothing: the attitude at the start says nothing any more."""
+    turned_s, turn = 2.5, np.radians([roll_deg, pitch_deg, 0.0])
+    sky = Sky(render, still)
+    assert sky.run(0.5).valid
+    R_BD, p_PD_B = sky.R_BD, still(0.0)
+    rate = turn / turned_s
+    for _ in range(round(100 * turned_s)):
+        times = (sky.tick * 5 + np.arange(1, 6)) / 500.0
+        sky.tick += 1
+        sky.navigator.step(tuple(ImuSample(time_stamp_s=float(t), angular_rate_rad_s=rate) for t in times), None)
+    sky.waiting.clear()
+    sky.window = sky.sheets.camera.full_window
+    sky.R_BD = exp(-turn) @ R_BD
+    solution = sky.run(0.5)
+    assert solution.valid and solution.status == "pose used"
+    assert np.abs(solution.p_PD_B - p_PD_B)[1:].max() < 0.005
+    off = log(solution.R_BD.T @ sky.R_BD)
+    spare_rad = np.remainder(off[0] + np.pi / 8, np.pi / 4) - np.pi / 8  # numbers are right up to the ring's symmetry
+    assert np.abs([spare_rad, *off[1:]]).max() < np.radians(2.0)
+
+
+def test_a_drogue_that_is_first_seen_after_seconds_is_found_wherever_it_is(render):
+    """A gust at the first sample, taken for the formation's acceleration, has led the belief astray by then."""
+    sky = Sky(render, still)
+    for k in range(600):
+        times = (sky.tick * 5 + np.arange(1, 6)) / 500.0
+        sky.tick += 1
+        force = np.array([-2.0 if k == 0 else 0.0, 0.0, 9.8])
+        sky.navigator.step(
+            tuple(
+                ImuSample(time_stamp_s=float(t), angular_rate_rad_s=np.zeros(3), specific_force_m_s2=force)
+                for t in times
+            ),
+            None,
+        )
+    assert sky.navigator._filter.state().p_PD_B[0] < -10.0
+    sky.window = sky.sheets.camera.full_window
+    solution = sky.run(1.0)
+    assert solution.valid
+    assert np.abs(solution.p_PD_B - still(0.0))[1:].max() < 0.01
+
+
 def test_a_lost_drogue_that_is_believed_behind_the_camera_is_found(render):
     """Backing off at 4 m/s when it went out of view, so that the belief passes the lens: no LED of it has a place."""
 
@@ -391,6 +435,20 @@ def test_named_leds_may_come_in_place_of_frames(render):
     assert sky.navigator.contact_claim().usable
     assert step_on_leds(sky, ()).status in ("pose used", "ring not found")
     assert step_on_leds(sky, ()).status == "ring not found"
+
+
+def test_with_named_leds_a_lost_drogue_is_found_again(render):
+    """The belief goes on with 3 m/s toward the lens and behind it."""
+    sky = Sky(render, lambda t: still(t) - [3.0 * t, 0.0, 0.0] if t < 0.5 else np.array([6.0, -1.1, 0.5]))
+    for _ in range(50):
+        assert step_on_leds(sky, range(8)) is not None
+    for _ in range(400):
+        step_on_leds(sky, ())
+    assert sky.navigator._filter.state().p_PD_B[0] < 0.0
+    for _ in range(50):
+        solution = step_on_leds(sky, range(8))
+    assert solution.valid and solution.status == "pose used"
+    assert np.abs(solution.p_PD_B - [6.0, -1.1, 0.5])[1:].max() < 0.005
 
 
 @pytest.mark.parametrize("count", [1, 2, 3])
