@@ -30,7 +30,7 @@ from dockair.nav.belief import Correction, begun_again, corrected, felt_first, m
 from dockair.nav.belief_motion import Motion, propagated
 from dockair.nav.belief_sight import Belief, Sight
 from dockair.nav.fusion_settings import FusionSettings as FusionSettings
-from dockair.nav.fusion_settings import motion_of, start_of, taking_of
+from dockair.nav.fusion_settings import motion_of, refusals_until_doubt, start_of, taking_of
 from dockair.nav.imu_record import ImuRecord, Stamps
 from dockair.nav.pose.estimate import PoseEstimate, PoseStatus
 from dockair.nav.pose.measurement import LinesOfSight, lines_of_sight_from_pixels
@@ -82,7 +82,8 @@ class RelativeFilter:
         self._lever2 = skew(self._p_IP) @ skew(self._p_IP).T
         probability = self._settings.gate_probability
         self._gates = [0.0, *(float(chi2.ppf(probability, freedom)) for freedom in range(1, 17))]
-        self._taking = taking_of(self._settings)
+        self._taking = taking_of(self._settings, sheets.camera_rate_hz)
+        self._refusals_until_doubt = refusals_until_doubt(self._settings, sheets.camera_rate_hz)
         self._motion: Motion = motion_of(self._settings, sheets.gyro)
         self._start = [start_of(self._settings, sheets)]
         self._record = ImuRecord(sheets.mounting, sheets.gyro, self._settings.saturated_share)
@@ -263,7 +264,7 @@ class RelativeFilter:
         before, doubted = self._moved(last, time_s), False
         correction = self._corrected(before, frame)
         self._last = correction
-        if not correction.beliefs and self._refusals + 1 >= self._settings.refusals_until_doubt:
+        if not correction.beliefs and self._refusals + 1 >= self._refusals_until_doubt:
             correction, doubted = self._corrected(self._widened(before), frame), True
         if not correction.beliefs:
             self._refusals += 1

@@ -1,5 +1,6 @@
 """Belief about motion and hardware that the relative filter starts from."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +11,8 @@ from dockair.nav.belief import Taking
 from dockair.nav.belief_motion import Motion
 from dockair.nav.belief_sight import Belief
 from dockair.rotations import Array
+
+_SETTINGS_AT_HZ = 50.0  # camera for which the settings per frame are made
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -88,14 +91,23 @@ class FusionSettings:
             raise DockairError("fusion.coupling", expected="one that exists", got=self.coupling, exists=exists)
 
 
-def taking_of(settings: FusionSettings) -> Taking:
-    """Return how frames are taken."""
+def taking_of(settings: FusionSettings, camera_rate_hz: float) -> Taking:
+    """Return how frames are taken.
+
+    What is taken of a frame for the LEDs' places is said of one at 50 Hz. Of a faster camera, whose frames see the LEDs
+    off in the same way, the frames of a second say as much as those; of a slower one no frame says more.
+    """
     return Taking(
         tight=settings.coupling == "tight",
         memory=settings.evidence_memory,
         share=settings.evidence_share,
-        ring=settings.led_place_share,
+        ring=settings.led_place_share * min(_SETTINGS_AT_HZ / camera_rate_hz, 1.0),
     )
+
+
+def refusals_until_doubt(settings: FusionSettings, camera_rate_hz: float) -> int:
+    """Return how many frames in a row are refused before the belief is widened: as long a time at a faster camera."""
+    return math.ceil(settings.refusals_until_doubt * max(camera_rate_hz / _SETTINGS_AT_HZ, 1.0))
 
 
 def motion_of(settings: FusionSettings, gyro: GyroSheet) -> Motion:

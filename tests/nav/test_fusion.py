@@ -11,6 +11,7 @@ from dockair.errors import DockairError
 from dockair.messages import ImuSample
 from dockair.nav import fusion
 from dockair.nav.fusion import FusionSettings, RelativeFilter
+from dockair.nav.fusion_settings import refusals_until_doubt, taking_of
 from dockair.nav.pose.estimate import PoseEstimate, solve_pose
 from dockair.nav.pose.planar import mirrored
 from dockair.rotations import Array, exp, log, matrix_from_yaw_pitch_roll
@@ -684,3 +685,11 @@ def test_a_long_silence_is_gone_through_once_however_often_the_present_is_asked_
     for filter_ in (asked, quiet):
         filter_.propagate([sample])
     assert np.array_equal(asked.state(begun_s + 0.6).covariance, quiet.state(begun_s + 0.6).covariance)
+
+
+def test_a_faster_camera_says_no_more_of_the_leds_places_in_a_second_and_a_blow_is_believed_as_late():
+    """Its frames see the same LEDs off in the same way; a glint of 17 ms is no blow."""
+    at = {hz: (taking_of(SETTINGS, hz).ring * max(hz, 50), refusals_until_doubt(SETTINGS, hz)) for hz in (25, 50, 180)}
+    shares, refusals = zip(*at.values(), strict=True)
+    np.testing.assert_allclose(shares, SETTINGS.led_place_share * 50)
+    assert refusals == (3, 3, 11)
