@@ -22,6 +22,7 @@ if TYPE_CHECKING:  # the progress of a flight is told in these; importing them h
 
 _PLAIN_INTERVAL_S = 5.0  # of simulated time between two lines where stderr is no terminal
 _BAR_INTERVAL_S = 0.1
+_FILE_WIDTH = 140  # of tables where stdout is no terminal
 
 #: Key of `result.json` (dotted) -> what people call it, unit, decimals.
 _FIGURES = {
@@ -92,7 +93,7 @@ def show_result(result: Mapping[str, Any], shortfalls: Sequence[str] | None, fol
         shortfalls: what the scenario's `accept` asks for and the flight did not show; None when it asks for nothing.
         folder: where the flight was written.
     """
-    console = _plain_console()
+    console = plain_console()
     colour = "green" if result["outcome"] == "contact" else "yellow"
     mark = "  (perfect navigation: the truth in place of the camera)" if result.get("truth_navigation") else ""
     flown = f"  {result['scenario']}, seed {result['seed']}{mark}"
@@ -127,7 +128,7 @@ def _failed_attempt(attempt: Mapping[str, Any]) -> str:
 
 def show_checks(checks: Sequence["Check"], versions: Mapping[str, str]) -> None:
     """Print what the doctor found."""
-    console = _plain_console()
+    console = plain_console()
     table = Table(show_header=False, box=None, padding=(0, 1))
     for check in checks:
         said = ("ok", "green") if check.ok else ("missing", "red") if check.needed else ("note", "yellow")
@@ -140,7 +141,7 @@ def show_checks(checks: Sequence["Check"], versions: Mapping[str, str]) -> None:
 def show_bench(report: "BenchReport") -> None:
     """Print where a flight's time goes."""
     figures = report.to_json()
-    console = _plain_console()
+    console = plain_console()
     console.print(
         f"{figures['frames_per_second']:.1f} frames per second, {figures['real_time_factor']:.2f} of real time"
     )
@@ -165,12 +166,12 @@ def show_reproductions(titles: Mapping[str, str]) -> None:
         table.add_column(heading)
     for name, title in titles.items():
         table.add_row(name, title)
-    _plain_console().print(table)
+    plain_console().print(table)
 
 
 def show_reproduction(reproduction: Mapping[str, Any], picture: Path) -> None:
     """Print ours beside the reference's, one line a figure, and where the picture is."""
-    console = _plain_console()
+    console = plain_console()
     console.print(Text.assemble((reproduction["id"], "bold"), f"  {reproduction['source']}"), soft_wrap=True)
     table = Table(box=None, padding=(0, 1))
     for heading in ("case", "figure", "ours", "reference"):
@@ -194,7 +195,7 @@ def _figure(value: Any) -> str:
 
 def show_stages_bench(figures: Mapping[str, Any]) -> None:
     """Print the times of the stages, their ratios, and what each of them found."""
-    console = _plain_console()
+    console = plain_console()
     if "flights" in figures:
         flights = figures["flights"].items()
         console.print(_bench_table({what: {key: f"{x:.2f}" for key, x in row.items()} for what, row in flights}))
@@ -224,15 +225,21 @@ def _bench_table(rows: Mapping[str, Mapping[str, str]]) -> Table:
     table = Table(box=None, padding=(0, 1))
     table.add_column("what")
     for heading in next(iter(rows.values())):
-        table.add_column(heading, justify="right")
+        table.add_column(heading, justify="right", overflow="fold")
     for what, row in rows.items():
         table.add_row(what, *row.values())
     return table
 
 
-def _plain_console() -> Console:
-    """Return stdout without markup: paths and what others say are printed as they are, brackets too."""
-    return Console(highlight=False, markup=False)
+def plain_console() -> Console:
+    """Return stdout without markup: paths and what others say are printed as they are, brackets too.
+
+    Where it is no terminal, lines are as long as the tables: nothing is cut off in a file.
+    """
+    console = Console(highlight=False, markup=False)
+    if not console.is_terminal:
+        console.width = _FILE_WIDTH
+    return console
 
 
 def _at(table: Mapping[str, Any], key: str) -> Any:

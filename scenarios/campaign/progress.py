@@ -10,10 +10,10 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 from rich.table import Table
 
 from dockair.scenarios.campaign.jobs import Job
+from dockair.scenarios.output import plain_console
 from dockair.scenarios.statistics import wilson_interval
 
 _LINE_INTERVAL_S = 30.0  # between two lines where stderr is no terminal
-_FILE_WIDTH = 140  # of tables where stdout is none
 
 Row = Mapping[str, Any]
 
@@ -116,9 +116,7 @@ def docked(successes: int, flights: int) -> str:
 
 def show_campaign(table: Mapping[str, Any]) -> None:
     """Print what `dockair campaign --json` would."""
-    console = Console(highlight=False, markup=False)
-    if not console.is_terminal:
-        console.width = _FILE_WIDTH
+    console = plain_console()
     shown = Table(box=None, padding=(0, 1))
     for heading in ("scenario", "sensing", "first attempt", "success", "offset", "closing", "unsafe", "errors"):
         shown.add_column(heading, no_wrap=True)

@@ -7,7 +7,7 @@ import numpy as np
 from rich.console import Console
 
 from dockair.scenarios.doctor import Check
-from dockair.scenarios.output import FlightProgress, show_checks, show_reproduction, show_result
+from dockair.scenarios.output import FlightProgress, show_checks, show_reproduction, show_result, show_stages_bench
 
 
 def tick(time_s: float):
@@ -91,3 +91,12 @@ def test_a_phase_of_ones_own_navigator_is_no_markup():
             progress(truth, SimpleNamespace(phase="[/hold]"))
             progress._bar.refresh()
             assert "[/hold]" in text.getvalue()
+
+
+def test_no_heading_of_a_bench_is_cut_off_in_a_file(capsys):
+    headings = ("x_real_time", "x_of_own_time", "simulated_s", "wall_s", "frames_per_s", "flight_process_s", "load")
+    flights = {"windowed, 50 Hz, one process": dict.fromkeys(headings, 1.0)}
+    show_stages_bench({"flights": flights, "steps_per_second": {"dockair/DockFast-v0": 1.0}, "ratios": {}})
+    heading, row, *_ = capsys.readouterr().out.splitlines()
+    assert heading.split() == ["what", *headings]
+    assert row.startswith(" windowed, 50 Hz, one process  ")
