@@ -73,3 +73,18 @@ def test_the_navigator_of_ones_own_docks_and_is_judged_by_the_truth(example, cap
     outcome, figures = capsys.readouterr().out.splitlines()
     assert outcome.startswith("contact after")
     assert float(re.search(r"([\d.]+) m off", figures)[1]) < 0.15
+
+
+def test_the_tutorial_s_navigator_docks(tmp_path, monkeypatch):
+    """As its page has it; its first frame, believed by half, had kept guidance waiting for a minute."""
+    from dockair.scenarios.loop import fly
+    from dockair.scenarios.schema import load_scenario
+
+    page = (EXAMPLES.parent / "docs" / "tutorials" / "own_navigator.md").read_text(encoding="utf-8")
+    code = "\n".join(re.findall(r"```python\n(.*?)```", page, re.DOTALL))
+    (tmp_path / "tutorial_navigator.py").write_text(code, encoding="utf-8")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    own = {"camera.sensing": "measurements", "navigation.navigator": "tutorial_navigator:MyNavigator"}
+    result = fly(load_scenario("still_air", own), 0)
+    assert result.first_attempt
+    assert result.contact.time_s < 15.0
