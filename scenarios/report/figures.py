@@ -57,7 +57,7 @@ def overview(groups: Sequence[Group]) -> str:
         ax.set_xlim(-2.0, 102.0)
         ax.set_xlabel("contact inside the limits [%], 95 % interval")
         ax.grid(axis="x", alpha=0.3)
-        ax.legend(loc="lower left", frameon=False)
+        ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, frameon=False)  # rates may be anywhere inside
         return _svg(figure)
 
 

@@ -285,3 +285,10 @@ def test_a_flight_in_two_campaigns_is_refused(tmp_path):
 def test_a_folder_without_a_campaign_is_one_clear_line(tmp_path):
     with pytest.raises(DockairError, match="manifest of a campaign"):
         read_campaigns([tmp_path])
+
+
+def test_where_perfect_navigation_never_docked_there_is_no_ratio():
+    truth = _without_attempt(0, "never_steady", sensing="truth", navigator="truth", scenario_hash="t")
+    text = page("made", [_campaign([_without_attempt(0, "never_steady"), truth])])
+    assert "What vision costs" in text
+    assert ">nan<" not in text
