@@ -74,13 +74,17 @@ class Sky:
             time_stamp_s=time_s, pixels=image, window=window, exposure_s=EXPOSURE_S, gain=255.0 / 13500.0
         )
 
-    def step(self, *, camera=True, gyro=True):
+    def imu(self, rate_rad_s=(0.0, 0.0, 0.0), **felt):
+        """The samples of the next control tick."""
         times = (self.tick * 5 + np.arange(1, 6)) / 500.0
         self.tick += 1
-        imu = tuple(ImuSample(time_stamp_s=float(t), angular_rate_rad_s=np.zeros(3)) for t in times)
+        return tuple(ImuSample(time_stamp_s=float(t), angular_rate_rad_s=np.array(rate_rad_s), **felt) for t in times)
+
+    def step(self, *, camera=True, gyro=True):
+        imu = self.imu()
         arrived = self.waiting.pop(0) if self.waiting else None
         if camera and self.tick % 2 == 0:
-            self.waiting.append(self.frame(float(times[-1]), self.window))
+            self.waiting.append(self.frame(imu[-1].time_stamp_s, self.window))
         solution = self.navigator.step(imu if gyro else (), arrived)
         self.window = solution.window or self.sheets.camera.full_window
         return solution
@@ -320,9 +324,7 @@ def test_a_receiver_that_stands_otherwise_when_it_sees_the_drogue_again_goes_on(
     R_BD, p_PD_B = sky.R_BD, still(0.0)
     rate = turn / turned_s
     for _ in range(round(100 * turned_s)):
-        times = (sky.tick * 5 + np.arange(1, 6)) / 500.0
-        sky.tick += 1
-        sky.navigator.step(tuple(ImuSample(time_stamp_s=float(t), angular_rate_rad_s=rate) for t in times), None)
+        sky.navigator.step(sky.imu(rate), None)
     sky.waiting.clear()
     sky.window = sky.sheets.camera.full_window
     sky.R_BD = exp(-turn) @ R_BD
@@ -338,16 +340,8 @@ def test_a_drogue_that_is_first_seen_after_seconds_is_found_wherever_it_is(rende
     """A gust at the first sample, taken for the formation's acceleration, has led the belief astray by then."""
     sky = Sky(render, still)
     for k in range(600):
-        times = (sky.tick * 5 + np.arange(1, 6)) / 500.0
-        sky.tick += 1
         force = np.array([-2.0 if k == 0 else 0.0, 0.0, 9.8])
-        sky.navigator.step(
-            tuple(
-                ImuSample(time_stamp_s=float(t), angular_rate_rad_s=np.zeros(3), specific_force_m_s2=force)
-                for t in times
-            ),
-            None,
-        )
+        sky.navigator.step(sky.imu(specific_force_m_s2=force), None)
     assert sky.navigator._filter.state().p_PD_B[0] < -10.0
     sky.window = sky.sheets.camera.full_window
     solution = sky.run(1.0)
@@ -417,10 +411,8 @@ def named(sky, numbers, time_s):
 
 def step_on_leds(sky, numbers):
     """One control tick; every second with named LEDs in place of a frame."""
-    times = (sky.tick * 5 + np.arange(1, 6)) / 500.0
-    sky.tick += 1
-    imu = tuple(ImuSample(time_stamp_s=float(t), angular_rate_rad_s=np.zeros(3)) for t in times)
-    seen = named(sky, numbers, float(times[-1])) if sky.tick % 2 == 0 else None
+    imu = sky.imu()
+    seen = named(sky, numbers, imu[-1].time_stamp_s) if sky.tick % 2 == 0 else None
     return sky.navigator.step(imu, seen)
 
 
