@@ -184,7 +184,16 @@ def _held_noise(after: float, before: float, turn2: float, most2: float) -> floa
 
 @njit(cache=True)
 def propagated(
-    R: Array, x: Array, P: Array, t0: float, t1: float, times: Array, rates: Array, forces: Array, motion: Motion
+    R: Array,
+    x: Array,
+    P: Array,
+    t0: float,
+    t1: float,
+    times: Array,
+    rates: Array,
+    forces: Array,
+    motion: Motion,
+    errors: bool = True,
 ) -> tuple[Array, Array, Array]:
     """Return R (3, 3), x (7, 3), P at t1 [s], from those at t0 <= t1 and the samples about.
 
@@ -198,6 +207,7 @@ def propagated(
         rates: (k, 3) of the gyro, body axes [rad/s].
         forces: (k, 3) of the accelerometers, body axes [m/s^2]; NaN where there is none.
         motion: belief about motion.
+        errors: whether P is moved, too; it is nearly all of the work.
     """
     R, x, P = R.copy(), x.copy(), P.copy()
     n, t = len(times), t0
@@ -244,13 +254,16 @@ def propagated(
             x[6] = x[6] * (1.0 - dt * motion.return_1_s)
             for row in (0, 1, 2, 3, 5, 6):
                 x[row] = _turned(E, x[row])
+            if not errors:
+                continue
             _errors_moved(P.ravel(), E, x, dt, felt, motion.stiffness, motion.friction, motion.return_1_s)
             P = P.T.copy()
             _errors_moved(P.ravel(), E, x, dt, felt, motion.stiffness, motion.friction, motion.return_1_s)
             gyro2 = motion.gyro2 + held2 + motion.scale2 * size2
             other2 = motion.accelerometer2 if felt else motion.receiver2
             _noise_added(P, x, dt, gyro2, motion.drive2, other2, rest)
-        for i in range(ERRORS):  # at every sample, so that the way there does not matter to the last bit
+        # at every sample, so that the way there does not matter to the last bit
+        for i in range(ERRORS if errors else 0):
             for j in range(i):
                 P[i, j] = P[j, i] = 0.5 * (P[i, j] + P[j, i])
         t, k = knot, k + (1 if k + 1 < n and knot == times[k + 1] else 0)

@@ -207,6 +207,21 @@ class RelativeFilter:
         seen = self._sight.apparent(mixture(self._beliefs(time_s)))
         return seen.R_CD, seen.p_CD, seen.covariance
 
+    def foretold_p_PD_B(self, time_s: float, horizon_s: float) -> tuple[Array, float]:
+        """Where the drogue would be believed to be at a time, had no frame come for `horizon_s` before.
+
+        Returns:
+            (3,) ring centre from the probe's tip [m], and for how long no frame would have come [s]; NaN where the
+            buffer holds no frame so old.
+        """
+        index = bisect_right(self._nodes, time_s - horizon_s, key=_time)
+        for node in reversed(self._nodes[:index]):
+            if node.frame is not None:
+                begin = node.beliefs[0]
+                _, x, _ = self._propagated(begin, node.time_s, time_s, errors=False)
+                return x[0] - self._p_IP, time_s - node.time_s
+        return np.full(3, np.nan), float("nan")
+
     def predicted_led_pixels(self, time_s: float) -> tuple[Array, Array]:
         """Where the LEDs should be seen.
 
@@ -326,9 +341,14 @@ class RelativeFilter:
         """Return a node's beliefs at a later time."""
         if time_s <= node.time_s:
             return node.beliefs
-        samples = self._record.times_s, self._record.rates_B, self._record.forces_B
         moved = []
         for belief in node.beliefs:
-            R, x, P = propagated(belief.R_BD, belief.x, belief.P, node.time_s, time_s, *samples, self._motion)
+            R, x, P = self._propagated(belief, node.time_s, time_s)
             moved.append(Belief(R, x, P, belief.log_weight, belief.ring))
         return moved
+
+    def _propagated(
+        self, belief: Belief, begin_s: float, end_s: float, *, errors: bool = True
+    ) -> tuple[Array, Array, Array]:
+        samples = self._record.times_s, self._record.rates_B, self._record.forces_B
+        return propagated(belief.R_BD, belief.x, belief.P, begin_s, end_s, *samples, self._motion, errors)

@@ -67,7 +67,7 @@ class FusionSettings:
     doubt_velocity_sigma_m_s: float = 1.2
     doubt_position_sigma_m: float = 0.08
     doubt_attitude_sigma_rad: float = 0.1
-    buffer_s: float = 0.25  # how late a frame may be
+    buffer_s: float = 0.45  # how late a frame may be; the belief is asked what it foretold 0.3 s before a late one
     leap_s: float = 1.0  # how far ahead of all others a stamp is believed without a second one
     node_interval_s: float = 0.02  # between beliefs kept to begin at when a frame is late; a frame's period
     longest_gap_s: float = 0.02  # between samples of acceleration: a receiver does not change it much sooner

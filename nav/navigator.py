@@ -16,13 +16,14 @@ import numpy as np
 from dockair.calibration import LedRing, NavigationSheets
 from dockair.errors import DockairError
 from dockair.messages import CameraFrame, ImuSample, LedObservation, NavSolution, TankerAnnouncement
-from dockair.nav.fusion import FusionSettings, RelativeFilter
+from dockair.nav.fusion import FilterState, FusionSettings, RelativeFilter
 from dockair.nav.guidance.approach import Guidance, GuidanceSettings, RelativeState
 from dockair.nav.guidance.phases import Phase
 from dockair.nav.heading.own_heading import OwnHeading, OwnHeadingSettings
 from dockair.nav.identify.code import CodeSettings, code_of
 from dockair.nav.identify.perspective import SLOTS
 from dockair.nav.image.detect import DetectSettings
+from dockair.nav.integrity.coasting import CoastingError, CoastingSettings
 from dockair.nav.integrity.contact import ContactClaim, ContactLimits, usable_for_contact
 from dockair.nav.integrity.fault_test import IntegritySettings
 from dockair.nav.integrity.monitor import Integrity, IntegrityStatus, check_integrity
@@ -49,6 +50,7 @@ class NavigatorSettings:
     few: FewSettings = field(default_factory=FewSettings)
     integrity: IntegritySettings = field(default_factory=IntegritySettings)
     contact: ContactLimits = field(default_factory=ContactLimits)
+    coasting: CoastingSettings = field(default_factory=CoastingSettings)
     fusion: FusionSettings = field(default_factory=FusionSettings)
     guidance: GuidanceSettings = field(default_factory=GuidanceSettings)
     tip_levelling_s: float = 60.0  # of the tip's motion: gusts of 1 m/s are then taken for 0.02 m/s^2 of gravity
@@ -89,6 +91,7 @@ class Navigator:
         self._used_time_s = self._posed_time_s = self._begun_s = float("nan")
         self._felt_time_s = 0.0
         self._integrity: Integrity | None = None
+        self._coasting, self._in_basket = CoastingError(self._settings.coasting), False
         self._status = self._finder.status
         self._candidates_px: Array = np.empty((0, 2))
         self._led_pixels_px: Array = np.full((len(self._points_D), 2), np.nan)
@@ -189,7 +192,15 @@ class Navigator:
             return "pose refused by the gate"
         self._used_time_s, self._integrity = time_s, checked
         self._posed_time_s = time_s
+        if self._coasting.due(time_s):
+            self._ask_coasting(time_s)
         return "pose used"
+
+    def _ask_coasting(self, time_s: float) -> None:
+        """Hold what had been foretold for a frame against what is believed with it."""
+        foretold_B, age_s = self._filter.foretold_p_PD_B(time_s, self._settings.coasting.horizon_s)
+        error_B = self._filter.state(time_s).p_PD_B - foretold_B
+        self._coasting.take(self._sheets.mounting.R_BC.T @ error_B, age_s, time_s)
 
     def _attitude_known(self, leds: int, time_s: float, R_CD: Array, covariance: Array) -> AttitudePrior | None:
         """The attitude that is believed, where the LEDs of one frame are too few to test one another without it."""
@@ -212,12 +223,18 @@ class Navigator:
         if self._integrity is None:
             return None
         offset_m = self._integrity.pose.p_CD - self._filter.predicted_pose(self._posed_time_s)[1]
+        age_s = self._time_s - self._posed_time_s
+        levels = self._coasting.added(self._integrity.levels.about(offset_m), age_s)
         return usable_for_contact(
-            self._integrity,
-            self._time_s - self._posed_time_s,
-            self._settings.contact,
-            levels=self._integrity.levels.about(offset_m),
+            self._integrity, age_s, self._settings.contact, levels=levels, in_basket=self._in_basket
         )
+
+    def _note_basket(self, state: FilterState, *, usable: bool) -> None:
+        """Note whether the tip is in the basket: it went in inside the rim, on a usable belief, and has stayed."""
+        p_DP = -state.R_BD.T @ state.p_PD_B
+        mouth_m = 0.5 * self._sheets.ring.diameter_m - self._settings.contact.lateral_m
+        enters = usable and np.hypot(p_DP[1], p_DP[2]) <= mouth_m
+        self._in_basket = bool(p_DP[0] > 0.0 and (self._in_basket or enters))
 
     def _solution(self) -> NavSolution:
         state = self._filter.state(self._time_s)
@@ -227,6 +244,7 @@ class Navigator:
         valid = known and sigma_lateral_m <= self._settings.usable_sigma_m and aged_s <= self._settings.usable_age_s
         claim = self.contact_claim()
         contact_usable = valid and claim is not None and claim.usable
+        self._note_basket(state, usable=contact_usable)
         w_WB_B = self._filter.rate_B(self._time_s)
         command = self._guidance.step(
             RelativeState(

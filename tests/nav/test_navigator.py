@@ -10,7 +10,7 @@ from scipy.stats import binom
 from dockair.calibration import Camera, GyroSheet, LedRing, Mounting, NavigationSheets, StartGeometry
 from dockair.errors import DockairError
 from dockair.messages import CameraFrame, ImuSample, LedObservation, Window
-from dockair.nav.integrity.contact import Doubt
+from dockair.nav.integrity.contact import ContactLimits, Doubt
 from dockair.nav.navigator import Navigator, NavigatorSettings
 from dockair.rotations import exp, log, matrix_from_yaw_pitch_roll
 
@@ -135,7 +135,41 @@ def test_contact_may_be_claimed_near_and_recent_and_not_before_a_pose(render):
     claim = sky.navigator.contact_claim()
     assert claim.usable and claim.levels.lateral_m < 0.01 and claim.levels.range_m < 0.08
     sky.run(0.3, camera=False)
-    assert sky.navigator.contact_claim().doubts == (Doubt.AGE,)
+    assert Doubt.LATERAL in sky.navigator.contact_claim().doubts  # it has not shown yet how well it foretells
+
+
+def test_a_belief_that_has_foretold_a_still_drogue_claims_contact_through_a_drop_out(render):
+    sky = Sky(render, still)
+    sky.run(5.0)
+    sky.run(0.35, camera=False)
+    claim = sky.navigator.contact_claim()
+    assert claim.usable and 0.01 < claim.levels.lateral_m < ContactLimits().lateral_m
+    sky.run(0.1, camera=False)
+    assert Doubt.AGE in sky.navigator.contact_claim().doubts
+
+
+def test_one_that_gusts_have_proved_wrong_does_not(render):
+    """4 m/s^2 to and fro at 1.2 Hz: 0.1 m in 0.3 s that no model foretells."""
+
+    def gusts(t):
+        return still(t) + [0.0, 0.0, 0.07 * np.sin(2.0 * np.pi * 1.2 * t)]
+
+    sky = Sky(render, gusts)
+    assert sky.run(5.0).contact_usable
+    assert not sky.run(0.2, camera=False).contact_usable
+    assert sky.navigator.contact_claim().doubts == (Doubt.LATERAL,)
+
+
+def test_in_the_basket_the_level_across_is_not_asked(render):
+    """The same gusts; the tip is past the ring's plane when the camera goes out, or 0.2 m before it."""
+    for speed_m_s, inside in ((0.6, True), (0.55, False)):
+
+        def path(t, speed_m_s=speed_m_s):
+            return np.array([3.3 - speed_m_s * t, 0.02, 0.07 * np.sin(2.0 * np.pi * 1.2 * t)])
+
+        sky = Sky(render, path)
+        sky.run(5.6)
+        assert sky.run(0.2, camera=False).contact_usable == inside
 
 
 def test_contact_may_not_be_claimed_where_the_range_is_not_known_well_enough(render):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from dockair.scenarios.reproduce import faulted_frames, pose_flips, pose_integrity
+from dockair.scenarios.reproduce import faulted_frames, integrity_coasting, pose_flips, pose_integrity
 from dockair.scenarios.reproduce.reference import picture_name
 
 pytestmark = pytest.mark.slow
@@ -29,13 +29,18 @@ def flips(folder):
     return pose_flips.run(60, folder)
 
 
+@pytest.fixture(scope="module")
+def coasting(folder):
+    return integrity_coasting.reproduce(folder, seeds=1)
+
+
 def rows(result, start):
     found = [row for row in result["rows"] if row["case"].startswith(start)]
     assert found
     return found
 
 
-@pytest.mark.parametrize("name", ["integrity", "flips"])
+@pytest.mark.parametrize("name", ["integrity", "flips", "coasting"])
 def test_it_has_the_printed_form_and_a_picture(name, folder, request):
     result = request.getfixturevalue(name)
     assert json.loads(json.dumps(result, allow_nan=False)) == result
@@ -114,3 +119,11 @@ def test_a_prior_rules_flips_out_where_it_can(flips):
 def test_a_node_without_a_mirror_image_has_no_flips(flips):
     (row,) = rows(flips, "3 m, tilt 0 deg")
     assert row["reference"] == {} and "alone_percent" not in row["ours"]
+
+
+def test_a_claim_while_the_camera_is_out_lasts_as_long_as_the_gusts_let_it(coasting):
+    calm, moderate = rows(coasting, "0.5 m/s"), rows(coasting, "moderate")
+    assert all(row["ours"].get("claimed_beyond_the_limit", 0) == 0 for row in calm)
+    for row in calm[:4] + moderate[:1]:  # up to 0.25 s, and ordinary frames
+        assert row["ours"]["claimed_percent"] > 90.0
+    assert moderate[3]["ours"]["claimed_percent"] < 30.0

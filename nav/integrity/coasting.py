@@ -1,0 +1,100 @@
+"""How far the drogue may be from where it was foretold while no frame comes: measured on frames that do come.
+
+A belief without frames goes wrong by what its model of motion does not know: gusts, the bow wave. Its covariance holds
+one strength of them for all weathers. So the belief is asked, again and again, where it had foretold the drogue a time
+h before: the squares of the errors, per camera axis, fade with `memory_s` and begin at `sigma_m` with `prior_s`. After
+a time a without frames
+
+    sigma(a)^2 = s^2 (a/h)^3 for a <= h,   s^2 (a/h)^4 beyond                                        (1)
+
+as by a white acceleration, and at worst by a steady one. Protection levels grow by k sigma(a), with k of one axis along
+and of two across for the probability `risk`.
+
+Not modelled: gusts that begin in the very moment in which the camera goes out, a drogue that is struck.
+"""
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+from scipy.stats import chi2
+
+from dockair.errors import DockairError
+from dockair.nav.integrity.levels import ProtectionLevels
+from dockair.rotations import Array
+
+_HIGHEST_RISK = 0.5
+_STAMP_S = 1e-6  # to which stamps are even
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CoastingSettings:
+    """How the belief is asked, and how often it may be wrong.
+
+    Raises:
+        DockairError: a number that is not positive, or a risk not below 0.5.
+    """
+
+    horizon_s: float = 0.3  #: h; drop-outs of a camera that a contact is flown through are as long
+    interval_s: float = 0.1  # between two questions: nearer ones have nearly the same answer
+    memory_s: float = 6.0  # two periods of the drogue's swing
+    sigma_m: float = 0.05  # before anything is measured: in light turbulence (docs/integrity.md)
+    prior_s: float = 0.3  # of measuring that weighs as much as that: one answer
+    #: That the drogue is farther off. A frame that does not come is a fault that seldom falls in the 0.2 s in which it
+    #: would matter; together with this it is as rare as `missed_detection`.
+    risk: float = 1e-3
+
+    def __post_init__(self) -> None:
+        for name in (f.name for f in fields(self)):
+            if not getattr(self, name) > 0.0:
+                raise DockairError(f"coasting.{name}", expected="a number above 0", got=getattr(self, name))
+        if not self.risk < _HIGHEST_RISK:
+            raise DockairError("coasting.risk", expected="a probability, 0 to 0.5", got=self.risk)
+
+
+class CoastingError:
+    """What the belief has foretold wrongly so far."""
+
+    def __init__(self, settings: CoastingSettings | None = None) -> None:
+        self._settings = settings or CoastingSettings()
+        self._squares, self._weight_s = np.full(3, self._settings.sigma_m**2), self._settings.prior_s
+        self._sigmas = tuple(float(np.sqrt(chi2.isf(self._settings.risk, axes))) for axes in (1, 2))
+        self._asked_s = -np.inf
+
+    def due(self, time_s: float) -> bool:
+        """Whether the belief is to be asked again at a frame of this stamp."""
+        return time_s - self._asked_s >= self._settings.interval_s - _STAMP_S
+
+    def take(self, error_C: Array, age_s: float, time_s: float) -> None:
+        """Take where a frame shows the drogue less where it was foretold.
+
+        Args:
+            error_C: (3,) in camera axes [m]; not finite when nothing was foretold, which says nothing.
+            age_s: how long before; about the horizon.
+            time_s: stamp of the frame.
+        """
+        s = self._settings
+        if not np.isfinite(error_C).all():
+            return
+        since_s = min(time_s - self._asked_s, s.horizon_s)
+        self._asked_s = time_s
+        kept_s = self._weight_s * np.exp(-since_s / s.memory_s)
+        at_horizon = np.square(error_C) / _growth(age_s / s.horizon_s)
+        self._weight_s = kept_s + since_s
+        self._squares = (kept_s * self._squares + since_s * at_horizon) / self._weight_s
+
+    def sigma_m(self, age_s: float) -> Array:
+        """(3,) of Eq. (1) in camera axes."""
+        return np.asarray(np.sqrt(self._squares * _growth(age_s / self._settings.horizon_s)))
+
+    def added(self, levels: ProtectionLevels, age_s: float) -> ProtectionLevels:
+        """Return protection levels of a belief that had its last frame so long ago; none promised without that."""
+        along, left, up = self.sigma_m(age_s) if age_s >= 0.0 else np.full(3, np.inf)
+        return ProtectionLevels(
+            range_m=levels.range_m + self._sigmas[0] * float(along),
+            lateral_m=levels.lateral_m + self._sigmas[1] * float(max(left, up)),
+        )
+
+
+def _growth(ratio: float) -> float:
+    """Variance of Eq. (1) in units of that at the horizon."""
+    return ratio**3 if ratio <= 1.0 else ratio**4

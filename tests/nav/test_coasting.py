@@ -1,0 +1,94 @@
+"""What the belief foretells wrongly while it coasts, and what that adds to protection levels."""
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+from dockair.errors import DockairError
+from dockair.nav.integrity.coasting import CoastingError, CoastingSettings
+from dockair.nav.integrity.levels import ProtectionLevels
+
+FRAME = ProtectionLevels(range_m=0.02, lateral_m=0.005)
+HORIZON_S = CoastingSettings().horizon_s
+
+
+def asked(sigma_m, seconds=60.0, age_s=HORIZON_S, seed=0):
+    """A belief that was asked every 0.1 s, its errors of these sigmas (3,) at that age."""
+    coasting, rng = CoastingError(), np.random.default_rng(seed)
+    for time_s in np.arange(0.1, seconds, 0.1):
+        assert coasting.due(time_s)
+        coasting.take(rng.normal(0.0, sigma_m, 3), age_s, time_s)
+    return coasting
+
+
+def test_the_sigma_at_the_horizon_is_that_of_the_errors():
+    # 6 s of memory hold about 120 squares: sigma is good to 1 / sqrt(240) = 6 %
+    assert asked(np.array([0.01, 0.03, 0.06])).sigma_m(HORIZON_S) == pytest.approx([0.01, 0.03, 0.06], rel=0.25)
+
+
+def test_of_one_answer_the_assumption_is_half():
+    coasting = CoastingError()
+    coasting.take(np.zeros(3), HORIZON_S, 10.0)
+    assert coasting.sigma_m(HORIZON_S) == pytest.approx(CoastingSettings().sigma_m / np.sqrt(2.0), rel=0.02)
+
+
+def test_it_grows_as_by_white_acceleration_and_then_as_by_a_steady_one():
+    coasting = asked(np.full(3, 0.02))
+    h = coasting.sigma_m(HORIZON_S)
+    assert coasting.sigma_m(0.25 * HORIZON_S) == pytest.approx(h / 8.0)
+    assert coasting.sigma_m(2.0 * HORIZON_S) == pytest.approx(4.0 * h)
+
+
+def test_errors_of_another_age_are_brought_to_the_horizon():
+    later = asked(np.full(3, 0.02), age_s=1.2 * HORIZON_S)
+    assert later.sigma_m(1.2 * HORIZON_S) == pytest.approx(asked(np.full(3, 0.02)).sigma_m(HORIZON_S), rel=1e-4)
+
+
+def test_stronger_gusts_are_known_within_the_memory():
+    coasting = asked(np.full(3, 0.01), seconds=30.0)
+    calm = coasting.sigma_m(HORIZON_S).max()
+    rng = np.random.default_rng(1)
+    for time_s in np.arange(30.0, 36.0, 0.1):
+        coasting.take(rng.normal(0.0, 0.1, 3), HORIZON_S, time_s)
+    assert calm < 0.015 and coasting.sigma_m(HORIZON_S).min() > 0.06
+
+
+def test_levels_are_exceeded_as_often_as_they_say():
+    """Errors as they were measured: the level across beyond that of the frame is exceeded by `risk` of them."""
+    settings = CoastingSettings(risk=0.05, memory_s=1e4)
+    coasting, rng = CoastingError(settings), np.random.default_rng(2)
+    errors = rng.normal(0.0, 0.03, (4000, 3))
+    for k, error in enumerate(errors):
+        coasting.take(error, HORIZON_S, 0.1 * (k + 1))
+    level = coasting.added(ProtectionLevels(range_m=0.0, lateral_m=0.0), HORIZON_S)
+    beyond_m = np.abs(errors[:, 0]) > level.range_m, np.hypot(errors[:, 1], errors[:, 2]) > level.lateral_m
+    for beyond in beyond_m:  # three sigmas of the binomial: 0.05 +- 0.010
+        assert np.mean(beyond) == pytest.approx(settings.risk, abs=0.011)
+
+
+def test_the_worse_of_the_two_axes_across_counts():
+    coasting = asked(np.array([0.001, 0.01, 0.05]))
+    up = float(coasting.sigma_m(HORIZON_S)[2])
+    k = float(np.sqrt(chi2.isf(CoastingSettings().risk, 2)))
+    assert coasting.added(FRAME, HORIZON_S).lateral_m == pytest.approx(FRAME.lateral_m + k * up)
+
+
+def test_a_frame_of_now_adds_nothing_and_no_frame_at_all_promises_nothing():
+    coasting = asked(np.full(3, 0.02))
+    assert coasting.added(FRAME, 0.0) == FRAME
+    for age_s in (np.nan, -0.01):
+        nothing = coasting.added(FRAME, age_s)
+        assert nothing.range_m == nothing.lateral_m == np.inf
+
+
+def test_what_was_not_foretold_says_nothing():
+    coasting = asked(np.full(3, 0.02))
+    before = coasting.sigma_m(HORIZON_S)
+    coasting.take(np.full(3, np.nan), np.nan, 100.0)
+    assert np.array_equal(coasting.sigma_m(HORIZON_S), before) and coasting.due(100.0)
+
+
+@pytest.mark.parametrize("wrong", [{"horizon_s": 0.0}, {"risk": 0.5}, {"risk": 0.0}, {"sigma_m": float("nan")}])
+def test_settings_that_cannot_be(wrong):
+    with pytest.raises(DockairError, match=rf"coasting\.{next(iter(wrong))}"):
+        CoastingSettings(**wrong)
