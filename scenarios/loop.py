@@ -10,6 +10,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from dockair.messages import ImuSample, NavSolution, ReceiverCommand, TankerAnnouncement
 from dockair.scenarios.attempts import RefereeLimits
 from dockair.scenarios.build import build
@@ -78,7 +80,7 @@ class Flight:
             command: flown instead of the navigation's own.
         """
         self._command = self._next_command if command is None else command
-        imu: list[ImuSample] = []
+        felt: list[Truth] = []
         diverged, touched, truth = False, False, self.world.truth
         for _ in range(self._periods.control):
             try:
@@ -89,16 +91,17 @@ class Flight:
             self.referee.watch(truth)
             touched |= truth.probe_touches_drogue
             if truth.tick % self._periods.gyro == 0:
-                imu += self._sampled(truth)
+                felt.append(truth)
             if self.camera is not None and truth.tick % self._periods.camera == 0:
                 self._expose(truth.time_s)
+        imu = self._sampled(felt)
         frame = None if self._exposures is None else self._exposures.delivered(truth.time_s)
         if isinstance(self.navigator, TruthNavigator):
             self.navigator.truth = truth
         announcement = self._announcer.due(truth.time_s)
         if announcement is not None:
             announce_to(self.navigator, announcement)
-        solution = self.navigator.step(tuple(imu), frame)  # type: ignore[arg-type]  # LEDs only where they are asked for
+        solution = self.navigator.step(imu, frame)  # type: ignore[arg-type]  # LEDs only where they are asked for
         self._next_command = solution.command
         self._window, self._exposure_s = solution.window or self.sheets.camera.full_window, solution.exposure_s
         outcome = self.referee.judge(
@@ -112,7 +115,7 @@ class Flight:
             outcome = Outcome.DIVERGED
         return Tick(
             truth=truth,
-            imu=tuple(imu),
+            imu=imu,
             frame=frame,
             solution=solution,
             outcome=outcome,
@@ -127,11 +130,18 @@ class Flight:
         if self.camera is not None:
             self.camera.close()
 
-    def _sampled(self, truth: Truth) -> list[ImuSample]:
-        """Return the IMU's sample, or nothing when it has dropped out."""
-        fault = self._faults.imu(truth.time_s) if self._faults.any else None
-        sample = self.imu.step(truth.time_s, truth.w_WB_B, truth.alpha_WB_B, truth.specific_force_B, fault)
-        return [] if sample is None else [sample]
+    def _sampled(self, truths: list[Truth]) -> tuple[ImuSample, ...]:
+        """Return the IMU's samples, but for those that have dropped out; all at once where nothing fails."""
+        if self._faults.any:
+            each = (
+                self.imu.step(t.time_s, t.w_WB_B, t.alpha_WB_B, t.specific_force_B, self._faults.imu(t.time_s))
+                for t in truths
+            )
+            return tuple(sample for sample in each if sample is not None)
+        if not truths:
+            return ()
+        felt = ((t.w_WB_B, t.alpha_WB_B, t.specific_force_B) for t in truths)
+        return self.imu.steps([t.time_s for t in truths], *(np.array(rows) for rows in zip(*felt, strict=True)))
 
     def _expose(self, time_s: float) -> None:
         if self._exposures is None:

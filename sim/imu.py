@@ -12,6 +12,7 @@ the motion does between two samples, a clock that runs fast or slow.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -145,6 +146,23 @@ class Imu:
             return None
         return ImuSample(time_stamp_s=stamp_s, angular_rate_rad_s=rates[0], specific_force_m_s2=forces[0])
 
+    def steps(
+        self, times_s: Sequence[float], w_WB_B: Array, alpha_WB_B: Array, specific_force_B: Array
+    ) -> tuple[ImuSample, ...]:
+        """Return the samples at some times, the very numbers of as many steps without faults.
+
+        Args:
+            times_s: of the samples.
+            w_WB_B: (n, 3) as in `step`.
+            alpha_WB_B: (n, 3).
+            specific_force_B: (n, 3).
+        """
+        stamps_s, rates, forces = self._sensed(np.array(times_s), w_WB_B, alpha_WB_B, specific_force_B)
+        return tuple(
+            ImuSample(time_stamp_s=stamp_s, angular_rate_rad_s=w, specific_force_m_s2=f)
+            for stamp_s, w, f in zip(stamps_s.tolist(), rates, forces, strict=True)
+        )
+
     def record(
         self,
         n: int,
@@ -165,17 +183,20 @@ class Imu:
         record = ImuRecord(np.empty(n), np.empty((n, 3)), np.empty((n, 3)))
         for first in range(0, n, _BLOCK):
             part = slice(first, min(first + _BLOCK, n))
-            count = part.stop - first
-            w, f = self._felt(
+            sensed = self._sensed(
+                start_s + np.arange(first, part.stop) / self._rate_hz,
                 _rows(w_WB_B, part, _STILL),
                 _rows(alpha_WB_B, part, _STILL),
                 _rows(specific_force_B, part, _UPRIGHT),
             )
-            record.angular_rate_rad_s[part] = self._gyros.sense(w, f)
-            record.specific_force_m_s2[part] = self._accelerometers.sense(f, w)
-            time_s = start_s + np.arange(first, part.stop) / self._rate_hz
-            record.time_stamp_s[part] = time_s + self._jitter(count)
+            for column, values in zip(record, sensed, strict=True):
+                column[part] = values
         return record
+
+    def _sensed(self, times_s: Array, w_B: Array, alpha_B: Array, f_B: Array) -> ImuRecord:
+        w, f = self._felt(w_B, alpha_B, f_B)
+        rates, forces = self._gyros.sense(w, f), self._accelerometers.sense(f, w)
+        return ImuRecord(times_s + self._jitter(len(times_s)), rates, forces)
 
     def _felt(self, w_B: Array, alpha_B: Array, f_B: Array) -> tuple[Array, Array]:
         return _at_imu(w_B, alpha_B, f_B, self._R_BI, self._p_BI)

@@ -43,6 +43,7 @@ from dockair.sim.hose.rest import hinge_angles
 from dockair.sim.hose.tow import Tow
 from dockair.sim.led_tanker import LedTanker
 from dockair.sim.parts import AirAround, Airframe, FlyingAirframe, WorldParameters, WorldStart, scene_of, still_air
+from dockair.sim.reach import Reach
 from dockair.sim.scene import build_scene
 from dockair.sim.step_limit import check_step
 from dockair.sim.truth import Seen, Truth, observe, truth_of
@@ -106,6 +107,7 @@ class World:
         self.model = build_scene(scene_of(parameters, receiver, clock.step_s))
         self.data = mujoco.MjData(self.model)
         self._at = Addresses.of(self.model)
+        self._reach, self._looks = Reach(self.model, self._at.receiver), True
         self._keep_views(self._at, self.data)
         self._wind_W = np.array([-parameters.airspeed_m_s, 0.0, 0.0])
         p = parameters
@@ -156,7 +158,7 @@ class World:
     def restore(self, state: WorldState) -> None:
         """Go back to a saved state; what follows is the same to the bit."""
         mujoco.mj_setState(self.model, self.data, state.engine, _STATE)
-        mujoco.mj_step1(self.model, self.data)
+        self._renew()
         self._tow.reel, self._receiver, self._air, self._fuel = copy.deepcopy(state.parts)
         self._coupling, self.truth, self._seen, self._air_state = state.coupling, state.truth, state.seen, state.air
         now, self._tick = self.truth, state.truth.tick
@@ -196,7 +198,7 @@ class World:
         qpos[:3], qpos[3:] = p_WB, quaternion_from_matrix(np.asarray(self._receiver.trim_R_WB))
         self.data.qvel[self._at.receiver_dof] = 0.0
         self.data.qacc_warmstart[self._at.receiver_dof] = 0.0
-        mujoco.mj_step1(self.model, self.data)
+        self._renew()
 
     def _settle(self, ticks: int) -> Array:
         """Run the hose in the gusts, the receiver held; return the drogue's mean place over the second half."""
@@ -227,8 +229,15 @@ class World:
         if self._air is not None:
             self._air.step()
         self._tanker.arrive()
-        mujoco.mj_step1(self.model, self.data)
+        self._renew(may_touch=not self._reach.is_clear(self.data))
         self._observe(tick)
+
+    def _renew(self, *, may_touch: bool = True) -> None:
+        """MuJoCo's first half step; to look for contacts takes a third of it."""
+        if may_touch != self._looks:
+            self.model.opt.disableflags ^= mujoco.mjtDisableBit.mjDSBL_CONTACT
+            self._looks = may_touch
+        mujoco.mj_step1(self.model, self.data)
 
     def _solve(self, time_s: float, at_exit: int) -> None:
         """MuJoCo's second half step, without actuators, and the forces that must be taken before it integrates."""

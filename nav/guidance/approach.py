@@ -50,6 +50,9 @@ class Guidance:
         self.phase, self.phase_reason = Phase.JOIN_UP, ""
         self._axes = StabilisedAxes(settings.levelling_s, self._dt)
         self._controller = _controller(settings, self._dt)
+        limits = np.array(settings.acceleration_limit_m_s2), self._dt * np.array(settings.jerk_limit_m_s3)
+        share = np.append(1.0, settings.patient_share)
+        self._limits, self._patient_limits = limits, (share * limits[0], share * limits[1])  # of u', of its change
         self._miss = PredictedMiss(settings.closing, self._dt)
         self._u: Array = np.zeros(3)
         self._u_dot: Array = np.zeros(3)
@@ -89,12 +92,9 @@ class Guidance:
         self._count(state, ring, rate, coupling)
         self._change_phase(self._situation(ring, rate, coupling))
         u_dot = self._follow(ring) if self._follows(state, ring) else self._hold_course(ring)
-        limit = np.array(self._settings.acceleration_limit_m_s2)
-        change = self._dt * np.array(self._settings.jerk_limit_m_s3)
-        if self._is_patient:
-            limit[1:], change[1:] = limit[1:] * self._settings.patient_share, change[1:] * self._settings.patient_share
-        u_dot = np.clip(np.clip(u_dot, -limit, limit), self._u_dot - change, self._u_dot + change)
-        self._u_dot = u_dot
+        limit, change = self._patient_limits if self._is_patient else self._limits
+        u_dot = np.minimum(np.maximum(u_dot, -limit), limit)
+        self._u_dot = u_dot = np.minimum(np.maximum(u_dot, self._u_dot - change), self._u_dot + change)
         self._u = _limited(self._u + u_dot * self._dt, self._settings.velocity_limit_m_s)
         self._controller.given(self._u, u_dot)
         return self._command(u_dot)

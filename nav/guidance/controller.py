@@ -3,8 +3,6 @@
 from dataclasses import dataclass
 from typing import Protocol
 
-import numpy as np
-
 from dockair.rotations import Array
 
 
@@ -86,4 +84,4 @@ class Controller(Protocol):
 
 def clipped(value: float, limit: float) -> float:
     """Return the value, or the limit with its sign."""
-    return float(np.clip(value, -limit, limit))
+    return min(max(value, -limit), limit)

@@ -42,8 +42,9 @@ class OwnPath:
     ) -> None:
         self._limit_m_s, self._dies = limit_m_s, np.exp(-step_s / straying_s)
         self._step_s, self._straying_s, self._kept = step_s, straying_s, 1.0 / (1.0 + step_s / forgotten_s)
-        self._response_s = np.asarray(response_s)
-        self._ticks = np.maximum(np.round(self._response_s / step_s).astype(int), 1)
+        self._ticks = np.maximum(np.round(np.asarray(response_s) / step_s).astype(int), 1)
+        self._strays_s = self.strays_s(np.asarray(response_s))
+        self._stays = np.exp(-np.asarray(response_s) / straying_s)  # of e, after tau
         self._length = int(self._ticks.max()) + 1
         self._axes, self._newest = np.arange(3), 0
         self._places, self._velocities = np.zeros((self._length, 3)), np.zeros((self._length, 3))  # rings
@@ -86,20 +87,23 @@ class OwnPath:
     @property
     def place_ahead_m(self) -> Array:
         """(3,) y_r after the response time of each axis, by the commands given so far."""
-        return self.places_m(self._response_s)
+        return self.places_m(self._strays_s)
 
     @property
     def straying_ahead_m_s(self) -> Array:
         """(3,) e after the response time of each axis."""
-        return np.asarray(self._straying * np.exp(-self._response_s / self._straying_s))
+        return np.asarray(self._straying * self._stays)
 
-    def places_m(self, time_s: Array) -> Array:
-        """(..., 3) y_r in times (..., 3) to come, no shorter than the response times, by the commands given so far."""
-        way = self._straying_s * (1.0 - np.exp(-time_s / self._straying_s)) * self._straying
-        return np.asarray(self._places[self._newest] + self._strayed + way)
+    def strays_s(self, time_s: Array) -> Array:
+        """(..., 3) T_e (1 - exp(-t/T_e)) of Eq. (3) for times (..., 3) to come, no shorter than the response times."""
+        return np.asarray(self._straying_s * (1.0 - np.exp(-time_s / self._straying_s)))
+
+    def places_m(self, strays_s: Array) -> Array:
+        """(..., 3) y_r in the times of `strays_s` (..., 3), by the commands given so far."""
+        return np.asarray(self._places[self._newest] + self._strayed + strays_s * self._straying)
 
     def _limited(self, v: Array) -> Array:
-        return np.clip(v, -self._limit_m_s, self._limit_m_s)
+        return np.minimum(np.maximum(v, -self._limit_m_s), self._limit_m_s)
 
     @property
     def _commanded_m_s(self) -> Array:

@@ -78,6 +78,8 @@ class PathPlan:
         self._all, self._left = np.ones(2 * n), np.tile(1.0 - kept, 2)
         self._a_max = acceleration_limit_m_s2
         self._v, self._p = np.zeros(2 * n), np.zeros(2 * n)
+        prices = settings.jerk_price_m2, settings.calm_price_s6 * jerk_limit_m_s3**2  # the second where calm
+        self._prices, self._following = prices, [self._system(np.ones(n), price) for price in prices]
 
     def jerk_m_s3(self, x: Array, places_m: Array, to_contact_s: float | None, *, calm: bool = False) -> float:
         """The jerk to fly now.
@@ -89,12 +91,17 @@ class PathPlan:
             calm: at the price of a swing that is only waited for.
         """
         s = self._settings
-        weights = np.ones(s.nodes) if to_contact_s is None else self._weights(to_contact_s)
-        price = s.calm_price_s6 * self._jerk**2 if calm else s.jerk_price_m2
         off = self._free @ x - places_m
-        limits = self._all if to_contact_s is None else self._left
-        ways = self._place, self._C, weights, off, x[2] / self._a_max, limits
-        return float(_first(*ways, price, self._v, self._p, s.iterations)) * self._jerk
+        if to_contact_s is None:
+            limits, system = self._all, self._following[calm]
+        else:
+            limits, system = self._left, self._system(self._weights(to_contact_s), self._prices[calm])
+        ways = self._C, self._place, *system, off, x[2] / self._a_max, limits
+        return float(_first(*ways, self._v, self._p, s.iterations)) * self._jerk
+
+    def _system(self, weights: Array, price: float) -> tuple[Array, Array, float]:
+        """Weights w and what Eq. (3) needs of them and of r: (H + q C'C)^-1, q."""
+        return weights, *_inverse(self._place, self._C, weights, price)
 
     def _weights(self, to_contact_s: float) -> Array:
         """(N,) Eq. (2); a contact that is there already is met at the first node."""
@@ -105,19 +112,30 @@ class PathPlan:
 
 
 @njit(cache=True)
-def _first(G, C, w, off, a_0, limits, price, v, p, iterations):  # type: ignore[no-untyped-def]
-    """First z of Eq. (1) by Eq. (3); v and p (2N,) go on in place."""
+def _inverse(G, C, w, price):  # type: ignore[no-untyped-def]
+    """(H + q C'C)^-1 and q of Eq. (3)."""
     n = G.shape[1]
     H = (G.T * w) @ G
     for i in range(n):
         H[i, i] += price
     q = 0.5 * np.trace(H) / n
-    M = np.linalg.inv(H + q * (C.T @ C))
+    return np.linalg.inv(H + q * (C.T @ C)), q
+
+
+@njit(cache=True)
+def _first(C, G, w, M, q, off, a_0, limits, v, p, iterations):  # type: ignore[no-untyped-def]
+    """First z of Eq. (1) by Eq. (3); v and p (2N,) go on in place."""
+    n = len(M)
     f = G.T @ (w * off)
-    z = np.zeros(n)
+    z, Cz, u, g = np.zeros(n), np.empty(2 * n), np.empty(2 * n), np.empty(n)
     for _ in range(iterations):
-        z = M @ (C.T @ (q * v - p) - f)
-        Cz = C @ z
+        for i in range(2 * n):
+            u[i] = q * v[i] - p[i]
+        np.dot(C.T, u, g)
+        for i in range(n):
+            g[i] -= f[i]
+        np.dot(M, g, z)
+        np.dot(C, z, Cz)
         for i in range(2 * n):
             free = a_0 if i >= n else 0.0  # the acceleration that is there already, as a share of its limit
             v[i] = min(max(Cz[i] + p[i] / q, -limits[i] - free), limits[i] - free)

@@ -73,7 +73,8 @@ class Predictive:
         self._response_s = float(response_s[_ACROSS[0]])
         nodes = self._response_s + plan.node_s * np.arange(plan.nodes + 1)
         self._times: Array = np.append(0.0, nodes)
-        self._node_times = response_s + plan.node_s * np.arange(1, plan.nodes + 1)[:, np.newaxis]  # (nodes, 3)
+        node_times = response_s + plan.node_s * np.arange(1, plan.nodes + 1)[:, np.newaxis]  # (nodes, 3)
+        self._strays_s = self._own.strays_s(node_times)
         self._ahead: tuple[Array, Array, Array] = (np.zeros(3), np.zeros(3), np.zeros(3))
         self._path: Array = np.zeros((plan.nodes, 3))
         self._u_dot: Array = np.zeros(3)
@@ -189,7 +190,7 @@ class Predictive:
         """(2,) next acceleration of the plans, left and up."""
         s = self._settings
         path = self._path if bearable else self._motion.mean_path(s.plan.nodes)
-        path = path - self._own.places_m(self._node_times)
+        path = path - self._own.places_m(self._strays_s)
         to_contact_s = None if wanted.to_contact_s is None else wanted.to_contact_s - self._response_s
         out = np.empty(2)
         plans = self._patient_plans if wanted.patient else self._plans

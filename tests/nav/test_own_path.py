@@ -38,8 +38,8 @@ def test_it_goes_on_to_stray_until_that_has_died_away():
     here = path.place_m
     for time_s in (RESPONSE_S, np.full(3, 0.8), np.full(3, 20.0)):
         way = strayed * STRAYING_S * (1.0 - np.exp(-time_s / STRAYING_S))
-        np.testing.assert_allclose(path.places_m(time_s) - here, way, atol=1e-12)
-    np.testing.assert_allclose(path.place_ahead_m, path.places_m(RESPONSE_S))
+        np.testing.assert_allclose(path.places_m(path.strays_s(time_s)) - here, way, atol=1e-12)
+    np.testing.assert_allclose(path.place_ahead_m, path.places_m(path.strays_s(RESPONSE_S)))
     np.testing.assert_allclose(path.straying_ahead_m_s, strayed * np.exp(-RESPONSE_S / STRAYING_S))
 
 

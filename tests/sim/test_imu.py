@@ -164,6 +164,19 @@ def test_a_record_is_what_so_many_steps_give_bit_for_bit() -> None:
     assert np.array_equal([s.specific_force_m_s2 for s in samples], forces)
 
 
+def test_steps_taken_together_are_those_taken_one_by_one_bit_for_bit() -> None:
+    w, alpha, f = np.random.default_rng(8).normal(size=(3, 100, 3))
+    times_s = [k / RATE for k in range(100)]
+    alone, together = (_imu(SHEET, p_BI=(1.0, 0.2, -0.3)) for _ in range(2))
+    ones = [alone.step(times_s[k], w[k], alpha[k], f[k]) for k in range(100)]
+    fives = [together.steps(times_s[k : k + 5], *(v[k : k + 5] for v in (w, alpha, f))) for k in range(0, 100, 5)]
+    for one, other in zip(ones, (sample for five in fives for sample in five), strict=True):
+        assert one is not None
+        assert one.time_stamp_s == other.time_stamp_s
+        assert np.array_equal(one.angular_rate_rad_s, other.angular_rate_rad_s)
+        assert np.array_equal(one.specific_force_m_s2, other.specific_force_m_s2)
+
+
 def test_a_record_goes_on_where_the_last_one_ended() -> None:
     w = np.random.default_rng(7).normal(size=(600, 3))
     whole = _imu(SHEET).record(600, w).angular_rate_rad_s
