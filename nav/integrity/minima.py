@@ -37,8 +37,8 @@ def minima_of(pose: PoseEstimate, sight: LinesOfSight, prior: Prior | None) -> l
     """
     other = pose.alternative
     as_it_came = prior is None and isclose(pose.cost, pose.chi2, rel_tol=_ROUNDING)
-    if as_it_came and other is not None:
-        return [pose, other]
+    if as_it_came and (other is not None or pose.mirror_tried):
+        return [pose] if other is None else [pose, other]
     seen = np.isfinite(pose.led_chi2)
     mirror = mirrored(pose.R_CD, pose.p_CD, sight.points_D) if other is None else (other.R_CD, other.p_CD)
     if as_it_came:

@@ -98,6 +98,7 @@ class PoseEstimate:
     led_chi2: Array  #: (n,) parts of chi2, NaN where an LED was not seen
     measurement: LinesOfSight | None = None  #: what was solved; lets a filter take the frame with its own prior
     alternative: "PoseEstimate | None" = None  #: the other minimum, if there is one
+    mirror_tried: bool = False  #: whether the mirror image was descended from: no `alternative` means none then
 
     @property
     def p_DC(self) -> Array:
@@ -182,7 +183,8 @@ def solve_pose(
     if prior is not None or start is None:
         ends.sort(key=lambda end: end.cost if end.converged else np.inf)
     two = len(ends) > 1 and _two_minima(*ends)
-    return estimate_of(ends[0], sight, seen, estimate_of(ends[1], sight, seen) if two else None)
+    other = estimate_of(ends[1], sight, seen) if two else None
+    return estimate_of(ends[0], sight, seen, other, mirror_tried=start is not None and len(ends) > 1)
 
 
 def _settings(method: str, prior: Prior | None, options: PoseOptions) -> DescentSettings:
@@ -247,7 +249,12 @@ def no_pose(status: PoseStatus, count: int) -> PoseEstimate:
 
 
 def estimate_of(
-    end: Descent, sight: LinesOfSight, seen: NDArray[np.bool_], alternative: PoseEstimate | None = None
+    end: Descent,
+    sight: LinesOfSight,
+    seen: NDArray[np.bool_],
+    alternative: PoseEstimate | None = None,
+    *,
+    mirror_tried: bool = False,
 ) -> PoseEstimate:
     """Return the end of a descent as an estimate from LEDs of which (n,) were seen."""
     led_chi2 = end.led_chi2
@@ -265,6 +272,7 @@ def estimate_of(
         led_chi2=led_chi2,
         measurement=sight,
         alternative=alternative,
+        mirror_tried=mirror_tried,
     )
 
 
