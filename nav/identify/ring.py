@@ -48,6 +48,8 @@ from dockair.rotations import Array
 
 __all__ = ["METHODS", "Identification", "IdentificationStatus", "IdentifySettings", "identify"]
 
+_SETTINGS, _CAMERA, _RING = IdentifySettings(), Camera(), LedRing()  # when none are given
+
 
 def identify(
     centroids_px: Array,
@@ -85,8 +87,7 @@ def identify(
     Raises:
         DockairError: unknown method, wrong shapes, a ring of other than eight LEDs.
     """
-    settings = settings or IdentifySettings()
-    camera, ring = camera or Camera(), ring or LedRing()
+    settings, camera, ring = settings or _SETTINGS, camera or _CAMERA, ring or _RING
     points, flux = _checked(centroids_px, brightness, method, ring)
     sigma_px, code = settings.sigma_px if sigma_px is None else sigma_px, code_of(ring, settings.code)
     nowhere_else = expected_centre_px is None and expected_radius_px is None and not code.says_something
