@@ -14,7 +14,7 @@ _LEAST_CURVATURE, _MOST_CURVATURE = 0.1, 2.0  # of Eq. (3) of `belief_frame`: on
 _SETTLED_CHI2 = 1e-8  # of a step: a ten-thousandth of a sigma
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _cholesky(S: Array) -> None:
     """Put L, S = L L', into the lower triangle of S (n, n)."""
     for j in range(len(S)):
@@ -25,7 +25,7 @@ def _cholesky(S: Array) -> None:
             S[i, j] = np.sqrt(a) if i == j else a / S[j, j]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _halfway(L: Array, b: Array) -> None:
     """Put L^-1 b into b (n,)."""
     for i in range(len(b)):
@@ -34,7 +34,7 @@ def _halfway(L: Array, b: Array) -> None:
         b[i] /= L[i, i]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _solved(L: Array, b: Array) -> Array:
     """(n,) S^-1 b, with S = L L'."""
     z = b.copy()
@@ -46,7 +46,7 @@ def _solved(L: Array, b: Array) -> Array:
     return z
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def distance2(y: Array, other: Array, C: Array) -> float:
     """Of two poses, the first six of y, by the covariance C (6, 6)."""
     L, step = C.copy(), y[:6] - other[:6]
@@ -55,7 +55,7 @@ def distance2(y: Array, other: Array, C: Array) -> float:
     return float((step * step).sum())
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def image_of(rays: Array, weights: Array) -> tuple[Array, Array]:
     """(n, 2) image of rays (n, 3), focal length 1, and (n, 2, 2) what whitens it, of weights (n, 3, 3)."""
     n = len(rays)
@@ -77,7 +77,7 @@ def image_of(rays: Array, weights: Array) -> tuple[Array, Array]:
     return ab, whiten
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _log(R: Array) -> Array:
     """(3,) rotation vector of R (3, 3), from the largest row of 4 q q', q its quaternion."""
     K = np.empty((4, 4))
@@ -97,7 +97,7 @@ def _log(R: Array) -> Array:
     return out
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _exp(phi: Array) -> tuple[Array, Array]:
     """(3, 3) exp(phi), and its left Jacobian."""
     angle = np.sqrt(phi[0] ** 2 + phi[1] ** 2 + phi[2] ** 2)
@@ -109,7 +109,7 @@ def _exp(phi: Array) -> tuple[Array, Array]:
     return np.eye(3) + p * K + q * KK, np.eye(3) + q * K + s * KK
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _residuals(R: Array, p: Array, points: Array, ab: Array, whiten: Array, d: Array) -> tuple[bool, Array]:
     """R (2n,) of LEDs moved by d (2n,); false when one is behind the camera."""
     n = len(points)
@@ -127,7 +127,7 @@ def _residuals(R: Array, p: Array, points: Array, ab: Array, whiten: Array, d: A
     return True, r
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _jacobian(R: Array, J: Array, p: Array, points: Array, whiten: Array, d: Array) -> Array:
     """H (2n, 6 + 2n) at a pose whose turn has the left Jacobian J; a row has but its own LED beside the pose."""
     n = len(points)
@@ -151,7 +151,7 @@ def _jacobian(R: Array, J: Array, p: Array, points: Array, whiten: Array, d: Arr
     return H
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _spread(H: Array, C: Array) -> tuple[Array, Array]:
     """H C, and L of S of Eq. (2), S = L L'."""
     HC, S = np.zeros(H.shape), np.empty((len(H), len(H)))
@@ -169,7 +169,7 @@ def _spread(H: Array, C: Array) -> tuple[Array, Array]:
     return HC, S
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _ended(HC: Array, L: Array, C: Array, cost: float) -> tuple[float, Array]:
     """Eq. (4), and (6, 6) the pose's covariance."""
     half, after, log_det = np.empty((6, len(L))), C[:6, :6].copy(), 0.0
@@ -185,7 +185,7 @@ def _ended(HC: Array, L: Array, C: Array, cost: float) -> tuple[float, Array]:
     return -0.5 * (cost + log_det), after
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _times(H: Array, y: Array) -> Array:
     """(2n,) H y."""
     out = np.empty(len(H))
@@ -197,7 +197,7 @@ def _times(H: Array, y: Array) -> Array:
     return out
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def fitted(
     R0: Array, p0: Array, points: Array, C: Array, ab: Array, whiten: Array, R: Array, p: Array
 ) -> tuple[int, Array, Array, Array, float, float, Array, Array, Array, Array, float, float, Array]:

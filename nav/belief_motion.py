@@ -68,7 +68,7 @@ class Motion(NamedTuple):
     longest_step_s: float
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _turned(E: Array, u: Array) -> Array:
     out = np.empty(3)
     for i in range(3):
@@ -76,7 +76,7 @@ def _turned(E: Array, u: Array) -> Array:
     return out
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _turn(w: Array, dt: float) -> Array:
     """(3, 3) E = exp(-[w x] dt)."""
     angle = np.sqrt(w[0] ** 2 + w[1] ** 2 + w[2] ** 2) * dt
@@ -90,7 +90,7 @@ def _turn(w: Array, dt: float) -> Array:
     return E
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _driven(P: Array, dt: float, felt: bool, stiffness: Array, friction: Array, return_1_s: float) -> None:
     """Eqs (2), (3) for the rows of P, row after row (47 * 47,): a width known to the compiler lets it go in fours."""
     for i in range(3):
@@ -111,7 +111,7 @@ def _driven(P: Array, dt: float, felt: bool, stiffness: Array, friction: Array, 
             P[u + j] -= back
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _errors_moved(
     P: Array, E: Array, x: Array, dt: float, felt: bool, stiffness: Array, friction: Array, return_1_s: float
 ) -> None:
@@ -138,7 +138,7 @@ def _errors_moved(
                 rows[2 * ERRORS + j] = q2 - (u0 * b1 - u1 * b0)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _noise_added(P: Array, x: Array, dt: float, gyro2: float, drive2: float, other2: float, rest: Array) -> None:
     """P <- P + Q in place; `other2` drives the velocity alone, `rest` is of all others."""
     for i in range(3):
@@ -172,7 +172,7 @@ def _noise_added(P: Array, x: Array, dt: float, gyro2: float, drive2: float, oth
             P[i, j] += gyro2 * dt * (G[i, 0] * G[j, 0] + G[i, 1] * G[j, 1] + G[i, 2] * G[j, 2])
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _held_noise(after: float, before: float, turn2: float, most2: float) -> float:
     """Mean of sigma_A^2 t^3 over a piece of time, t from `before` to `after`, at most `most2` (Eq. (5))."""
     corner = (most2 / turn2) ** (1.0 / 3.0) if turn2 > 0.0 else np.inf
@@ -182,7 +182,7 @@ def _held_noise(after: float, before: float, turn2: float, most2: float) -> floa
     return (turn2 * (inside**4 - before**4) / 4.0 + most2 * max(after - corner, 0.0)) / (after - before)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def propagated(
     R: Array,
     x: Array,

@@ -124,7 +124,7 @@ class Sight:
         return pixels, camera.focal_length_px * np.sqrt(variances)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _seen(R_BC: Array, R_BD: Array, p_CD_B: Array, P: Array, turn: int) -> tuple[Array, Array, Array, Array]:
     """R_CD, p_CD, M (6, 47) and M P M' of Eq. (1); `turn` is the calibration's first column.
 
@@ -161,7 +161,7 @@ def _seen(R_BC: Array, R_BD: Array, p_CD_B: Array, P: Array, turn: int) -> tuple
     return R_CD, p_CD, M, covariance
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _with_leds(
     M_pose: Array, covariance: Array, P: Array, ring: Array, points: Array, first: int
 ) -> tuple[NDArray[np.int64], Array, Array]:
@@ -189,7 +189,7 @@ def _with_leds(
     return numbers, M, C
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _led_variances(a: Array, R_CD: Array, p_CD: Array, M: Array, P: Array, turn: int, ring: int) -> Array:
     """(n,) largest variance of the image, focal length 1, of LEDs at a (n, 3) from the ring's centre, NaN behind."""
     columns, H, HP, out = np.empty(15, np.int64), np.empty((2, 15)), np.empty((2, 15)), np.full(len(a), np.nan)
