@@ -71,12 +71,17 @@ class Navigator:
     """The navigation that Dockair flies; see `messages.Navigates` for what any other must offer.
 
     Raises:
-        DockairError: a ring that cannot be identified, or numbered by the code it has.
+        DockairError: a ring that cannot be identified, or numbered by the code it has; a horizon of coasting that the
+            filter's buffer does not hold.
     """
 
     def __init__(self, sheets: NavigationSheets, settings: NavigatorSettings | None = None) -> None:
         _check_ring(sheets.ring)
         self._sheets, self._settings = sheets, settings or NavigatorSettings()
+        horizon_s, buffer_s = self._settings.coasting.horizon_s, self._settings.fusion.buffer_s
+        if not horizon_s < buffer_s:
+            expected = f"less than fusion.buffer_s = {buffer_s}, in which what was foretold is kept"
+            raise DockairError("coasting.horizon_s", expected=expected, got=horizon_s)
         self._filter = RelativeFilter(sheets, self._settings.fusion)
         self._finder = RingFinder(
             sheets, self._filter, self._settings.detect, self._settings.track, self._settings.turned_rad,
@@ -152,6 +157,7 @@ class Navigator:
         )
         if pose.status is PoseStatus.CONVERGED:
             self._filter.begin_again(pose, seen.time_stamp_s)
+            self._in_basket = False
 
     def _nothing(self, status: str) -> str:
         self._led_pixels_px = np.full((len(self._points_D), 2), np.nan)
@@ -190,10 +196,11 @@ class Navigator:
         )
         if not self._filter.update(replace(checked.pose, measurement=sight), time_s):
             return "pose refused by the gate"
-        self._used_time_s, self._integrity = time_s, checked
-        self._posed_time_s = time_s
-        if self._coasting.due(time_s):
-            self._ask_coasting(time_s)
+        if not time_s < self._posed_time_s:  # a late one corrects the belief, and the claim stays that of a newer
+            self._integrity, self._posed_time_s = checked, time_s
+            if self._coasting.due(time_s):
+                self._ask_coasting(time_s)
+        self._used_time_s = max(time_s, self._used_time_s)  # NaN before the first: the first of the two then
         return "pose used"
 
     def _ask_coasting(self, time_s: float) -> None:
@@ -215,7 +222,7 @@ class Navigator:
             return "pose too few LEDs"
         if not self._filter.update_leds(seen.centroids_px, self._points_D[seen.led_numbers], seen.sigma_px, time_s):
             return "LEDs refused by the gate"
-        self._used_time_s = time_s
+        self._used_time_s = max(time_s, self._used_time_s)
         return "LEDs used"
 
     def contact_claim(self) -> ContactClaim | None:
@@ -224,17 +231,26 @@ class Navigator:
             return None
         offset_m = self._integrity.pose.p_CD - self._filter.predicted_pose(self._posed_time_s)[1]
         age_s = self._time_s - self._posed_time_s
-        levels = self._coasting.added(self._integrity.levels.about(offset_m), age_s)
+        levels = self._coasting.added(self._integrity.levels.about(offset_m), age_s, self._sigmas_to_ask_m())
         return usable_for_contact(
             self._integrity, age_s, self._settings.contact, levels=levels, in_basket=self._in_basket
         )
 
-    def _note_basket(self, state: FilterState, *, usable: bool) -> None:
+    def _sigmas_to_ask_m(self) -> Array:
+        """(3,) of the belief in camera axes [m]; 0 where what it foretold wrongly says all: with IMU, well followed."""
+        felt = self._time_s - self._filter.imu_time_s <= self._settings.fusion.longest_gap_s
+        if felt and self._coasting.is_of(self._posed_time_s):
+            return np.zeros(3)
+        covariance = self._filter.predicted_pose(self._time_s)[2]
+        return np.asarray(np.sqrt(np.diag(covariance)[3:]))
+
+    def _note_basket(self, state: FilterState, claim: ContactClaim | None, *, usable: bool) -> None:
         """Note whether the tip is in the basket: it went in inside the rim, on a usable belief, and has stayed."""
-        p_DP = -state.R_BD.T @ state.p_PD_B
-        mouth_m = 0.5 * self._sheets.ring.diameter_m - self._settings.contact.lateral_m
-        enters = usable and np.hypot(p_DP[1], p_DP[2]) <= mouth_m
-        self._in_basket = bool(p_DP[0] > 0.0 and (self._in_basket or enters))
+        p_DP, rim_m = -state.R_BD.T @ state.p_PD_B, 0.5 * self._sheets.ring.diameter_m
+        aside_m = float(np.hypot(p_DP[1], p_DP[2]))
+        stays = self._in_basket and p_DP[0] > 0.0 and aside_m <= rim_m
+        within = claim is not None and p_DP[0] > claim.levels.range_m
+        self._in_basket = bool(stays or (usable and within and aside_m <= rim_m - self._settings.contact.lateral_m))
 
     def _solution(self) -> NavSolution:
         state = self._filter.state(self._time_s)
@@ -244,7 +260,7 @@ class Navigator:
         valid = known and sigma_lateral_m <= self._settings.usable_sigma_m and aged_s <= self._settings.usable_age_s
         claim = self.contact_claim()
         contact_usable = valid and claim is not None and claim.usable
-        self._note_basket(state, usable=contact_usable)
+        self._note_basket(state, claim, usable=contact_usable)
         w_WB_B = self._filter.rate_B(self._time_s)
         command = self._guidance.step(
             RelativeState(

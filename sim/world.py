@@ -86,7 +86,7 @@ class World:
 
     Attributes:
         truth: the state now.
-        model, data: for the camera, to read only.
+        model, data: for the camera, to read only; the model says to look for contacts only while there may be some.
         rest: hose and drogue at rest at full trail in still air.
     """
 

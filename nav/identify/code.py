@@ -14,7 +14,6 @@ Left out: flux is not corrected for the pattern's fall with the angle, which all
 """
 
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,7 +61,6 @@ class Code:
         return any(all(np.array_equal(np.roll(m, turn), m) for m in marks) for turn in range(1, SLOTS))
 
 
-@lru_cache(maxsize=16)
 def code_of(ring: LedRing, settings: CodeSettings) -> Code:
     """The code of a sheet of eight LEDs."""
     offset = ring.angles_rad - _PLACE * np.arange(SLOTS)

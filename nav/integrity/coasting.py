@@ -8,9 +8,11 @@ a time a without frames
     sigma(a)^2 = s^2 (a/h)^3 for a <= h,   s^2 (a/h)^4 beyond                                        (1)
 
 as by a white acceleration, and at worst by a steady one. Protection levels grow by k sigma(a), with k of one axis along
-and of two across for the probability `risk`.
+and of two across for the probability `risk`. So it is for a belief like those that were asked: with an IMU, and with
+frames up to the last. Of any other (`is_of` says which) the covariance is asked, too.
 
-Not modelled: gusts that begin in the very moment in which the camera goes out, a drogue that is struck.
+Not modelled: gusts that begin in the very moment in which the camera goes out, a drogue that is struck, that s is
+itself an estimate (along, the risk is up to twice the one set).
 """
 
 from dataclasses import dataclass, fields
@@ -60,6 +62,10 @@ class CoastingError:
         self._sigmas = tuple(float(np.sqrt(chi2.isf(self._settings.risk, axes))) for axes in (1, 2))
         self._asked_s = -np.inf
 
+    def is_of(self, frame_s: float) -> bool:
+        """Whether the belief with a last frame of this stamp is like those that were asked: one of them was, lately."""
+        return frame_s - self._asked_s <= self._settings.horizon_s
+
     def due(self, time_s: float) -> bool:
         """Whether the belief is to be asked again at a frame of this stamp."""
         return time_s - self._asked_s >= self._settings.interval_s - _STAMP_S
@@ -75,20 +81,27 @@ class CoastingError:
         s = self._settings
         if not np.isfinite(error_C).all():
             return
-        since_s = min(time_s - self._asked_s, s.horizon_s)
-        self._asked_s = time_s
-        kept_s = self._weight_s * np.exp(-since_s / s.memory_s)
+        since_s, self._asked_s = time_s - self._asked_s, time_s
+        kept_s = self._weight_s * (np.exp(-since_s / s.memory_s) if np.isfinite(since_s) else 1.0)
+        weight_s = min(since_s, s.horizon_s)
         at_horizon = np.square(error_C) / _growth(age_s / s.horizon_s)
-        self._weight_s = kept_s + since_s
-        self._squares = (kept_s * self._squares + since_s * at_horizon) / self._weight_s
+        self._weight_s = kept_s + weight_s
+        self._squares = (kept_s * self._squares + weight_s * at_horizon) / self._weight_s
 
     def sigma_m(self, age_s: float) -> Array:
         """(3,) of Eq. (1) in camera axes."""
         return np.asarray(np.sqrt(self._squares * _growth(age_s / self._settings.horizon_s)))
 
-    def added(self, levels: ProtectionLevels, age_s: float) -> ProtectionLevels:
-        """Return protection levels of a belief that had its last frame so long ago; none promised without that."""
-        along, left, up = self.sigma_m(age_s) if age_s >= 0.0 else np.full(3, np.inf)
+    def added(self, levels: ProtectionLevels, age_s: float, believed_m: Array) -> ProtectionLevels:
+        """Return protection levels of a belief that had its last frame so long ago; none promised without that.
+
+        Args:
+            levels: at the frame.
+            age_s: of the frame.
+            believed_m: (3,) sigmas of the belief itself in camera axes, below which nothing is promised [m].
+        """
+        measured_m = self.sigma_m(age_s) if age_s >= 0.0 else np.full(3, np.inf)
+        along, left, up = np.maximum(measured_m, believed_m)
         return ProtectionLevels(
             range_m=levels.range_m + self._sigmas[0] * float(along),
             lateral_m=levels.lateral_m + self._sigmas[1] * float(max(left, up)),

@@ -60,7 +60,7 @@ def test_levels_are_exceeded_as_often_as_they_say():
     errors = rng.normal(0.0, 0.03, (4000, 3))
     for k, error in enumerate(errors):
         coasting.take(error, HORIZON_S, 0.1 * (k + 1))
-    level = coasting.added(ProtectionLevels(range_m=0.0, lateral_m=0.0), HORIZON_S)
+    level = coasting.added(ProtectionLevels(range_m=0.0, lateral_m=0.0), HORIZON_S, np.zeros(3))
     beyond_m = np.abs(errors[:, 0]) > level.range_m, np.hypot(errors[:, 1], errors[:, 2]) > level.lateral_m
     for beyond in beyond_m:  # three sigmas of the binomial: 0.05 +- 0.010
         assert np.mean(beyond) == pytest.approx(settings.risk, abs=0.011)
@@ -70,15 +70,35 @@ def test_the_worse_of_the_two_axes_across_counts():
     coasting = asked(np.array([0.001, 0.01, 0.05]))
     up = float(coasting.sigma_m(HORIZON_S)[2])
     k = float(np.sqrt(chi2.isf(CoastingSettings().risk, 2)))
-    assert coasting.added(FRAME, HORIZON_S).lateral_m == pytest.approx(FRAME.lateral_m + k * up)
+    assert coasting.added(FRAME, HORIZON_S, np.zeros(3)).lateral_m == pytest.approx(FRAME.lateral_m + k * up)
 
 
 def test_a_frame_of_now_adds_nothing_and_no_frame_at_all_promises_nothing():
     coasting = asked(np.full(3, 0.02))
-    assert coasting.added(FRAME, 0.0) == FRAME
+    assert coasting.added(FRAME, 0.0, np.zeros(3)) == FRAME
     for age_s in (np.nan, -0.01):
-        nothing = coasting.added(FRAME, age_s)
+        nothing = coasting.added(FRAME, age_s, np.zeros(3))
         assert nothing.range_m == nothing.lateral_m == np.inf
+
+
+def test_a_belief_that_is_less_sure_of_itself_promises_no_more_than_that():
+    coasting = asked(np.full(3, 0.001))
+    k = float(np.sqrt(chi2.isf(CoastingSettings().risk, 2)))
+    added = coasting.added(FRAME, HORIZON_S, np.array([0.0, 0.04, 0.02]))
+    assert added.lateral_m == pytest.approx(FRAME.lateral_m + k * 0.04)
+    assert added.range_m < FRAME.range_m + 0.005
+
+
+def test_only_a_belief_that_was_asked_lately_is_like_those_that_were():
+    assert not CoastingError().is_of(0.0)
+    coasting = asked(np.full(3, 0.02), seconds=10.0)
+    assert coasting.is_of(10.1) and not coasting.is_of(11.0)
+
+
+def test_what_was_measured_fades_also_while_nothing_is():
+    coasting = asked(np.full(3, 0.01), seconds=30.0)
+    coasting.take(np.full(3, 0.1), HORIZON_S, 90.0)
+    assert coasting.sigma_m(HORIZON_S) == pytest.approx(0.1, rel=0.01)
 
 
 def test_what_was_not_foretold_says_nothing():

@@ -363,9 +363,10 @@ def test_contact_is_usable_at_2_m_and_not_at_30_m():
     assert usable_for_contact(far, 0.02).doubts == (Doubt.RANGE,)
 
 
-@pytest.mark.parametrize("age_s", [0.21, -0.01, float("nan"), float("inf")])
+@pytest.mark.parametrize("age_s", [0.41, -0.01, float("nan"), float("inf")])
 def test_a_frame_of_another_age_than_recent_is_a_doubt(age_s):
     near = checked(pixels_at(*pose_at(2.0, 5.0), seed=9))
+    assert usable_for_contact(near, 0.39).usable
     assert usable_for_contact(near, age_s).doubts == (Doubt.AGE,)
 
 

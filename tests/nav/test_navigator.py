@@ -10,6 +10,7 @@ from scipy.stats import binom
 from dockair.calibration import Camera, GyroSheet, LedRing, Mounting, NavigationSheets, StartGeometry
 from dockair.errors import DockairError
 from dockair.messages import CameraFrame, ImuSample, LedObservation, Window
+from dockair.nav.integrity.coasting import CoastingSettings
 from dockair.nav.integrity.contact import ContactLimits, Doubt
 from dockair.nav.navigator import Navigator, NavigatorSettings
 from dockair.rotations import exp, log, matrix_from_yaw_pitch_roll
@@ -170,6 +171,50 @@ def test_in_the_basket_the_level_across_is_not_asked(render):
         sky = Sky(render, path)
         sky.run(5.6)
         assert sky.run(0.2, camera=False).contact_usable == inside
+
+
+def test_beside_the_basket_no_wall_holds_the_tip(render):
+    """In at 0.6 m/s; then the drogue leaves sideways at 0.5 m/s, among the same gusts, until it is 0.4 m off."""
+
+    def path(t):
+        out_m = 0.5 * min(max(t - 5.6, 0.0), 0.8)
+        return np.array([max(3.3 - 0.6 * t, -0.1), 0.02 + out_m, 0.07 * np.sin(2.0 * np.pi * 1.2 * t)])
+
+    sky = Sky(render, path)
+    sky.run(7.0)
+    assert not sky.run(0.25, camera=False).contact_usable
+
+
+def test_a_belief_that_has_just_found_the_drogue_again_claims_nothing_without_frames(render):
+    """After 1.3 s out of view its velocity is a guess, however well a followed belief has foretold."""
+    sky = Sky(render, still)
+    sky.run(5.0)
+    sky.run(1.3, camera=False)
+    while sky.step().frame_time_stamp_s < 6.0:
+        pass
+    assert not sky.run(0.2, camera=False).contact_usable
+
+
+def test_without_gyro_and_camera_the_claim_is_the_beliefs_own(render):
+    sky = Sky(render, still)
+    sky.run(5.0)
+    with_gyro = sky.run(0.25, camera=False).contact_usable
+    sky.run(1.0)
+    assert with_gyro and not sky.run(0.25, camera=False, gyro=False).contact_usable
+
+
+def test_a_late_frame_does_not_take_the_claim_back_in_time(render):
+    sky = Sky(render, still)
+    sky.run(2.0)
+    late = sky.frame(1.75, sky.window)
+    sky.run(0.1)
+    before_s = sky.navigator.step(sky.imu(), late).frame_time_stamp_s
+    assert before_s > 2.0 and sky.navigator.contact_claim().usable
+
+
+def test_a_horizon_that_the_buffer_does_not_hold_is_refused():
+    with pytest.raises(DockairError, match=r"coasting\.horizon_s"):
+        Navigator(sheets(None), NavigatorSettings(coasting=CoastingSettings(horizon_s=0.5)))
 
 
 def test_contact_may_not_be_claimed_where_the_range_is_not_known_well_enough(render):
