@@ -313,7 +313,7 @@ def test_frame_older_than_the_buffer_is_refused_and_changes_nothing():
     filter_ = RelativeFilter(world.sheets, SETTINGS)
     filter_.propagate([world.gyro()] + [world.step() for _ in range(150)])
     before = state_of(filter_, 0.6)
-    assert not filter_.update(solve_pose(world_pixels(world), RING, CAMERA), 0.3)
+    assert not filter_.update(solve_pose(world_pixels(world), RING, CAMERA), 0.1)
     np.testing.assert_array_equal(state_of(filter_, 0.6), before)
 
 
