@@ -59,7 +59,7 @@ class CoastingError:
     def __init__(self, settings: CoastingSettings | None = None) -> None:
         self._settings = settings or CoastingSettings()
         self._squares, self._weight_s = np.full(3, self._settings.sigma_m**2), self._settings.prior_s
-        self._sigmas = tuple(float(np.sqrt(chi2.isf(self._settings.risk, axes))) for axes in (1, 2))
+        self._factors = tuple(float(np.sqrt(chi2.isf(self._settings.risk, axes))) for axes in (1, 2))
         self._asked_s = -np.inf
 
     def is_of(self, frame_s: float) -> bool:
@@ -103,8 +103,8 @@ class CoastingError:
         measured_m = self.sigma_m(age_s) if age_s >= 0.0 else np.full(3, np.inf)
         along, left, up = np.maximum(measured_m, believed_m)
         return ProtectionLevels(
-            range_m=levels.range_m + self._sigmas[0] * float(along),
-            lateral_m=levels.lateral_m + self._sigmas[1] * float(max(left, up)),
+            range_m=levels.range_m + self._factors[0] * float(along),
+            lateral_m=levels.lateral_m + self._factors[1] * float(max(left, up)),
         )
 
 
