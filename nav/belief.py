@@ -32,6 +32,7 @@ from dockair.nav.belief_frame import Explanation, explanations
 from dockair.nav.belief_motion import (
     CALIBRATION,
     ERRORS,
+    GUST,
     HARDWARE,
     PLACE,
     REST,
@@ -177,7 +178,7 @@ def mixture(beliefs: Sequence[Belief]) -> Belief:
 
 
 def _difference(belief: Belief, other: Belief) -> Array:
-    """(47,) errors by which a belief is off from another."""
+    """(50,) errors by which a belief is off from another."""
     pose = pose_difference(belief.R_BD, belief.p_ID, other.R_BD, other.p_ID)
     calibration = np.zeros(CALIBRATION.stop - CALIBRATION.start)
     return np.concatenate([pose, (belief.x[V:] - other.x[V:]).ravel(), calibration, belief.ring - other.ring])
@@ -236,13 +237,13 @@ def begun_again(belief: Belief, start: Belief, p_ID: Array, turn_sigma_rad: floa
         p_ID: where the drogue is seen.
         turn_sigma_rad: what the drogue may have turned by on each axis.
     """
-    moving = np.r_[PLACE, VELOCITY, SWING, SWING_RATE]
+    moving = np.r_[PLACE, VELOCITY, SWING, SWING_RATE, GUST]
     P = belief.P.copy()
     P[moving], P[:, moving] = 0.0, 0.0
     P[np.ix_(moving, moving)] = start.P[np.ix_(moving, moving)]
     P[range(3), range(3)] += turn_sigma_rad**2
     x = belief.x.copy()
-    x[:4] = start.x[:4]
+    x[:4], x[7] = start.x[:4], start.x[7]
     x[0] = p_ID
     return replace(belief, x=x, P=P)
 

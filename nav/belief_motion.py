@@ -5,7 +5,8 @@ Held in body axes B, from the place I of the accelerometers; u' is the rate of c
     R = R_BD,  s = p_ID_B,  v = s',  n = swing of the drogue about its place of rest,  m = n',
     b = bias of the gyro,   c = gravity less the steady acceleration of the formation
     u = turn from the drogue's attitude to that of rest, R_rest = exp(u) R
-    a = -W^2 n - 2 z W m + white drive                                                                (1)
+    g = what gusts and the receiver's bow wave drive it with, which lasts for a while [Singer 1970]
+    a = -W^2 n - 2 z W m + g + white drive,   g' = -g / T_g + white                                   (1)
     s' = v,   v' = a - (f + c),   n' = m,   m' = a,   w = w_gyro - b                                  (2)
     phi' = u / T + white turning,   u' = -phi'                                                        (3)
 
@@ -15,7 +16,7 @@ their bias is part of c, from which it cannot be told. The drogue turns about an
 it, which stays and walks a little, as the LEDs' places do for what is not modelled of them. In body axes every vector
 turns with E = exp(-[w x] dt). Errors
 
-    e = (phi, ds, dv, dn, dm, db, dc, du, calibration, ring),   R_true = exp(phi) R,   dw = -db - noise         (4)
+    e = (phi, ds, dv, dn, dm, db, dc, du, dg, calibration, ring),   R_true = exp(phi) R,   dw = -db - noise     (4)
 
 so that a turn that the gyro did not measure enters phi with +1 and each vector u with -[u x]. One step is Eq. (2) to
 second order in dt (Eq. (3) to first), then E; the steps are at most `longest_step_s`.
@@ -28,7 +29,8 @@ after the last, or between two that are T apart, the gyro's squared noise densit
 
 The receiver's acceleration is taken for white where no two samples of it stand near.
 
-Not modelled: the size of the IMU, the swing's axes turning with the tanker, a formation that speeds up (walk of c).
+Not modelled: overtones of the hose, which take back half a second later what a gust gave, the size of the IMU, the
+swing's axes turning with the tanker, a formation that speeds up (walk of c).
 """
 
 from typing import NamedTuple
@@ -40,10 +42,11 @@ from dockair.rotations import Array
 
 PHI, PLACE, VELOCITY = slice(0, 3), slice(3, 6), slice(6, 9)
 SWING, SWING_RATE, BIAS, FORMATION = slice(9, 12), slice(12, 15), slice(15, 18), slice(18, 21)
-REST, CALIBRATION, RING, HARDWARE = slice(21, 24), slice(24, 31), slice(31, 47), slice(24, 47)
-ERRORS = 47  #: how many errors a belief has
-S, V, N, M, B, C, U = range(7)  #: rows of the state (7, 3)
-_MOVING = 24  # errors that move; those of calibration and ring do not
+REST, GUST = slice(21, 24), slice(24, 27)
+CALIBRATION, RING, HARDWARE = slice(27, 34), slice(34, 50), slice(27, 50)
+ERRORS = 50  #: how many errors a belief has
+S, V, N, M, B, C, U, G = range(8)  #: rows of the state (8, 3)
+_MOVING = 27  # errors that move; those of calibration and ring do not
 
 
 class Motion(NamedTuple):
@@ -51,11 +54,13 @@ class Motion(NamedTuple):
 
     stiffness: Array  #: (3,) W^2 [1/s^2]
     friction: Array  #: (3,) 2 z W [1/s]
+    gust_1_s: float  #: 1/T_g of Eq. (1)
+    gust2: Array  #: (3,) of g' [m^2/s^5]
     attitude2: float  #: drogue's turning [rad^2/s]
     return_1_s: float  #: 1/T of Eq. (3)
     rest2: float  #: walk of the attitude of rest [rad^2/s]
     ring2: float  #: walk of the LEDs' places [m^2/s]
-    drive2: float  #: of Eq. (1) [m^2/s^3]
+    drive2: float  #: the white one of Eq. (1) [m^2/s^3]
     receiver2: float  #: receiver's acceleration where it is not measured [m^2/s^3]
     accelerometer2: float  #: [m^2/s^3]
     gyro2: float  #: [rad^2/s]
@@ -91,36 +96,58 @@ def _turn(w: Array, dt: float) -> Array:
 
 
 @njit(cache=True, error_model="numpy")
-def _driven(P: Array, dt: float, felt: bool, stiffness: Array, friction: Array, return_1_s: float) -> None:
-    """Eqs (2), (3) for the rows of P, row after row (47 * 47,): a width known to the compiler lets it go in fours."""
+def _state_driven(x: Array, f: Array, w: Array, dt: float, felt: bool, motion: Motion) -> None:
+    """Eqs (1), (2) of the state (8, 3) in place, in axes that do not turn."""
+    fading_1_s = motion.gust_1_s * (1.0 - 0.5 * dt * motion.gust_1_s)
     for i in range(3):
-        W2, zW2 = stiffness[i], friction[i]
+        fades = fading_1_s * x[7, i]
+        a = -motion.stiffness[i] * x[2, i] - motion.friction[i] * x[3, i] + x[7, i]
+        a = a - 0.5 * dt * (motion.stiffness[i] * x[3, i] + motion.friction[i] * a + fades)  # half-way
+        j, m = (i + 1) % 3, (i + 2) % 3
+        before = f[i] + 0.5 * dt * (w[j] * f[m] - w[m] * f[j])  # f in the axes at the step's begin
+        relative = a - before - x[5, i] if felt else a
+        x[0, i] += dt * x[1, i] + 0.5 * dt * dt * relative
+        x[1, i] += dt * relative
+        x[7, i] -= dt * fades
+        if i > 0:
+            x[2, i] += dt * x[3, i] + 0.5 * dt * dt * a
+            x[3, i] += dt * a
+
+
+@njit(cache=True, error_model="numpy")
+def _driven(P: Array, dt: float, felt: bool, motion: Motion) -> None:
+    """Eqs (1) to (3) for the rows of P, row after row (50 * 50,): a width known to the compiler lets it go in fours."""
+    fading_1_s = motion.gust_1_s * (1.0 - 0.5 * dt * motion.gust_1_s)
+    for i in range(3):
+        W2, zW2 = motion.stiffness[i], motion.friction[i]
         s, v, n, m, c = (3 + i) * ERRORS, (6 + i) * ERRORS, (9 + i) * ERRORS, (12 + i) * ERRORS, (18 + i) * ERRORS
+        g = (24 + i) * ERRORS
         for j in range(ERRORS):
-            a = -W2 * P[n + j] - zW2 * P[m + j]
-            a = a - 0.5 * dt * (W2 * P[m + j] + zW2 * a)  # half-way
+            fades = fading_1_s * P[g + j]
+            a = -W2 * P[n + j] - zW2 * P[m + j] + P[g + j]
+            a = a - 0.5 * dt * (W2 * P[m + j] + zW2 * a + fades)  # half-way
             relative = a - P[c + j] if felt else a
             P[s + j] += dt * P[v + j] + 0.5 * dt * dt * relative
             P[v + j] += dt * relative
-            P[n + j] += dt * P[m + j] + 0.5 * dt * dt * a
-            P[m + j] += dt * a
+            P[g + j] -= dt * fades
+            if i > 0:  # along the hose there is no swing
+                P[n + j] += dt * P[m + j] + 0.5 * dt * dt * a
+                P[m + j] += dt * a
         phi, u = i * ERRORS, (21 + i) * ERRORS
         for j in range(ERRORS):
-            back = dt * return_1_s * P[u + j]
+            back = dt * motion.return_1_s * P[u + j]
             P[phi + j] += back
             P[u + j] -= back
 
 
 @njit(cache=True, error_model="numpy")
-def _errors_moved(
-    P: Array, E: Array, x: Array, dt: float, felt: bool, stiffness: Array, friction: Array, return_1_s: float
-) -> None:
-    """P <- F P in place, P row after row (47 * 47,); x (7, 3) is the state after the step."""
-    _driven(P, dt, felt, stiffness, friction, return_1_s)
+def _errors_moved(P: Array, E: Array, x: Array, dt: float, felt: bool, motion: Motion) -> None:
+    """P <- F P in place, P row after row (50 * 50,); x (8, 3) is the state after the step."""
+    _driven(P, dt, felt, motion)
     e00, e01, e02, e10, e11, e12 = E[0, 0], E[0, 1], E[0, 2], E[1, 0], E[1, 1], E[1, 2]
     e20, e21, e22 = E[2, 0], E[2, 1], E[2, 2]
     bias = P[15 * ERRORS : 18 * ERRORS]  # the gyro's stays in the body
-    for block in (0, 1, 2, 3, 4, 6, 7):
+    for block in (0, 1, 2, 3, 4, 6, 7, 8):
         rows = P[3 * block * ERRORS : 3 * (block + 1) * ERRORS]
         state = max(block - 1, 0)
         u0, u1, u2 = x[state, 0], x[state, 1], x[state, 2]
@@ -162,7 +189,7 @@ def _noise_added(P: Array, x: Array, dt: float, gyro2: float, drive2: float, oth
     G = np.zeros((_MOVING, 3))
     for i in range(3):
         G[i, i] = 1.0
-    for block in range(1, 8):
+    for block in range(1, 9):
         if block != 5:
             u, r = x[block - 1], 3 * block
             G[r, 1], G[r, 2], G[r + 1, 2] = u[2], -u[1], u[0]
@@ -170,6 +197,18 @@ def _noise_added(P: Array, x: Array, dt: float, gyro2: float, drive2: float, oth
     for i in range(_MOVING):
         for j in range(_MOVING):
             P[i, j] += gyro2 * dt * (G[i, 0] * G[j, 0] + G[i, 1] * G[j, 1] + G[i, 2] * G[j, 2])
+
+
+@njit(cache=True, error_model="numpy")
+def _gust_noise_added(P: Array, dt: float, gust2: Array) -> None:
+    """The same of what drives g' of Eq. (1), to second order in dt."""
+    for i in range(3):
+        g, half = 24 + i, 0.5 * gust2[i] * dt * dt
+        P[g, g] += gust2[i] * dt
+        for row in (6, 12):
+            if row == 6 or i > 0:
+                P[g, row + i] += half
+                P[row + i, g] += half
 
 
 @njit(cache=True, error_model="numpy")
@@ -195,12 +234,12 @@ def propagated(
     motion: Motion,
     errors: bool = True,
 ) -> tuple[Array, Array, Array]:
-    """Return R (3, 3), x (7, 3), P at t1 [s], from those at t0 <= t1 and the samples about.
+    """Return R (3, 3), x (8, 3), P at t1 [s], from those at t0 <= t1 and the samples about.
 
     Args:
         R: (3, 3) R_BD.
-        x: (7, 3) s, v, n, m, b, c, u.
-        P: (47, 47) covariance of the errors.
+        x: (8, 3) s, v, n, m, b, c, u, g.
+        P: (50, 50) covariance of the errors.
         t0: time of the belief.
         t1: time wanted.
         times: (k,) stamps of the samples, increasing.
@@ -239,29 +278,21 @@ def propagated(
             felt = felt and np.isfinite(f[0]) and np.isfinite(f[1]) and np.isfinite(f[2])
             size2 = w[0] ** 2 + w[1] ** 2 + w[2] ** 2
             w = w - x[4]
-            for i in range(3):
-                a = -motion.stiffness[i] * x[2, i] - motion.friction[i] * x[3, i]
-                a = a - 0.5 * dt * (motion.stiffness[i] * x[3, i] + motion.friction[i] * a)  # half-way
-                j, m = (i + 1) % 3, (i + 2) % 3
-                before = f[i] + 0.5 * dt * (w[j] * f[m] - w[m] * f[j])  # f in the axes at the step's begin
-                relative = a - before - x[5, i] if felt else a
-                x[0, i] += dt * x[1, i] + 0.5 * dt * dt * relative
-                x[1, i] += dt * relative
-                x[2, i] += dt * x[3, i] + 0.5 * dt * dt * a
-                x[3, i] += dt * a
+            _state_driven(x, f, w, dt, felt, motion)
             E = _turn(w, dt)
             R = np.dot(E, np.dot(_turn(-motion.return_1_s * x[6], dt), R))
             x[6] = x[6] * (1.0 - dt * motion.return_1_s)
-            for row in (0, 1, 2, 3, 5, 6):
+            for row in (0, 1, 2, 3, 5, 6, 7):
                 x[row] = _turned(E, x[row])
             if not errors:
                 continue
-            _errors_moved(P.ravel(), E, x, dt, felt, motion.stiffness, motion.friction, motion.return_1_s)
+            _errors_moved(P.ravel(), E, x, dt, felt, motion)
             P = P.T.copy()
-            _errors_moved(P.ravel(), E, x, dt, felt, motion.stiffness, motion.friction, motion.return_1_s)
+            _errors_moved(P.ravel(), E, x, dt, felt, motion)
             gyro2 = motion.gyro2 + held2 + motion.scale2 * size2
             other2 = motion.accelerometer2 if felt else motion.receiver2
             _noise_added(P, x, dt, gyro2, motion.drive2, other2, rest)
+            _gust_noise_added(P, dt, motion.gust2)
         # at every sample, so that the way there does not matter to the last bit
         for i in range(ERRORS if errors else 0):
             for j in range(i):

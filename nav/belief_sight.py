@@ -33,8 +33,8 @@ class Belief:
     """One Gaussian."""
 
     R_BD: Array  #: (3, 3)
-    x: Array  #: (7, 3) rows of `belief_motion`: p_ID, v_ID, swing, its rate, the gyro's bias, formation, turn to rest
-    P: Array  #: (47, 47) of the errors
+    x: Array  #: (8, 3) rows of `belief_motion`: p_ID, v_ID, swing, its rate, gyro's bias, formation, turn to rest, gust
+    P: Array  #: (47, 50) of the errors
     log_weight: float = 0.0
     ring: Array = field(default_factory=lambda: np.zeros(RING.stop - RING.start))
     #: (16,) how far each LED is off its place in the ring's plane [m]
@@ -61,7 +61,7 @@ class Apparent:
 
     R_CD: Array  #: (3, 3)
     p_CD: Array  #: (3,) [m]
-    M: Array  #: (6, 47) its errors (phi, delta) in camera axes, per error of the belief
+    M: Array  #: (6, 50) its errors (phi, delta) in camera axes, per error of the belief
     covariance: Array  #: (6, 6)
 
     @property
@@ -101,7 +101,7 @@ class Sight:
         return Apparent(R_CD=R_CD, p_CD=p_CD, M=M, covariance=covariance)
 
     def shown(self, belief: Belief, sight: LinesOfSight) -> tuple[Seen, Array]:
-        """Return what the LEDs of a frame should show, and (6 + 2n, 47) its errors per error of the belief."""
+        """Return what the LEDs of a frame should show, and (6 + 2n, 50) its errors per error of the belief."""
         seen = self.apparent(belief)
         numbers, M, C = _with_leds(seen.M, seen.covariance, belief.P, self.points_D, sight.points_D, RING.start)
         points = self.points_D[numbers]
@@ -126,7 +126,7 @@ class Sight:
 
 @njit(cache=True, error_model="numpy")
 def _seen(R_BC: Array, R_BD: Array, p_CD_B: Array, P: Array, turn: int) -> tuple[Array, Array, Array, Array]:
-    """R_CD, p_CD, M (6, 47) and M P M' of Eq. (1); `turn` is the calibration's first column.
+    """R_CD, p_CD, M (6, 50) and M P M' of Eq. (1); `turn` is the calibration's first column.
 
     Columns come as arguments: the compiler's cache would not see it when they changed in another file.
     """
@@ -165,7 +165,7 @@ def _seen(R_BC: Array, R_BD: Array, p_CD_B: Array, P: Array, turn: int) -> tuple
 def _with_leds(
     M_pose: Array, covariance: Array, P: Array, ring: Array, points: Array, first: int
 ) -> tuple[NDArray[np.int64], Array, Array]:
-    """Numbers (n,) of LEDs at points (n, 3) of a ring (8, 3), M (6 + 2n, 47) of pose and LEDs, M P M'."""
+    """Numbers (n,) of LEDs at points (n, 3) of a ring (8, 3), M (6 + 2n, 50) of pose and LEDs, M P M'."""
     n = len(points)
     numbers, M, C = np.empty(n, np.int64), np.zeros((6 + 2 * n, len(P))), np.empty((6 + 2 * n, 6 + 2 * n))
     place = np.empty(2 * n, np.int64)

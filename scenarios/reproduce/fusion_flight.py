@@ -3,7 +3,7 @@
 In axes N that do not turn, with the receiver's place r (of the accelerometers), the drogue's place s from there:
 
     r'' = k_p (s - s_wanted) + k_d (s' - s_wanted') + gust,   gust' = -gust/T + noise               (1)
-    n'' = -W^2 n - 2 z W n' + noise,   s'' = n'' - r''                                              (2)
+    n'' = -W^2 n - 2 z W n' + g + noise,   g' = -g/T_g + noise,   s'' = n'' - r''                   (2)
     theta'' = -W_a^2 theta - 2 z_a W_a theta' + stir,   stir' = -stir/T_a + noise,   w_B = theta'   (3)
     u' = -u/T_u - noise,   R_ND = exp(-u) R_rest                                                    (4)
 
@@ -21,6 +21,7 @@ import numpy as np
 from dockair.calibration import Camera, GyroSheet, LedRing, Mounting, NavigationSheets, StartGeometry
 from dockair.messages import ImuSample
 from dockair.nav.fusion import FusionSettings
+from dockair.nav.fusion_settings import swing_covariance
 from dockair.parameters import load_parameters
 from dockair.rotations import Array, exp, matrix_from_yaw_pitch_roll
 from dockair.scenarios.build import MountingParameters
@@ -30,6 +31,7 @@ from dockair.sim.imu import Imu, ImuParameters
 
 GRAVITY_N: Array = np.array([0.0, 0.0, -9.80665])
 NOTHING_OFF = "nominal"
+_TINY: Array = 1e-12 * np.eye(3)  # along the hose there is no swing to draw
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -151,9 +153,10 @@ class _Motion:
         self._stiffness = np.append(0.0, omega**2)
         self._friction = np.append(0.0, 2.0 * belief.swing_damping * omega)
         self._drive = belief.drogue_acceleration_density * approach.drive_factor
-        rate_sigma = self._drive / np.sqrt(4.0 * belief.swing_damping * omega)
-        self._m = np.append(0.0, rate_sigma * rng.standard_normal(2))
-        self._n = np.append(0.0, rate_sigma / omega * rng.standard_normal(2))
+        self._gust_drive = np.array(belief.gust_density) * approach.drive_factor
+        blown = [np.linalg.cholesky(swing_covariance(belief, axis) + _TINY) for axis in range(3)]
+        n, m, g = approach.drive_factor * np.stack([root @ rng.standard_normal(3) for root in blown], axis=1)
+        self._n, self._m, self._drogue_gust = n / approach.swing_frequency_factor, m, g
         self._tip = mounting.p_BP - mounting.p_BI
         self._s = start.p_PD_B + self._tip + start.sigma_p_m * rng.standard_normal(3)
         self._v = self._m + belief.start_velocity_sigma_m_s * rng.standard_normal(3)
@@ -179,8 +182,10 @@ class _Motion:
         row = (self._R_NB, exp(-self._u) @ self._R_rest, self._s, self._v, self._w, alpha, f_B)
         kick, more = draw((2, 3)) * self._drive
         kick_s, kick_v = dt**1.5 * (kick / 2.0 + more / np.sqrt(12.0)), kick * np.sqrt(dt)
-        swing = -self._stiffness * self._n - self._friction * self._m
+        swing = -self._stiffness * self._n - self._friction * self._m + self._drogue_gust
         across = np.array([0.0, 1.0, 1.0])
+        fades = np.exp(-dt / a.belief.gust_time_s)
+        self._drogue_gust = fades * self._drogue_gust + self._gust_drive * np.sqrt(dt) * draw(3)
         self._gust = self._gust * np.exp(-dt / a.gust_time_s) + a.gust_m_s2 * np.sqrt(2.0 * dt / a.gust_time_s) * draw(
             3
         )
@@ -188,8 +193,8 @@ class _Motion:
         mean = 0.5 * (own + later)
         self._s = self._s + self._v * dt + 0.5 * dt**2 * (swing - mean) + kick_s
         self._v = self._v + (swing - mean) * dt + kick_v
-        self._n = self._n + self._m * dt + 0.5 * dt**2 * swing + kick_s * across
-        self._m = self._m + swing * dt + kick_v * across
+        self._n = self._n + (self._m * dt + 0.5 * dt**2 * swing + kick_s) * across
+        self._m = self._m + (swing * dt + kick_v) * across
         w_next = self._w + alpha * dt
         self._R_NB = self._R_NB @ exp(0.5 * (self._w + w_next) * dt)
         self._theta, self._w = self._theta + self._w * dt, w_next

@@ -41,7 +41,7 @@ def covariance(blocks: dict[int, float]) -> Array:
 
 
 def belief(P: Array, R: Array | None = None, log_weight: float = 0.0) -> Belief:
-    x = np.zeros((7, 3))
+    x = np.zeros((8, 3))
     x[0], x[1] = [12.0, -0.5, 0.8], [0.4, -0.3, 0.2]
     return Belief(exp(np.array([0.1, -0.2, 0.3])) if R is None else R, x, P, log_weight)
 
@@ -94,7 +94,7 @@ def start(sigma_tilt_rad: float, tilt_deg: float, range_m: float) -> tuple[Belie
     R_CD, p_CD = matrix_from_yaw_pitch_roll(0.0, np.deg2rad(tilt_deg), 0.0), np.array([range_m, 0.0, 0.0])
     P = covariance({0: sigma_tilt_rad**2, 3: 0.04, 6: 0.1, 15: 1e-5})
     P[3:6, 6:9] = P[6:9, 3:6] = 0.03 * np.eye(3)
-    x = np.zeros((7, 3))
+    x = np.zeros((8, 3))
     x[0] = MOUNTING.p_BC - MOUNTING.p_BI + MOUNTING.R_BC @ p_CD
     return Belief(MOUNTING.R_BC, x, P), R_CD
 

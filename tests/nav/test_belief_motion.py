@@ -8,10 +8,13 @@ from scipy.linalg import expm
 from dockair.nav.belief_motion import BIAS, CALIBRATION, ERRORS, REST, RING, Motion, propagated
 from dockair.rotations import Array, exp, log, skew
 
+SWINGS = np.array([0.0, 1.0, 1.0])  # along the hose there is no swing
 OMEGA = 2.0 * np.pi * np.array([0.0, 0.33, 0.40])
 SILENT = Motion(
     stiffness=OMEGA**2,
     friction=0.3 * OMEGA,
+    gust_1_s=1.4,
+    gust2=np.zeros(3),
     attitude2=0.0,
     return_1_s=0.7,
     rest2=0.0,
@@ -38,6 +41,7 @@ X0 = np.array(
         [0.01, -0.02, 0.03],
         [0.3, -0.1, -9.7],
         [0.02, -0.03, 0.01],
+        [0.3, -0.2, 0.4],
     ]
 )
 ZERO = np.zeros((ERRORS, ERRORS))
@@ -49,7 +53,7 @@ def samples(w: Array, f: Array, until_s: float, rate_hz: float = 250.0) -> tuple
 
 
 def off(x: Array, R: Array, e: Array) -> tuple[Array, Array]:
-    return exp(e[:3]) @ R, x + e[3 : CALIBRATION.start].reshape(7, 3)
+    return exp(e[:3]) @ R, x + e[3 : CALIBRATION.start].reshape(8, 3)
 
 
 def difference(a: tuple[Array, Array], b: tuple[Array, Array]) -> Array:
@@ -62,13 +66,15 @@ def test_state_follows_its_differential_equation(w):
     f = np.array([0.2, 0.4, 9.5])
 
     def rate(_: float, y: Array) -> Array:
-        s, v, n, m, b, c, u = y.reshape(7, 3)
-        a, turn = -SILENT.stiffness * n - SILENT.friction * m, w - b
-        moved = np.array([v, a - f - c, m, a, np.zeros(3), np.zeros(3), -SILENT.return_1_s * u])
-        moved[[0, 1, 2, 3, 5, 6]] -= np.cross(turn, np.array([s, v, n, m, c, u]))
+        s, v, n, m, b, c, u, g = y.reshape(8, 3)
+        a, turn = -SILENT.stiffness * n - SILENT.friction * m + g, w - b
+        still = np.zeros(3)
+        swing = SWINGS * m, SWINGS * a
+        moved = np.array([v, a - f - c, *swing, still, still, -SILENT.return_1_s * u, -SILENT.gust_1_s * g])
+        moved[[0, 1, 2, 3, 5, 6, 7]] -= np.cross(turn, np.array([s, v, n, m, c, u, g]))
         return moved.ravel()
 
-    expected = solve_ivp(rate, (0.0, 0.8), X0.ravel(), rtol=1e-10, atol=1e-12).y[:, -1].reshape(7, 3)
+    expected = solve_ivp(rate, (0.0, 0.8), X0.ravel(), rtol=1e-10, atol=1e-12).y[:, -1].reshape(8, 3)
     R, x, _ = propagated(R0, X0, ZERO, 0.0, 0.8, *samples(w, f, 0.8), SILENT)
     np.testing.assert_allclose(x, expected, atol=2e-4)  # second order in 4 ms
     returned = exp(X0[6] * (1.0 - np.exp(-0.8 * SILENT.return_1_s)))  # towards the attitude of rest
@@ -77,7 +83,7 @@ def test_state_follows_its_differential_equation(w):
 
 def test_a_swing_without_damping_keeps_its_period():
     """After one period of 1/0.33 s it is where it was; side by side with a receiver that keeps its course."""
-    x = np.zeros((7, 3))
+    x = np.zeros((8, 3))
     x[0, 0], x[2, 1] = 10.0, 0.2
     calm = SILENT._replace(friction=np.zeros(3))
     period_s = 1.0 / 0.33
@@ -116,32 +122,35 @@ def test_gyro_noise_enters_as_turning_the_rate_would():
 
 def test_noise_of_the_swing_is_that_of_the_lyapunov_equation():
     """Not turning: P' = A P + P A' + Q by Van Loan's matrix exponential, an axis without and one with swing."""
-    q2, other2, t = 0.05, 0.02, 1.0
+    q2, other2, gust2, t = 0.05, 0.02, np.array([0.4, 0.6, 0.9]), 1.0
     P = propagated(
         R0,
-        np.zeros((7, 3)),
+        np.zeros((8, 3)),
         ZERO,
         0.0,
         t,
         *samples(np.zeros(3), np.zeros(3), t),
-        SILENT._replace(drive2=q2, accelerometer2=other2),
+        SILENT._replace(drive2=q2, accelerometer2=other2, gust2=gust2),
     )[2]
     for axis in (0, 2):
-        A = np.zeros((4, 4))
-        A[0, 1] = A[2, 3] = 1.0
-        A[1, 2:] = A[3, 2:] = -SILENT.stiffness[axis], -SILENT.friction[axis]
-        drive = np.array([0.0, 1.0, 0.0, 1.0 if axis else 0.0])
-        Q = q2 * np.outer(drive, drive) + np.diag([0.0, other2, 0.0, 0.0])
-        loan = expm(np.block([[-A, Q], [np.zeros((4, 4)), A.T]]) * t)
-        expected = loan[4:, 4:].T @ loan[:4, 4:]
-        rows = [3 + axis, 6 + axis, 9 + axis, 12 + axis]
+        A = np.zeros((5, 5))
+        swings = SWINGS[axis]
+        A[0, 1], A[2, 3] = 1.0, swings
+        A[1, 2:] = -SILENT.stiffness[axis], -SILENT.friction[axis], 1.0
+        A[3, 2:] = swings * A[1, 2:]
+        A[4, 4] = -SILENT.gust_1_s
+        drive = np.array([0.0, 1.0, 0.0, swings, 0.0])
+        Q = q2 * np.outer(drive, drive) + np.diag([0.0, other2, 0.0, 0.0, gust2[axis]])
+        loan = expm(np.block([[-A, Q], [np.zeros((5, 5)), A.T]]) * t)
+        expected = loan[5:, 5:].T @ loan[:5, 5:]
+        rows = [3 + axis, 6 + axis, 9 + axis, 12 + axis, 24 + axis]
         np.testing.assert_allclose(P[np.ix_(rows, rows)], expected, rtol=0.02, atol=1e-5)
 
 
 def test_walks_grow_with_time():
     given = samples(np.zeros(3), np.zeros(3), 0.5)
     moving = SILENT._replace(attitude2=1e-3, return_1_s=0.0, bias2=1e-8, formation2=0.04, ring2=1e-8)
-    P = propagated(R0, np.zeros((7, 3)), ZERO, 0.0, 0.5, *given, moving)[2]
+    P = propagated(R0, np.zeros((8, 3)), ZERO, 0.0, 0.5, *given, moving)[2]
     np.testing.assert_allclose(np.diag(P)[:3], 0.5e-3 + 1e-8 * 0.5**3 / 3.0, rtol=1e-3)
     np.testing.assert_allclose(np.diag(P)[BIAS], 0.5e-8, rtol=1e-9)
     np.testing.assert_allclose(np.diag(P)[18:21], 0.02, rtol=1e-9)
@@ -153,7 +162,7 @@ def test_a_drogue_that_turns_comes_back_to_an_attitude_of_rest_that_walks():
     """The way to rest has an Ornstein-Uhlenbeck process's variance, the attitude of rest that of its walk alone."""
     q2, walk2, k, t = 2e-4, 1e-5, SILENT.return_1_s, 2.0
     turning = SILENT._replace(attitude2=q2, rest2=walk2)
-    P = propagated(R0, np.zeros((7, 3)), ZERO, 0.0, t, *samples(np.zeros(3), np.zeros(3), t), turning)[2]
+    P = propagated(R0, np.zeros((8, 3)), ZERO, 0.0, t, *samples(np.zeros(3), np.zeros(3), t), turning)[2]
     decay = 1.0 - np.exp(-2.0 * k * t)
     np.testing.assert_allclose(np.diag(P)[REST], (q2 + walk2) / (2.0 * k) * decay, rtol=0.01)
     M = np.zeros((3, ERRORS))
@@ -167,7 +176,7 @@ def test_a_rate_that_is_held_is_as_uncertain_as_a_rate_that_is_missing(wait_s, c
     turn2, most2 = 0.04, 1.25e-3
     held = SILENT._replace(held_turn2=turn2, held_most2=most2)
     given = samples(np.zeros(3), np.full(3, np.nan), 0.1)
-    P = propagated(R0, np.zeros((7, 3)), ZERO, 0.1, 0.1 + wait_s, *given, held)[2]
+    P = propagated(R0, np.zeros((8, 3)), ZERO, 0.1, 0.1 + wait_s, *given, held)[2]
     knee = (most2 / turn2) ** (1.0 / 3.0)
     expected = turn2 * min(wait_s, knee) ** 4 / 4.0 + most2 * max(wait_s - knee, 0.0)
     assert (wait_s > knee) is corner
@@ -177,7 +186,7 @@ def test_a_rate_that_is_held_is_as_uncertain_as_a_rate_that_is_missing(wait_s, c
 def test_a_gap_between_samples_is_bridged_with_its_own_uncertainty():
     held = SILENT._replace(held_turn2=0.04, held_most2=1.25e-3)
     times = np.array([0.0, 0.2])
-    P = propagated(R0, np.zeros((7, 3)), ZERO, 0.0, 0.2, times, np.zeros((2, 3)), np.zeros((2, 3)), held)[2]
+    P = propagated(R0, np.zeros((8, 3)), ZERO, 0.0, 0.2, times, np.zeros((2, 3)), np.zeros((2, 3)), held)[2]
     np.testing.assert_allclose(np.diag(P)[:3], 0.04 * 0.2**4 / 64.0, rtol=1e-9)
 
 
@@ -185,7 +194,7 @@ def test_in_a_gap_the_receiver_s_acceleration_is_not_taken_for_known():
     """Samples 0.2 s apart with 5 m/s^2 between them: not used, and the velocity's variance is that of a guess."""
     times, forces = np.array([0.0, 0.2]), np.tile([5.0, 0.0, 0.0], (2, 1))
     guess = SILENT._replace(receiver2=0.2, accelerometer2=1e-6)
-    _, x, P = propagated(R0, np.zeros((7, 3)), ZERO, 0.0, 0.2, times, np.zeros((2, 3)), forces, guess)
+    _, x, P = propagated(R0, np.zeros((8, 3)), ZERO, 0.0, 0.2, times, np.zeros((2, 3)), forces, guess)
     np.testing.assert_array_equal(x[1], 0.0)
     np.testing.assert_allclose(np.diag(P)[6:9], 0.04, rtol=1e-9)
 
