@@ -10,8 +10,9 @@ from dockair.calibration import Camera, GyroSheet, LedRing, Mounting, Navigation
 from dockair.errors import DockairError
 from dockair.messages import ImuSample
 from dockair.nav import fusion
+from dockair.nav.belief_motion import BIAS, ERRORS, GUST, SWING, SWING_RATE, VELOCITY, propagated
 from dockair.nav.fusion import FusionSettings, RelativeFilter
-from dockair.nav.fusion_settings import refusals_until_doubt, swing_covariance, taking_of
+from dockair.nav.fusion_settings import motion_of, refusals_until_doubt, start_of, swing_covariance, taking_of
 from dockair.nav.pose.estimate import PoseEstimate, solve_pose
 from dockair.nav.pose.planar import mirrored
 from dockair.rotations import Array, exp, log, matrix_from_yaw_pitch_roll
@@ -211,6 +212,24 @@ def test_coasting_through_dropped_frames_the_covariance_grows_and_stays_honest()
         at_end.append(nees(e, P))
     assert (np.diff(sigma, axis=1) > 0.0).all()
     assert_mean_nees(at_end, 9)
+
+
+def test_before_the_first_message_the_drogue_has_swung_in_gusts_for_ever():
+    """Its swing is as uncertain a second later, and the drogue's velocity as much as the rate of its swing more."""
+    start, motion = start_of(SETTINGS, sheets(5.0)), motion_of(SETTINGS, GYRO)
+    swinging = np.r_[VELOCITY, SWING, SWING_RATE, GUST]
+    P = np.zeros((ERRORS, ERRORS))
+    P[np.ix_(swinging, swinging)] = start.P[np.ix_(swinging, swinging)]
+    times, still = np.arange(251) / 250.0, np.zeros((251, 3))
+    alone = motion._replace(gyro2=0.0, scale2=0.0, held_turn2=0.0, bias2=0.0, formation2=0.0, accelerometer2=0.0)
+    after = propagated(np.eye(3), np.zeros((8, 3)), P, 0.0, 1.0, times, still, still, alone)[2]
+    across = np.r_[SWING, SWING_RATE, GUST].reshape(3, 3)[:, 1:].ravel()
+    kept = np.ix_(across, across)
+    size = np.sqrt(np.outer(P.diagonal(), P.diagonal()))[kept]
+    np.testing.assert_allclose(after[kept] / size, P[kept] / size, atol=0.01)
+    more = P[VELOCITY, VELOCITY].diagonal() - P[SWING_RATE, SWING_RATE].diagonal()
+    np.testing.assert_allclose(more, SETTINGS.start_velocity_sigma_m_s**2, rtol=1e-12)
+    np.testing.assert_array_equal(start.P[BIAS, GUST], 0.0)
 
 
 def test_turning_of_the_receiver_alone_leaves_the_drogue_where_it_is():
