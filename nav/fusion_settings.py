@@ -47,9 +47,6 @@ class FusionSettings:
     #: Believed to be slower or less, what it turns is taken for bias of the gyro.
     attitude_density: float = 0.025
     attitude_time_s: float = 0.6
-    #: Attitude of rest against the start's: hose, trim and heading are known to 0.5 degrees, the ring's roll to 1.1.
-    #: With the turning 0.95 degrees; measured 0.5 in light gusts, 0.85 in moderate ones.
-    rest_sigma_rad: tuple[float, float, float] = (0.02, 0.009, 0.009)
     rest_walk_rad_rts: float = (
         0.0017  # 0.3 degrees in 10 s: slow wander of the receiver's heading and of the air's direction
     )
@@ -148,7 +145,7 @@ def start_of(settings: FusionSettings, sheets: NavigationSheets) -> Belief:
     turning2 = 0.5 * settings.attitude_density**2 * settings.attitude_time_s
     variances = np.concatenate(
         [
-            np.square(np.minimum(settings.rest_sigma_rad, start.sigma_R_rad)) + turning2,
+            np.square(start.sigma_R_rad) + turning2,
             np.square(start.sigma_p_m),
             np.full(3, settings.start_velocity_sigma_m_s**2),
             np.zeros(6),

@@ -69,7 +69,8 @@ class Start(Table):
     left_m: float = Field(default=0.0, ge=-20.0, le=20.0)
     up_m: float = Field(default=0.0, ge=-20.0, le=20.0)
     sigma_m: _ThreeSigmas = (0.3, 0.3, 0.3)  #: forward, left, up
-    sigma_attitude_deg: float = Field(default=5.0, ge=0.0, le=30.0)  #: of the drogue, about each axis
+    #: Of the drogue's attitude of rest, about each axis: the ring's roll, and 0.5 degrees of hose, trim and heading.
+    sigma_attitude_deg: _ThreeSigmas = (1.15, 0.52, 0.52)
 
     @property
     def p_PD_B(self) -> Array:
@@ -82,6 +83,6 @@ class Start(Table):
         return np.array(self.sigma_m)
 
     @property
-    def sigma_R_rad(self) -> float:
-        """Standard deviation of the drogue's attitude about each axis [rad]."""
-        return float(np.radians(self.sigma_attitude_deg))
+    def sigma_R_rad(self) -> Array:
+        """(3,) standard deviation of the drogue's attitude about each axis [rad]."""
+        return np.radians(self.sigma_attitude_deg)

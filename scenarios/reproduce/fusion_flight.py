@@ -55,7 +55,7 @@ class Approach:
     rate_gain_1_s: float = 1.4
     ramp_s: float = 1.0  # in which the steering begins
     start_sigma_m: float = 0.2
-    start_sigma_rad: float = 0.05
+    start_sigma_rad: tuple[float, float, float] = (0.02, 0.009, 0.009)  # as scenarios start
     drogue_pitch_rad: float = 0.12  # the drogue hangs below the tanker's line: its axis is tilted against the camera's
     belief: FusionSettings = field(default_factory=FusionSettings)  # what the drogue does is drawn from it
     swing_frequency_factor: float = 1.0  # truth over belief
@@ -102,7 +102,7 @@ def navigation_sheets(approach: Approach, imu: ImuParameters) -> NavigationSheet
         p_PD_B=np.array([approach.first_m, 0.0, 0.0]),
         sigma_p_m=np.full(3, approach.start_sigma_m),
         R_BD=matrix_from_yaw_pitch_roll(0.0, approach.drogue_pitch_rad, 0.0),
-        sigma_R_rad=approach.start_sigma_rad,
+        sigma_R_rad=np.array(approach.start_sigma_rad),
     )
     nominal = approach.imu == NOTHING_OFF
     gyro = GyroSheet(
@@ -160,7 +160,7 @@ class _Motion:
         self._tip = mounting.p_BP - mounting.p_BI
         self._s = start.p_PD_B + self._tip + start.sigma_p_m * rng.standard_normal(3)
         self._v = self._m + belief.start_velocity_sigma_m_s * rng.standard_normal(3)
-        rest = np.minimum(belief.rest_sigma_rad, start.sigma_R_rad) * rng.standard_normal(3)
+        rest = start.sigma_R_rad * rng.standard_normal(3)
         self._R_rest = exp(rest + [0.0, approach.rest_pitch_rad, 0.0]) @ start.R_BD
         self._turning = belief.attitude_density * approach.turning_factor
         self._u = self._turning * np.sqrt(0.5 * belief.attitude_time_s) * rng.standard_normal(3)

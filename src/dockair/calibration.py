@@ -235,7 +235,7 @@ class StartGeometry:
     p_PD_B: Array  #: (3,) drogue ring centre from the probe's tip, body axes [m]
     sigma_p_m: Array  #: (3,) its standard deviation
     R_BD: Array  #: (3, 3) drogue axes in body axes
-    sigma_R_rad: float  #: its standard deviation about each axis
+    sigma_R_rad: Array  #: (3,) standard deviation of the attitude that it returns to, about each axis
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

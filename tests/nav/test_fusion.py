@@ -47,12 +47,12 @@ CALIBRATED = dict.fromkeys(
 SETTINGS = FusionSettings(start_velocity_sigma_m_s=0.3, **CALIBRATED)
 
 
-def sheets(distance_m: float, sigma_R_rad: float = 0.05, sigma_p_m: float = 0.2) -> NavigationSheets:
+def sheets(distance_m: float, sigma_R_rad: float = 0.009, sigma_p_m: float = 0.2) -> NavigationSheets:
     start = StartGeometry(
         p_PD_B=np.array([distance_m, 0.3, -0.2]),
         sigma_p_m=np.full(3, sigma_p_m),
         R_BD=matrix_from_yaw_pitch_roll(0.05, -0.08, 0.1),
-        sigma_R_rad=sigma_R_rad,
+        sigma_R_rad=np.full(3, sigma_R_rad),
     )
     return NavigationSheets(
         camera=CAMERA,
@@ -78,7 +78,7 @@ class World:
     def __post_init__(self) -> None:
         start, s, rng = self.sheets.start, self.settings, self.rng
         self.k, self.dt, self.R_NB = 0, 1.0 / GYRO.rate_hz, np.eye(3)
-        self.R_rest = exp(np.minimum(s.rest_sigma_rad, start.sigma_R_rad) * rng.normal(size=3)) @ start.R_BD
+        self.R_rest = exp(start.sigma_R_rad * rng.normal(size=3)) @ start.R_BD
         self.u_N = s.attitude_density * np.sqrt(0.5 * s.attitude_time_s) * rng.normal(size=3)
         self.R_ND = exp(-self.u_N) @ self.R_rest
         self.s_N = start.p_PD_B + MOUNTING.p_BP - MOUNTING.p_BI + start.sigma_p_m * rng.normal(size=3)

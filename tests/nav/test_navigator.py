@@ -33,7 +33,7 @@ def sheets(ring=None):
         p_PD_B=np.array([4.0, 0.0, 0.0]),
         sigma_p_m=np.full(3, 0.3),
         R_BD=matrix_from_yaw_pitch_roll(0.0, -0.05, 0.0),
-        sigma_R_rad=np.radians(5.0),
+        sigma_R_rad=np.full(3, np.radians(0.5)),
     )
     gyro = GyroSheet(rate_hz=500, noise_density_rad_s_rthz=1.7e-4, bias_sigma_rad_s=1e-3)
     return NavigationSheets(

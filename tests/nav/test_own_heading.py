@@ -26,7 +26,10 @@ SHEETS = NavigationSheets(
         p_BP=np.array([6.0, -0.9, 0.6]),
     ),
     start=StartGeometry(
-        p_PD_B=np.array([4.0, 0.0, 0.0]), sigma_p_m=np.full(3, 0.3), R_BD=np.eye(3), sigma_R_rad=np.radians(5.0)
+        p_PD_B=np.array([4.0, 0.0, 0.0]),
+        sigma_p_m=np.full(3, 0.3),
+        R_BD=np.eye(3),
+        sigma_R_rad=np.full(3, np.radians(5.0)),
     ),
     gyro=GyroSheet(rate_hz=500, noise_density_rad_s_rthz=1.7e-4, bias_sigma_rad_s=3.5e-3),
     camera_rate_hz=50,

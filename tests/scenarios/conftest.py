@@ -24,7 +24,10 @@ def _sheets() -> NavigationSheets:
             p_BP=np.array([6.8, 0.4, 1.0]),
         ),
         start=StartGeometry(
-            p_PD_B=np.array([4.0, 0.0, 0.0]), sigma_p_m=np.array([0.3, 0.3, 0.3]), R_BD=np.eye(3), sigma_R_rad=0.08
+            p_PD_B=np.array([4.0, 0.0, 0.0]),
+            sigma_p_m=np.array([0.3, 0.3, 0.3]),
+            R_BD=np.eye(3),
+            sigma_R_rad=np.full(3, 0.08),
         ),
         gyro=GyroSheet(rate_hz=500, noise_density_rad_s_rthz=1.7e-4, bias_sigma_rad_s=4.8e-5),
         camera_rate_hz=50,

@@ -225,9 +225,9 @@ def test_without_sun_there_is_no_direction():
 
 
 def test_a_tip_behind_left_and_above_has_the_ring_ahead_right_and_below():
-    start = Start(aft_m=4.0, left_m=1.0, up_m=0.5, sigma_attitude_deg=180.0 / np.pi * 0.1)
+    start = Start(aft_m=4.0, left_m=1.0, up_m=0.5, sigma_attitude_deg=(90.0, 45.0, 0.0))
     np.testing.assert_array_equal(start.p_PD_B, [4.0, -1.0, -0.5])
-    assert start.sigma_R_rad == pytest.approx(0.1)
+    np.testing.assert_allclose(start.sigma_R_rad, [np.pi / 2.0, np.pi / 4.0, 0.0], rtol=1e-15)
 
 
 def test_acceptance_names_each_figure_that_was_not_reached():
