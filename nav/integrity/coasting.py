@@ -5,9 +5,10 @@ one strength of them for all weathers. So the belief is asked, again and again, 
 h before: the squares of the errors, per camera axis, fade with `memory_s` and begin at `sigma_m` with `prior_s`. After
 a time a without frames
 
-    sigma(a)^2 = s^2 (a/h)^3 for a <= h,   s^2 (a/h)^4 beyond                                        (1)
+    sigma(a)^2 = s^2 (a/h)^3 for a <= h,   s^2 (a/h)^5 beyond                                        (1)
 
-as by a white acceleration, and at worst by a steady one. Protection levels grow by k sigma(a), with k of one axis along
+as by a white acceleration, and beyond as by one that itself changes at random. On flights it grew by something between
+the two (docs/integrity.md), so that neither below nor beyond too little is added. Protection levels grow by k sigma(a), with k of one axis along
 and of two across for the probability `risk`. So it is for a belief like those that were asked: with an IMU, and with
 frames up to the last. Of any other (`is_of` says which) the covariance is asked, too.
 
@@ -110,4 +111,4 @@ class CoastingError:
 
 def _growth(ratio: float) -> float:
     """Variance of Eq. (1) in units of that at the horizon."""
-    return ratio**3 if ratio <= 1.0 else ratio**4
+    return ratio**3 if ratio <= 1.0 else ratio**5
