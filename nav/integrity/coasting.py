@@ -8,9 +8,9 @@ a time a without frames
     sigma(a)^2 = s^2 (a/h)^3 for a <= h,   s^2 (a/h)^5 beyond                                        (1)
 
 as by a white acceleration, and beyond as by one that itself changes at random. On flights it grew by something between
-the two (docs/integrity.md), so that neither below nor beyond too little is added. Protection levels grow by k sigma(a), with k of one axis along
-and of two across for the probability `risk`. So it is for a belief like those that were asked: with an IMU, and with
-frames up to the last. Of any other (`is_of` says which) the covariance is asked, too.
+the two (docs/integrity.md), so that neither below nor beyond too little is added. Protection levels grow by k sigma(a),
+with k of one axis along and of two across for the probability `risk`. So it is for a belief like those that were asked:
+with an IMU, and with frames up to the last. Of any other (`is_of` says which) the covariance is asked, too.
 
 Not modelled: gusts that begin in the very moment in which the camera goes out, a drogue that is struck, that s is
 itself an estimate (along, the risk is up to twice the one set).
