@@ -9,7 +9,7 @@ from scipy.linalg import solve_continuous_lyapunov
 from dockair.calibration import GyroSheet, NavigationSheets
 from dockair.errors import DockairError
 from dockair.nav.belief import Taking
-from dockair.nav.belief_motion import Motion
+from dockair.nav.belief_motion import GUST, PHI, REST, SWING, SWING_RATE, VELOCITY, Motion
 from dockair.nav.belief_sight import Belief
 from dockair.rotations import Array
 
@@ -157,10 +157,12 @@ def start_of(settings: FusionSettings, sheets: NavigationSheets) -> Belief:
         ]
     )
     P = np.diag(variances)
-    P[np.arange(3), np.arange(21, 24)] = P[np.arange(21, 24), np.arange(3)] = -turning2
     for axis in range(3):
-        rows = np.arange(6, 27)[[0, 3, 6, 18]] + axis  # v, n, m, g
-        P[np.ix_(rows, rows)] += swing_covariance(settings, axis)[np.ix_([1, 0, 1, 2], [1, 0, 1, 2])]
+        phi, u = PHI.start + axis, REST.start + axis
+        P[phi, u] = P[u, phi] = -turning2
+        rows = [block.start + axis for block in (VELOCITY, SWING, SWING_RATE, GUST)]
+        of = [1, 0, 1, 2]  # (n, m, g): the velocity is the rate of the swing, and more
+        P[np.ix_(rows, rows)] += swing_covariance(settings, axis)[np.ix_(of, of)]
     x = np.zeros((8, 3))
     x[0] = start.p_PD_B + sheets.mounting.p_BP - sheets.mounting.p_BI
     return Belief(np.array(start.R_BD, dtype=float), x, P)

@@ -17,6 +17,12 @@ _ThreeSigmas = Annotated[
     BeforeValidator(tuple_from_list),
     Expected("three numbers, each 0 or more"),
 ]
+_SmallAngle = Annotated[float, Field(ge=0.0, le=30.0)]
+_ThreeSmallAngles = Annotated[
+    tuple[_SmallAngle, _SmallAngle, _SmallAngle],
+    BeforeValidator(tuple_from_list),
+    Expected("three numbers, each 0 to 30"),
+]
 _Rate = Annotated[int, Field(ge=1, le=100_000)]
 
 
@@ -70,7 +76,7 @@ class Start(Table):
     up_m: float = Field(default=0.0, ge=-20.0, le=20.0)
     sigma_m: _ThreeSigmas = (0.3, 0.3, 0.3)  #: forward, left, up
     #: Of the drogue's attitude of rest, about each axis: the ring's roll, and 0.5 degrees of hose, trim and heading.
-    sigma_attitude_deg: _ThreeSigmas = (1.15, 0.52, 0.52)
+    sigma_attitude_deg: _ThreeSmallAngles = (1.15, 0.52, 0.52)
 
     @property
     def p_PD_B(self) -> Array:

@@ -47,6 +47,8 @@ SIGMAS = "three numbers, each 0 or more"
         ("start.sigma_m = [1.0, 2.0]", "start.sigma_m[2]", SIGMAS),
         ("start.sigma_m = [1.0, 2.0, -3.0]", "start.sigma_m[2]", f"{SIGMAS}, got -3.0"),
         ("start.sigma_m = 0.3", "start.sigma_m", f"{SIGMAS}, got 0.3"),
+        ("start.sigma_attitude_deg = 5.0", "start.sigma_attitude_deg", "three numbers, each 0 to 30, got 5.0"),
+        ("start.sigma_attitude_deg = [1, 31, 1]", "start.sigma_attitude_deg[1]", "three numbers, each 0 to 30, got 31"),
         ('turbulence.model = "x"', "turbulence.model", "one of the names that exist, got 'x'; exists: none, dryden"),
         ('turbulence.intensity = "x"', "turbulence.intensity", "one of the names that exist, got 'x'; exists: light,"),
         ('turbulence.model = "dryden"', "turbulence", "sigma_m_s or intensity beside the model, got 'dryden'"),
@@ -225,9 +227,9 @@ def test_without_sun_there_is_no_direction():
 
 
 def test_a_tip_behind_left_and_above_has_the_ring_ahead_right_and_below():
-    start = Start(aft_m=4.0, left_m=1.0, up_m=0.5, sigma_attitude_deg=(90.0, 45.0, 0.0))
+    start = Start(aft_m=4.0, left_m=1.0, up_m=0.5, sigma_attitude_deg=(30.0, 22.5, 0.0))
     np.testing.assert_array_equal(start.p_PD_B, [4.0, -1.0, -0.5])
-    np.testing.assert_allclose(start.sigma_R_rad, [np.pi / 2.0, np.pi / 4.0, 0.0], rtol=1e-15)
+    np.testing.assert_allclose(start.sigma_R_rad, [np.pi / 6.0, np.pi / 8.0, 0.0], rtol=1e-15)
 
 
 def test_acceptance_names_each_figure_that_was_not_reached():
