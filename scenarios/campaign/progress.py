@@ -8,6 +8,7 @@ from typing import Any, Self
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 from rich.table import Table
+from rich.text import Text
 
 from dockair.scenarios.campaign.jobs import Job
 from dockair.scenarios.output import plain_console
@@ -120,6 +121,9 @@ def show_campaign(table: Mapping[str, Any]) -> None:
     shown = Table(box=None, padding=(0, 1))
     for heading in ("scenario", "sensing", "first attempt", "success", "offset", "closing", "unsafe", "errors"):
         shown.add_column(heading, no_wrap=True)
+    with_settings = any(group["settings"] for group in table["groups"])
+    if with_settings:
+        shown.add_column("set")
     for group in table["groups"]:
         offset, speed = group["radial_offset_m"], group["closure_speed_m_s"]
         shown.add_row(
@@ -128,6 +132,7 @@ def show_campaign(table: Mapping[str, Any]) -> None:
             f"{offset['median']:.3f} m" if offset else "",
             f"{speed['min']:.2f}-{speed['max']:.2f} m/s" if speed else "",
             *(str(group[name]) if group[name] else "" for name in ("unsafe", "errors")),
+            *((Text(group["settings"]),) if with_settings else ()),  # a list's brackets are no markup
         )
     console.print(shown)
     for group in table["groups"]:

@@ -35,6 +35,7 @@ def _group(group: Group, claimed: Accept | None) -> dict[str, Any]:
         "sensing": group.sensing,
         "navigator": group.navigator,
         "controller": group.controller,
+        "settings": group.settings,
         "flights": len(group.rows),
         "seeds": group.seeds,
         "independent": group.independent,

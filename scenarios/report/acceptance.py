@@ -5,10 +5,9 @@ perfect navigation in place of the camera nor of another controller. A file of o
 flown, or be another one from here; its campaign's summary says what it claims.
 """
 
-import shlex
 from collections.abc import Sequence
 
-from dockair.scenarios.report.groups import Group, Row
+from dockair.scenarios.report.groups import Group, Row, file_and_settings
 from dockair.scenarios.scenario_file import scenario_names
 from dockair.scenarios.schema import Scenario, load_scenario
 
@@ -36,5 +35,5 @@ def shortfalls_of(group: Group) -> Sequence[str] | None:
 
 def _flown_as_written(row: Row) -> str:
     """Return the scenario's name or path from the flight's command; "" where a key is set."""
-    _, _, name, _, _, *settings = shlex.split(row["command"])
+    name, settings = file_and_settings(row)
     return "" if settings else name

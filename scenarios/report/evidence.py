@@ -1,6 +1,7 @@
-"""The small table that a repository keeps of campaigns: counts, intervals, spread, causes, how to fly them again."""
+"""The small table that a repository keeps of campaigns: counts, intervals, spread, causes, a line for each flight."""
 
 import json
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -12,6 +13,8 @@ from dockair.scenarios.report.folders import Campaign
 from dockair.scenarios.report.groups import Group, Paired, Share, groups_of, paired
 
 _MANIFEST = ("plan", "flights", "seeds", "commit", "uncommitted_changes", "code", "plug_ins", "versions", "begun")
+_OF_EACH = ("seed", "outcome", "attempts", "radial_offset_m", "closure_speed_m_s")
+_LIST_OVER_LINES = re.compile(r"\[\n\s*([^\[\]{}]*?)\n\s*\]")  # one that holds neither list nor object
 
 
 def evidence_of(campaigns: Sequence[Campaign]) -> dict[str, Any]:
@@ -19,13 +22,18 @@ def evidence_of(campaigns: Sequence[Campaign]) -> dict[str, Any]:
     groups = groups_of([row for campaign in campaigns for row in campaign.rows])
     return {
         "groups": [_group(group, groups) for group in groups],
-        "campaigns": [{key: campaign.manifest.get(key) for key in _MANIFEST} for campaign in campaigns],
+        "each_flight": _OF_EACH,
+        "campaigns": [
+            {"flown": len(campaign.rows)} | {key: campaign.manifest.get(key) for key in _MANIFEST}
+            for campaign in campaigns
+        ],
     }
 
 
 def as_text(table: Mapping[str, Any]) -> str:
-    """Return it as JSON, one group a few lines."""
-    return json.dumps(table, indent=1, allow_nan=False) + "\n"
+    """Return it as JSON, one flight a line."""
+    text = json.dumps(table, indent=1, allow_nan=False) + "\n"
+    return _LIST_OVER_LINES.sub(lambda found: "[" + re.sub(r"\n\s*", " ", found[1]) + "]", text)
 
 
 def _group(group: Group, groups: Sequence[Group]) -> dict[str, Any]:
@@ -36,6 +44,7 @@ def _group(group: Group, groups: Sequence[Group]) -> dict[str, Any]:
         "sensing": group.sensing,
         "navigator": group.navigator,
         "controller": group.controller,
+        "settings": group.settings,
         "flights": len(group.rows),
         "seeds": group.seeds,
         "independent": group.independent,
@@ -54,6 +63,7 @@ def _group(group: Group, groups: Sequence[Group]) -> dict[str, Any]:
         "failed_seeds": [row["seed"] for row in group.flown if not row["first_attempt"]],
         "beside_perfect_navigation": None if pair is None else _pair(pair),
         "shortfalls": None if shortfalls is None else list(shortfalls),
+        "each": [[_rounded(row[name]) for name in _OF_EACH] for row in group.rows],
     }
 
 
@@ -65,6 +75,10 @@ def _pair(pair: Paired) -> dict[str, Any]:
 def _share(share: Share) -> dict[str, Any]:
     low, high = share.interval
     return {"count": share.count, "of": share.of, "low": _finite(low), "high": _finite(high)}
+
+
+def _rounded(value: Any) -> Any:
+    return round(value, 4) if isinstance(value, float) else value
 
 
 def _quantile(values: Array, share: float) -> float | None:

@@ -1,5 +1,6 @@
-"""Flights that may be pooled: same scenario, same sensing, same navigator, same controller.
+"""Flights that may be pooled: same scenario, same keys set over it, same sensing, same navigator, same controller.
 
+A key that the plan draws differs from flight to flight of one group; of any other each value is a group of its own.
 Perfect navigation, the measurement model and the camera never share a group: what one shows says nothing of the other
 until both stand side by side. Where a group on the truth has flown the same flights, `paired` puts it there.
 """
@@ -17,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from dockair.rotations import Array
+from dockair.scenarios.campaign.row import SET
 from dockair.scenarios.crew_tables import OUR_NAVIGATOR
 from dockair.scenarios.statistics import wilson_interval
 
@@ -26,6 +28,7 @@ CLOSING_BAND_M_S = (1.0, 1.5)  # service practice
 CAPTURE_M = 0.15  # of the tip from the ring's centre, inside which a contact is asked for
 SENSING_IN_WORDS = {"camera": "camera", "measurements": "measurement model", "truth": "perfect navigation"}
 _SEES = ("navigation.navigator", "camera.sensing")  # keys that say what the navigation sees, and nothing of the world
+_IN_COLUMNS = (*_SEES, "guidance.controller")  # keys whose values have a column, whoever sets them
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,12 +63,13 @@ class Group:
     sensing: str
     navigator: str
     controller: str
+    settings: str  #: keys set over the scenario as in `--set`, but those of sensing, navigator and controller
     rows: tuple[Row, ...]
 
     @property
     def anchor(self) -> str:
         """Its id on the page."""
-        return "-".join([self.scenario, self.sensing, self.controller, self.navigator])
+        return "-".join([self.scenario, self.sensing, self.controller, self.navigator, self.settings]).replace(" ", "")
 
     @property
     def own_navigator(self) -> str:
@@ -75,13 +79,18 @@ class Group:
     @property
     def title(self) -> str:
         """What it is, in words."""
-        words = f"{self.scenario}: {SENSING_IN_WORDS.get(self.sensing, self.sensing)}, {self.controller} controller"
+        words = f"{self.name}: {SENSING_IN_WORDS.get(self.sensing, self.sensing)}, {self.controller} controller"
         return words + (f", navigator {self.own_navigator}" if self.own_navigator else "")
+
+    @property
+    def name(self) -> str:
+        """The scenario, with what is set over it."""
+        return f"{self.scenario} with {self.settings}" if self.settings else self.scenario
 
     @property
     def label(self) -> str:
         """What it is, short, for a picture's axis."""
-        return f"{self.scenario} ({', '.join(filter(None, [self.sensing, self.controller, self.own_navigator]))})"
+        return f"{self.name} ({', '.join(filter(None, [self.sensing, self.controller, self.own_navigator]))})"
 
     @cached_property
     def seeds(self) -> int:
@@ -188,11 +197,26 @@ class Group:
 
 def groups_of(rows: Sequence[Row]) -> list[Group]:
     """Return the groups, by scenario and then by sensing."""
-    kinds: dict[tuple[str, str, str, str], list[Row]] = {}
+    kinds: dict[tuple[str, str, str, str, str], list[Row]] = {}
     for row in sorted(rows, key=lambda row: int(row["seed"])):
-        kind = str(row["scenario"]), str(row["sensing"]), str(row["navigator"]), str(row["controller"])
-        kinds.setdefault(kind, []).append(row)
+        crew = str(row["sensing"]), str(row["navigator"]), str(row["controller"])
+        kinds.setdefault((str(row["scenario"]), *crew, _settings_of(row)), []).append(row)
     return [Group(*kind, tuple(kinds[kind])) for kind in sorted(kinds)]
+
+
+def file_and_settings(row: Row) -> tuple[str, list[str]]:
+    """Return the scenario's name or path from the flight's command, and what was set over it: "key=value" each."""
+    _, _, file, _, _, *options = shlex.split(row["command"])
+    return file, options[1::2]
+
+
+def _settings_of(row: Row) -> str:
+    """Return what was set over the scenario, but for keys that have a column of their own."""
+    _, settings = file_and_settings(row)
+    keys = {text: text.partition("=")[0] for text in settings}
+    return ", ".join(
+        sorted(text for text, key in keys.items() if key not in _IN_COLUMNS and row.get(SET + key) is None)
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -232,7 +256,7 @@ def paired(group: Group, groups: Sequence[Group]) -> Paired | None:
 
 
 def _docks_alike(a: Group, b: Group) -> bool:
-    return (a.scenario, a.controller) == (b.scenario, b.controller)
+    return (a.scenario, a.controller, a.settings) == (b.scenario, b.controller, b.settings)
 
 
 def _docked_at_once(row: Row) -> bool:
@@ -244,9 +268,9 @@ def _by_conditions(rows: Sequence[Row]) -> dict[tuple[str, ...], list[Row]]:
     """Return the rows by what decides the flight but for what the navigation sees: file, seed, values set and drawn."""
     found: dict[tuple[str, ...], list[Row]] = {}
     for row in rows:
-        _, _, file, _, seed, *options = shlex.split(row["command"])
-        settings = [text for text in options[1::2] if text.partition("=")[0] not in _SEES]
-        found.setdefault((normpath(file), seed, *sorted(settings)), []).append(row)
+        file, options = file_and_settings(row)
+        settings = [text for text in options if text.partition("=")[0] not in _SEES]
+        found.setdefault((normpath(file), str(row["seed"]), *sorted(settings)), []).append(row)
     return found
 
 

@@ -18,7 +18,8 @@ def rows(docked: int, flights: int, scenario: str = "light", **changes):
     common = {"scenario": scenario, "sensing": "camera", "navigator": "n", "controller": "c", "unsafe": "", "error": ""}
     return [
         common
-        | {"seed": seed, "success": seed < docked, "first_attempt": seed < docked // 2, "outcome": "contact"}
+        | {"seed": seed, "command": f"dockair fly {scenario} --seed {seed}"}
+        | {"success": seed < docked, "first_attempt": seed < docked // 2, "outcome": "contact"}
         | changes
         for seed in range(flights)
     ]

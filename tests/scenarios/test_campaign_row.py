@@ -120,22 +120,21 @@ def claims(tmp_path, scenarios):
     jobs = jobs_of(PlanFile(path))
     failed = columns_of(result(contact=None, outcome="miss", success=False, cause="never_steady", attempt_log=()))
     rows = [row_of(job, Answer(columns=failed | {"attempts": 0})) for job in jobs]
-    return {(g["scenario"], g["controller"]): g for g in summary_of(rows, jobs)}
+    return {(g["scenario"], g["controller"], g["settings"]): g for g in summary_of(rows, jobs)}
 
 
 def test_a_claim_is_held_against_a_group_whose_flights_are_all_as_the_scenario_is_written(tmp_path):
     changed = '{ scenario = "default", set = { "turbulence.sigma_m_s" = 3.0 } }'
     pid = '{ scenario = "default", set = { "guidance.controller" = "pid" } }'
-    alone = claims(tmp_path, f'"default", {pid}')
-    assert alone["default", "predictive"]["shortfalls"] != []
-    assert alone["default", "pid"]["shortfalls"] is None
-    pooled = claims(tmp_path, f'"default", {changed}, {pid}')["default", "predictive"]
-    assert (pooled["flights"], pooled["seeds"], pooled["independent"]) == (6, 3, False)
-    assert pooled["shortfalls"] is None
+    groups = claims(tmp_path, f'"default", {changed}, {pid}')
+    assert len(groups) == 3
+    assert groups["default", "predictive", ""]["shortfalls"] != []
+    assert groups["default", "pid", ""]["shortfalls"] is None
+    assert groups["default", "predictive", "turbulence.sigma_m_s=3.0"]["shortfalls"] is None
 
 
 def test_the_summary_counts_why_flights_began_no_attempt(tmp_path):
-    group = claims(tmp_path, '"default"')["default", "predictive"]
+    group = claims(tmp_path, '"default"')["default", "predictive", ""]
     assert group["causes"] == {}
     assert group["causes_of_flights_without_attempt"] == {"never_steady": 3}
     assert group["independent"]

@@ -12,7 +12,7 @@ from dockair.scenarios.campaign import manifest as manifests
 from dockair.scenarios.campaign import table
 from dockair.scenarios.campaign.row import COLUMNS
 from dockair.scenarios.report.acceptance import claim_of, shortfalls_of
-from dockair.scenarios.report.evidence import evidence_of
+from dockair.scenarios.report.evidence import as_text, evidence_of
 from dockair.scenarios.report.figures import panels
 from dockair.scenarios.report.folders import Campaign, read_campaigns
 from dockair.scenarios.report.groups import Share, groups_of, paired
@@ -91,6 +91,37 @@ def test_sensing_is_never_pooled():
     assert [(group.sensing, len(group.rows)) for group in groups] == [("camera", 3), ("measurements", 3), ("truth", 3)]
 
 
+def test_what_is_set_makes_a_group_of_its_own_and_what_is_drawn_does_not():
+    filters = [_row(0, command=_command("light_gusts", 0, **{"camera.filter": name})) for name in ("none", "band_pass")]
+    column, sigma = {"set.turbulence.sigma_m_s": 0.5}, {"turbulence.sigma_m_s": 0.5}
+    drawn = [
+        _row(1, sensing=kind, command=_command("light_gusts", 1, **sigma, **_SENSING[kind])) | column
+        for kind in _SENSING
+    ]
+    pid = _row(2, controller="pid", command=_command("light_gusts", 2, **{"guidance.controller": "pid"}))
+    groups = groups_of([_row(0), *filters, *drawn, pid])
+    assert {(group.settings, group.sensing, group.controller, len(group.rows)) for group in groups} == {
+        ("", "camera", "predictive", 2), ("", "truth", "predictive", 1), ("", "measurements", "predictive", 1),
+        ("", "camera", "pid", 1),
+        ('camera.filter="none"', "camera", "predictive", 1), ('camera.filter="band_pass"', "camera", "predictive", 1),
+    }  # fmt: skip
+    assert len({name for group in groups for name in (group.anchor, group.title, group.label)}) == 3 * len(groups)
+    text = page("made", [_campaign([row for group in groups for row in group.rows])])
+    assert "with <code>camera.filter=&#34;none&#34;</code>" in text
+
+
+def test_what_is_set_is_compared_with_perfect_navigation_that_flew_it_so():
+    with_sigma = [
+        _row(0, sensing=kind, command=_command("light_gusts", 0, **{"turbulence.sigma_m_s": 0.5}, **_SENSING[kind]))
+        for kind in ("camera", "truth")
+    ]
+    groups = groups_of([_row(0), *with_sigma])
+    pairs = [paired(group, groups) for group in groups]
+    assert [(g.settings, g.sensing, p and p.flights) for g, p in zip(groups, pairs, strict=True)] == [
+        ("", "camera", None), ("turbulence.sigma_m_s=0.5", "camera", 1), ("turbulence.sigma_m_s=0.5", "truth", None),
+    ]  # fmt: skip
+
+
 def test_a_flight_that_crashed_is_no_success_and_still_counts():
     rows = [_row(0), _row(1, error="ValueError: x", outcome="error", success=False, first_attempt=False)]
     (group,) = groups_of(rows)
@@ -128,7 +159,8 @@ def test_perfect_navigation_is_compared_on_the_same_draws_and_settings(sensing):
 
     def drawn(kind, value, attempts=None):
         command = _command("light_gusts", 0, **{"turbulence.sigma_m_s": value}, **_SENSING[kind])
-        return _row(0, sensing=kind, attempts=attempts, command=command, scenario_hash=f"{kind}-{value}")
+        row = _row(0, sensing=kind, attempts=attempts, command=command, scenario_hash=f"{kind}-{value}")
+        return row | {"set.turbulence.sigma_m_s": value}
 
     ours = [drawn(sensing, 0.5, bad), drawn(sensing, 1.5), drawn(sensing, 2.5)]  # the last is the truth's never
     groups = groups_of([*ours, drawn("truth", 0.5), drawn("truth", 1.5, bad)])
@@ -195,8 +227,9 @@ def test_only_the_librarys_scenarios_as_they_are_written_are_held_to_their_claim
     (written,) = groups_of([_row(seed, attempts=bad) for seed in range(3)])
     assert shortfalls_of(written) and claim_of(written)
     changed = _row(9, attempts=bad, command=_command("light_gusts", 9, **{"turbulence.sigma_m_s": 3}))
-    (mixed,) = groups_of([*written.rows, changed])
-    assert shortfalls_of(mixed) is None and claim_of(mixed) == ""
+    drawn = changed | {"set.turbulence.sigma_m_s": 3}
+    for other in (groups_of([*written.rows, drawn])[0], groups_of([changed])[0]):
+        assert shortfalls_of(other) is None and claim_of(other) == ""
     text = 'name = "mine"\nclaim = "it docks"\n[accept]\noutcome = "contact"\n'
     (tmp_path / "mine.toml").write_text(text)
     monkeypatch.chdir(tmp_path)
@@ -256,8 +289,12 @@ def test_the_same_rows_make_the_same_page():
 def test_evidence_is_plain_json_with_counts_of_every_group():
     rows = [_row(0), _row(1, attempts=[_attempt(1, "miss", 0.4, "gust")]), _row(0, sensing="truth")]
     table_ = evidence_of([_campaign(rows)])
-    json.dumps(table_, allow_nan=False)
+    text = as_text(table_)
+    assert json.loads(text) == json.loads(json.dumps(table_))
     camera, truth = table_["groups"]
+    assert table_["each_flight"] == ("seed", "outcome", "attempts", "radial_offset_m", "closure_speed_m_s")
+    assert camera["each"] == [[0, "contact", 1, 0.05, 1.2], [1, "miss", 1, None, None]]
+    assert '[1, "miss", 1, null, null]' in text and table_["campaigns"][0]["flown"] == 3
     assert camera["first_attempt"]["count"] == 1 and camera["failed_seeds"] == [1]
     assert camera["causes_of_failed_attempts"] == {"gust": 1}
     assert truth["shortfalls"] is None
