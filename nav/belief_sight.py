@@ -34,7 +34,7 @@ class Belief:
 
     R_BD: Array  #: (3, 3)
     x: Array  #: (8, 3) rows of `belief_motion`: p_ID, v_ID, swing, its rate, gyro's bias, formation, turn to rest, gust
-    P: Array  #: (47, 50) of the errors
+    P: Array  #: (50, 50) of the errors
     log_weight: float = 0.0
     ring: Array = field(default_factory=lambda: np.zeros(RING.stop - RING.start))
     #: (16,) how far each LED is off its place in the ring's plane [m]

@@ -15,7 +15,6 @@ Not modelled: contact (the drogue moves with the probe then, and white accelerat
 turns or speeds up but by the walk of c.
 """
 
-from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -27,13 +26,13 @@ from dockair.errors import DockairError
 from dockair.messages import ImuSample
 from dockair.nav import belief_motion as motion
 from dockair.nav.belief import Correction, begun_again, corrected, felt_first, mixture, rolled, widened
-from dockair.nav.belief_motion import Motion, propagated
+from dockair.nav.belief_buffer import BeliefBuffer, Frame, Node
 from dockair.nav.belief_sight import Belief, Sight
 from dockair.nav.fusion_settings import FusionSettings as FusionSettings
 from dockair.nav.fusion_settings import motion_of, refusals_until_doubt, start_of, taking_of
 from dockair.nav.imu_record import ImuRecord, Stamps
 from dockair.nav.pose.estimate import PoseEstimate, PoseStatus
-from dockair.nav.pose.measurement import LinesOfSight, lines_of_sight_from_pixels
+from dockair.nav.pose.measurement import lines_of_sight_from_pixels
 from dockair.rotations import Array, log, skew
 
 
@@ -48,20 +47,6 @@ class FilterState:
     rate_PD_B: Array  #: (3,) d/dt of p_PD_B in body axes [m/s]
     gyro_bias_B: Array  #: (3,) [rad/s]
     covariance: Array  #: (9, 9) of (phi, p_PD_B, v_PD_B): R_BD <- exp(phi) R_BD [rad, m, m/s]
-
-
-@dataclass(slots=True, eq=False)
-class _Node:
-    """A moment in the buffer, a frame's or one to begin at, and the belief after it."""
-
-    time_s: float
-    frame: PoseEstimate | LinesOfSight | None
-    beliefs: list[Belief]
-    doubted: bool = False  #: the belief was widened before the frame was taken
-
-
-def _time(node: _Node) -> float:
-    return node.time_s
 
 
 class RelativeFilter:
@@ -84,13 +69,17 @@ class RelativeFilter:
         self._gates = [0.0, *(float(chi2.ppf(probability, freedom)) for freedom in range(1, 17))]
         self._taking = taking_of(self._settings, sheets.camera_rate_hz)
         self._refusals_until_doubt = refusals_until_doubt(self._settings, sheets.camera_rate_hz)
-        self._motion: Motion = motion_of(self._settings, sheets.gyro)
-        self._start = [start_of(self._settings, sheets)]
+        self._motion = motion_of(self._settings, sheets.gyro)
         self._record = ImuRecord(sheets.mounting, sheets.gyro, self._settings.saturated_share)
         self._imu_stamps, self._frame_stamps = Stamps(self._settings.leap_s), Stamps(self._settings.leap_s)
-        self._nodes: list[_Node] = []
-        self._head: _Node | None = None  #: at the newest sample, when no frame is newer
-        self._coasted: tuple[_Node, _Node] | None = None  #: the second: the first, coasted on for long
+        self._buffer = BeliefBuffer(
+            self._record,
+            self._motion,
+            [start_of(self._settings, sheets)],
+            self._taken_again,
+            span_s=self._settings.buffer_s,
+            interval_s=self._settings.node_interval_s,
+        )
         self._refusals, self._felt = 0, False
         self._last: Correction | None = None
 
@@ -109,13 +98,15 @@ class RelativeFilter:
         taken = 0
         for sample in imu:
             before_s = self._record.newest_s
-            if sample.time_stamp_s <= before_s or not self._imu_stamps.believed(sample.time_stamp_s, self._newest_s()):
+            believed = self._imu_stamps.believed
+            if sample.time_stamp_s <= before_s or not believed(sample.time_stamp_s, self._buffer.newest_s):
                 continue
             if self._record.take(sample):
                 taken += 1
-                self._after_sample(before_s)
+                self._feel(self._record.forces_B[-1])
+                self._buffer.after_sample(before_s)
         if taken:
-            self._renew_head()
+            self._buffer.renew_head()
         return taken
 
     def update(self, pose: PoseEstimate, time_stamp_s: float) -> bool:
@@ -151,9 +142,8 @@ class RelativeFilter:
     def turn_drogue(self, roll_rad: float, time_s: float) -> None:
         """Begin afresh at a time with the drogue rolled about its axis: its LEDs had been numbered wrongly."""
         led2 = self._settings.led_place_sigma_m**2
-        beliefs = [rolled(belief, roll_rad, led2) for belief in self._beliefs(time_s)]
-        self._nodes, self._head = [_Node(time_s, None, beliefs)], None
-        self._renew_head()
+        beliefs = [rolled(belief, roll_rad, led2) for belief in self._buffer.beliefs(time_s)]
+        self._buffer.begin(time_s, beliefs)
 
     def begin_again(self, pose: PoseEstimate, time_s: float) -> None:
         """Begin afresh at a time with the drogue where a converged pose has it: it had been lost.
@@ -163,22 +153,21 @@ class RelativeFilter:
         """
         mounting, settings = self._sheets.mounting, self._settings
         p_ID = mounting.R_BC @ pose.p_CD + mounting.p_BC - mounting.p_BI
-        lost = mixture(self._beliefs(time_s))
+        lost = mixture(self._buffer.beliefs(time_s))
         apart_rad = 2.0 * np.pi / self._sheets.ring.count
         turn = log(lost.R_BD.T @ mounting.R_BC @ pose.R_CD)
         leds = round(float(turn[0]) / apart_rad)
         if leds != 0:
             lost = rolled(lost, leds * apart_rad, settings.led_place_sigma_m**2)
-        beliefs = [begun_again(lost, start, p_ID, settings.doubt_attitude_sigma_rad) for start in self._start]
-        self._nodes, self._head = [_Node(time_s, None, beliefs)], None
-        self._coasted, self._refusals = None, 0
-        self._renew_head()
+        start = self._buffer.start
+        self._buffer.begin(time_s, [begun_again(lost, s, p_ID, settings.doubt_attitude_sigma_rad) for s in start])
+        self._refusals = 0
 
     def state(self, time_s: float | None = None) -> FilterState:
         """Return the belief at a time; at that of the newest message if none is given."""
         if time_s is None:
-            time_s = self._newest_s() if self._nodes else 0.0
-        belief, r, average_s = mixture(self._beliefs(time_s)), self._p_IP, self._settings.rate_average_s
+            time_s = self._buffer.newest_s if self._buffer.newest is not None else 0.0
+        belief, r, average_s = mixture(self._buffer.beliefs(time_s)), self._p_IP, self._settings.rate_average_s
         w_cross = skew(self._record.mean_rate_B(time_s - average_s, time_s) - belief.bias)
         covariance = self._to_tip @ belief.P @ self._to_tip.T
         covariance[6:, 6:] += self._rate_variance(time_s) * self._lever2
@@ -194,7 +183,7 @@ class RelativeFilter:
 
     def rate_B(self, time_s: float) -> Array:
         """(3,) gyro rate less its bias [rad/s], linear between samples, that of the nearest one outside."""
-        newest = self._head or (self._nodes[-1] if self._nodes else None)
+        newest = self._buffer.newest
         bias = newest.beliefs[0].bias if newest is not None else np.zeros(3)
         return np.asarray(self._record.rate_B(time_s) - bias) if np.isfinite(self.imu_time_s) else np.zeros(3)
 
@@ -204,7 +193,7 @@ class RelativeFilter:
 
     def predicted_pose(self, time_s: float) -> tuple[Array, Array, Array]:
         """R_CD (3, 3), p_CD (3,) [m] that a frame would show, and their covariance (6, 6) of (phi, delta) in C."""
-        seen = self._sight.apparent(mixture(self._beliefs(time_s)))
+        seen = self._sight.apparent(mixture(self._buffer.beliefs(time_s)))
         return seen.R_CD, seen.p_CD, seen.covariance
 
     def foretold_p_PD_B(self, time_s: float, horizon_s: float) -> tuple[Array, float]:
@@ -214,13 +203,8 @@ class RelativeFilter:
             (3,) ring centre from the probe's tip [m], and for how long no frame would have come [s]; NaN where the
             buffer holds no frame so old.
         """
-        index = bisect_right(self._nodes, time_s - horizon_s, key=_time)
-        for node in reversed(self._nodes[:index]):
-            if node.frame is not None:
-                begin = node.beliefs[0]
-                _, x, _ = self._propagated(begin, node.time_s, time_s, errors=False)
-                return x[0] - self._p_IP, time_s - node.time_s
-        return np.full(3, np.nan), float("nan")
+        x, unseen_s = self._buffer.foretold(time_s, horizon_s)
+        return x[motion.S] - self._p_IP, unseen_s
 
     def predicted_led_pixels(self, time_s: float) -> tuple[Array, Array]:
         """Where the LEDs should be seen.
@@ -229,7 +213,7 @@ class RelativeFilter:
             (count, 2) pixels, NaN behind the camera; (count,) standard deviation of each in its worst direction [px],
             from the belief alone: without the centroid's noise, the lens's distortion neglected.
         """
-        return self._sight.led_pixels(mixture(self._beliefs(time_s)), self._sheets.camera)
+        return self._sight.led_pixels(mixture(self._buffer.beliefs(time_s)), self._sheets.camera)
 
     def _rate_variance(self, time_s: float) -> float:
         """Of the averaged rate, each axis, by what may have changed since the samples' middle.
@@ -240,43 +224,18 @@ class RelativeFilter:
         age_s = max(time_s - self._record.newest_s, 0.0) + 0.5 * self._settings.rate_average_s
         return float(min(self._motion.held_turn2 * age_s**2, self._settings.held_rate_sigma_rad_s**2))
 
-    def _newest_s(self) -> float:
-        return max(self._record.newest_s, self._nodes[-1].time_s if self._nodes else -np.inf)
-
-    def _after_sample(self, before_s: float) -> None:
-        time_s = self._record.newest_s
-        if not self._nodes:
-            self._nodes.append(_Node(time_s, None, self._start))
-        if not self._felt and np.isfinite(self._record.forces_B[-1]).all():
-            self._feel(self._record.forces_B[-1])
-        if self._nodes[-1].time_s > before_s:
-            self._run_from(bisect_right(self._nodes, before_s, key=_time))  # those after it had to guess the rate
-        if time_s - self._nodes[-1].time_s >= self._settings.node_interval_s:
-            self._renew_head()
-            assert self._head is not None  # no frame is newer
-            self._nodes.append(self._head)
-        oldest_s = time_s - self._settings.buffer_s
-        if len(self._nodes) > 1 and self._nodes[1].time_s <= oldest_s:
-            del self._nodes[: bisect_right(self._nodes, oldest_s, key=_time) - 1]
-            self._record.forget(self._nodes[0].time_s)
-
     def _feel(self, force_B: Array) -> None:
         """Take the first specific force for that of the formation."""
-        self._felt, self._head, self._coasted = True, None, None
-        self._start = [felt_first(belief, force_B) for belief in self._start]
-        for node in self._nodes:
-            node.beliefs = [felt_first(belief, force_B) for belief in node.beliefs]
+        if not self._felt and np.isfinite(force_B).all():
+            self._felt = True
+            self._buffer.change_all(lambda belief: felt_first(belief, force_B))
 
-    def _offer(self, frame: PoseEstimate | LinesOfSight, time_s: float) -> bool:
-        if not self._frame_stamps.believed(time_s, self._newest_s()):
+    def _offer(self, frame: Frame, time_s: float) -> bool:
+        if not self._frame_stamps.believed(time_s, self._buffer.newest_s):
             return False
-        if not self._nodes:
-            self._nodes.append(_Node(time_s, None, self._start))
-        index = bisect_right(self._nodes, time_s, key=_time)
-        last = self._nodes[index - 1]
-        if index == 0 or (last.time_s == time_s and last.frame is not None):
+        before, doubted = self._buffer.before_frame(time_s), False
+        if before is None:
             return False
-        before, doubted = self._moved(last, time_s), False
         correction = self._corrected(before, frame)
         self._last = correction
         if not correction.beliefs and self._refusals + 1 >= self._refusals_until_doubt:
@@ -285,70 +244,22 @@ class RelativeFilter:
             self._refusals += 1
             return False
         self._refusals = 0
-        self._nodes.insert(index, _Node(time_s, frame, correction.beliefs, doubted))
-        self._run_from(index + 1)
-        self._renew_head()
+        self._buffer.insert(Node(time_s, frame, correction.beliefs, doubted))
         return True
 
-    def _corrected(self, beliefs: list[Belief], frame: PoseEstimate | LinesOfSight) -> Correction:
+    def _taken_again(self, node: Node, before: list[Belief]) -> list[Belief]:
+        """Return what is believed after a node whose past has changed."""
+        if node.doubted:
+            before = self._widened(before)
+        if node.frame is None:
+            return before
+        return self._corrected(before, node.frame).beliefs or before
+
+    def _corrected(self, beliefs: list[Belief], frame: Frame) -> Correction:
         return corrected(beliefs, frame, self._sight, self._gates, self._taking)
-
-    def _run_from(self, index: int) -> None:
-        """Run the buffer again from a node on; the first node is given."""
-        self._head = self._coasted = None
-        for i in range(max(index, 1), len(self._nodes)):
-            node = self._nodes[i]
-            node.beliefs = self._moved(self._nodes[i - 1], node.time_s)
-            if node.doubted:
-                node.beliefs = self._widened(node.beliefs)
-            if node.frame is not None:
-                node.beliefs = self._corrected(node.beliefs, node.frame).beliefs or node.beliefs
-
-    def _renew_head(self) -> None:
-        """Bring the belief to the newest sample, unless a frame is newer."""
-        newest_s, last = self._record.newest_s, self._nodes[-1]
-        if newest_s < last.time_s:
-            self._head = None
-            return
-        begin = last if self._head is None or self._head.time_s < last.time_s else self._head
-        self._head = _Node(newest_s, None, self._moved(begin, newest_s))
 
     def _widened(self, beliefs: list[Belief]) -> list[Belief]:
         """Return the beliefs with less certainty: the drogue has been struck or let go, or is seen from elsewhere."""
         s = self._settings
         sigmas = (s.doubt_attitude_sigma_rad, s.doubt_position_sigma_m, s.doubt_velocity_sigma_m_s)
         return [widened(belief, sigmas, s.led_place_sigma_m) for belief in beliefs]
-
-    def _beliefs(self, time_s: float) -> list[Belief]:
-        """Return the belief at a time; the oldest kept if it is older."""
-        if not self._nodes:
-            return self._start
-        if self._head is not None and self._head.time_s <= time_s:
-            return self._coasting(self._head, time_s)
-        index = bisect_right(self._nodes, time_s, key=_time)
-        return self._coasting(self._nodes[index - 1], time_s) if index else self._nodes[0].beliefs
-
-    def _coasting(self, node: _Node, time_s: float) -> list[Belief]:
-        """As `_moved`; where no message comes for long, the way is not gone again from its beginning every time."""
-        kept = self._coasted
-        begin = kept[1] if kept is not None and kept[0] is node and kept[1].time_s <= time_s else node
-        beliefs = self._moved(begin, time_s)
-        if time_s - begin.time_s > self._settings.buffer_s:
-            self._coasted = node, _Node(time_s, None, beliefs)
-        return beliefs
-
-    def _moved(self, node: _Node, time_s: float) -> list[Belief]:
-        """Return a node's beliefs at a later time."""
-        if time_s <= node.time_s:
-            return node.beliefs
-        moved = []
-        for belief in node.beliefs:
-            R, x, P = self._propagated(belief, node.time_s, time_s)
-            moved.append(Belief(R, x, P, belief.log_weight, belief.ring))
-        return moved
-
-    def _propagated(
-        self, belief: Belief, begin_s: float, end_s: float, *, errors: bool = True
-    ) -> tuple[Array, Array, Array]:
-        samples = self._record.times_s, self._record.rates_B, self._record.forces_B
-        return propagated(belief.R_BD, belief.x, belief.P, begin_s, end_s, *samples, self._motion, errors)

@@ -9,7 +9,7 @@ from scipy.stats import chi2
 from dockair.calibration import Camera, GyroSheet, LedRing, Mounting, NavigationSheets, StartGeometry
 from dockair.errors import DockairError
 from dockair.messages import ImuSample
-from dockair.nav import fusion
+from dockair.nav import belief_buffer
 from dockair.nav.belief_motion import ERRORS, GUST, SWING, SWING_RATE, VELOCITY, propagated
 from dockair.nav.fusion import FusionSettings, RelativeFilter
 from dockair.nav.fusion_settings import motion_of, refusals_until_doubt, start_of, swing_covariance, taking_of
@@ -692,8 +692,8 @@ def test_a_long_silence_is_gone_through_once_however_often_the_present_is_asked_
         sample = world.step()
         for filter_ in (asked, quiet):
             filter_.propagate([sample])
-    gone, real = [], fusion.propagated
-    monkeypatch.setattr(fusion, "propagated", lambda *a: gone.append(a[4] - a[3]) or real(*a))
+    gone, real = [], belief_buffer.propagated
+    monkeypatch.setattr(belief_buffer, "propagated", lambda *a: gone.append(a[4] - a[3]) or real(*a))
     begun_s, rate_hz, silence_s = asked.imu_time_s, 50, 40.0
     times = begun_s + np.arange(1, round(silence_s * rate_hz) + 1) / rate_hz
     for time_s in times:

@@ -1,0 +1,189 @@
+"""What is believed at the moments of the last half second, so that a message that is late finds its place.
+
+A node is a moment with the belief after it: that of a frame, or one to begin at. Between nodes the belief is run
+forward with the IMU's samples; the head is that at the newest sample. A frame put among the nodes is followed by all
+that is newer, once more: run forward, and each frame taken again, as the filter says.
+"""
+
+from bisect import bisect_right
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from dockair.nav.belief_motion import Motion, propagated
+from dockair.nav.belief_sight import Belief
+from dockair.nav.imu_record import ImuRecord
+from dockair.nav.pose.estimate import PoseEstimate
+from dockair.nav.pose.measurement import LinesOfSight
+from dockair.rotations import Array
+
+Frame = PoseEstimate | LinesOfSight
+
+
+@dataclass(slots=True, eq=False)
+class Node:
+    """A moment, and the belief after it."""
+
+    time_s: float
+    frame: Frame | None
+    beliefs: list[Belief]
+    doubted: bool = False  #: the belief was widened before the frame was taken
+
+
+def _time(node: Node) -> float:
+    return node.time_s
+
+
+class BeliefBuffer:
+    """Nodes in order of time, and the way between them.
+
+    Args:
+        record: samples of the IMU; what is older than all nodes is forgotten there.
+        motion: of the drogue between them.
+        start: the belief before any message.
+        taken_again: of a node whose past has changed, what is believed after it, given what is before.
+        span_s: how long a node is kept.
+        interval_s: between nodes where no frame comes.
+    """
+
+    def __init__(
+        self,
+        record: ImuRecord,
+        motion: Motion,
+        start: list[Belief],
+        taken_again: Callable[[Node, list[Belief]], list[Belief]],
+        *,
+        span_s: float,
+        interval_s: float,
+    ) -> None:
+        self._record, self._motion, self._start, self._taken_again = record, motion, start, taken_again
+        self._span_s, self._interval_s = span_s, interval_s
+        self._nodes: list[Node] = []
+        self._head: Node | None = None  #: at the newest sample, when no frame is newer
+        self._coasted: tuple[Node, Node] | None = None  #: the second: the first, coasted on for long
+
+    @property
+    def start(self) -> list[Belief]:
+        """The belief before any message."""
+        return self._start
+
+    @property
+    def newest(self) -> Node | None:
+        """The head, or the last node; None before the first message."""
+        return self._head or (self._nodes[-1] if self._nodes else None)
+
+    @property
+    def newest_s(self) -> float:
+        """Stamp of the newest message; -inf before the first."""
+        return max(self._record.newest_s, self._nodes[-1].time_s if self._nodes else -np.inf)
+
+    def begin(self, time_s: float, beliefs: list[Belief]) -> None:
+        """Forget all nodes but one, at a time, with these beliefs."""
+        self._nodes, self._head, self._coasted = [Node(time_s, None, beliefs)], None, None
+        self.renew_head()
+
+    def change_all(self, changed: Callable[[Belief], Belief]) -> None:
+        """Put another belief in the place of each, the start's too."""
+        self._head = self._coasted = None
+        self._start = [changed(belief) for belief in self._start]
+        for node in self._nodes:
+            node.beliefs = [changed(belief) for belief in node.beliefs]
+
+    def after_sample(self, before_s: float) -> None:
+        """Take note of a sample that is new in the record, the one before it being of `before_s`."""
+        time_s = self._record.newest_s
+        self._require_node(time_s)
+        if self._nodes[-1].time_s > before_s:
+            self._run_from(bisect_right(self._nodes, before_s, key=_time))  # those after it had to guess the rate
+        if time_s - self._nodes[-1].time_s >= self._interval_s:
+            self.renew_head()
+            assert self._head is not None  # no frame is newer
+            self._nodes.append(self._head)
+        oldest_s = time_s - self._span_s
+        if len(self._nodes) > 1 and self._nodes[1].time_s <= oldest_s:
+            del self._nodes[: bisect_right(self._nodes, oldest_s, key=_time) - 1]
+            self._record.forget(self._nodes[0].time_s)
+
+    def before_frame(self, time_s: float) -> list[Belief] | None:
+        """Return what was believed when a frame was taken; None if it is older than all nodes, or was had already."""
+        self._require_node(time_s)
+        index = bisect_right(self._nodes, time_s, key=_time)
+        last = self._nodes[index - 1]
+        if index == 0 or (last.time_s == time_s and last.frame is not None):
+            return None
+        return self._moved(last, time_s)
+
+    def insert(self, node: Node) -> None:
+        """Put a frame in its place, and run again what is newer."""
+        index = bisect_right(self._nodes, node.time_s, key=_time)
+        self._nodes.insert(index, node)
+        self._run_from(index + 1)
+        self.renew_head()
+
+    def renew_head(self) -> None:
+        """Bring the belief to the newest sample, unless a frame is newer."""
+        newest_s, last = self._record.newest_s, self._nodes[-1]
+        if newest_s < last.time_s:
+            self._head = None
+            return
+        begin = last if self._head is None or self._head.time_s < last.time_s else self._head
+        self._head = Node(newest_s, None, self._moved(begin, newest_s))
+
+    def beliefs(self, time_s: float) -> list[Belief]:
+        """Return the belief at a time; the oldest kept if it is older."""
+        if not self._nodes:
+            return self._start
+        if self._head is not None and self._head.time_s <= time_s:
+            return self._coasting(self._head, time_s)
+        index = bisect_right(self._nodes, time_s, key=_time)
+        return self._coasting(self._nodes[index - 1], time_s) if index else self._nodes[0].beliefs
+
+    def foretold(self, time_s: float, horizon_s: float) -> tuple[Array, float]:
+        """Return what the newest frame that is `horizon_s` old or more has foretold of a time.
+
+        Returns:
+            (8, 3) state, and the frame's age [s]; NaN where no frame so old is kept.
+        """
+        index = bisect_right(self._nodes, time_s - horizon_s, key=_time)
+        for node in reversed(self._nodes[:index]):
+            if node.frame is not None:
+                _, x, _ = self._propagated(node.beliefs[0], node.time_s, time_s, errors=False)
+                return x, time_s - node.time_s
+        return np.full((8, 3), np.nan), float("nan")
+
+    def _require_node(self, time_s: float) -> None:
+        if not self._nodes:
+            self._nodes.append(Node(time_s, None, self._start))
+
+    def _run_from(self, index: int) -> None:
+        """Run the nodes again from one on; the first is given."""
+        self._head = self._coasted = None
+        for i in range(max(index, 1), len(self._nodes)):
+            node = self._nodes[i]
+            node.beliefs = self._taken_again(node, self._moved(self._nodes[i - 1], node.time_s))
+
+    def _coasting(self, node: Node, time_s: float) -> list[Belief]:
+        """As `_moved`; where no message comes for long, the way is not gone again from its beginning every time."""
+        kept = self._coasted
+        begin = kept[1] if kept is not None and kept[0] is node and kept[1].time_s <= time_s else node
+        beliefs = self._moved(begin, time_s)
+        if time_s - begin.time_s > self._span_s:
+            self._coasted = node, Node(time_s, None, beliefs)
+        return beliefs
+
+    def _moved(self, node: Node, time_s: float) -> list[Belief]:
+        """Return a node's beliefs at a later time."""
+        if time_s <= node.time_s:
+            return node.beliefs
+        moved = []
+        for belief in node.beliefs:
+            R, x, P = self._propagated(belief, node.time_s, time_s)
+            moved.append(Belief(R, x, P, belief.log_weight, belief.ring))
+        return moved
+
+    def _propagated(
+        self, belief: Belief, begin_s: float, end_s: float, *, errors: bool = True
+    ) -> tuple[Array, Array, Array]:
+        samples = self._record.times_s, self._record.rates_B, self._record.forces_B
+        return propagated(belief.R_BD, belief.x, belief.P, begin_s, end_s, *samples, self._motion, errors)
