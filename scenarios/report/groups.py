@@ -48,11 +48,16 @@ class Share:
         """Lower and upper end."""
         return wilson_interval(self.count, self.of) if self.of else (math.nan, math.nan)
 
-    def __str__(self) -> str:
-        if not self.of:
-            return "–"
+    @property
+    def counted(self) -> str:
+        """Count and share in words; a dash of nothing."""
+        return f"{self.count}/{self.of} = {100 * self.value:.1f} %" if self.of else "–"
+
+    @property
+    def between(self) -> str:
+        """The interval in words [%]; "" of nothing."""
         low, high = self.interval
-        return f"{self.count}/{self.of} = {100 * self.value:.1f} % ({100 * low:.1f}–{100 * high:.1f})"
+        return f"({100 * low:.1f}–{100 * high:.1f})" if self.of else ""
 
 
 @dataclass(frozen=True)

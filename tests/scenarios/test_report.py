@@ -139,7 +139,8 @@ def test_success_within_attempts_grows_and_ends_at_all():
 
 def test_intervals_are_wilsons():
     assert Share(7, 10).interval == wilson_interval(7, 10)
-    assert str(Share(0, 0)) == "–"
+    assert (Share(7, 10).counted, Share(7, 10).between) == ("7/10 = 70.0 %", "(39.7–89.2)")
+    assert (Share(0, 0).counted, Share(0, 0).between) == ("–", "")
 
 
 def test_what_vision_costs_is_counted_on_common_seeds_only():
@@ -203,7 +204,7 @@ def test_a_flight_that_lost_the_drogue_after_a_good_contact_had_docked_by_then()
 def test_a_seed_that_occurs_twice_is_said_and_marks_the_intervals():
     twice = [_row(seed, scenario_hash=f"point {k}") for seed in range(3) for k in range(20)]
     text = page("made", [_campaign(twice)])
-    assert "60 flights of 3 seeds" in text and "= 100.0 % (94.0–100.0) †" in text
+    assert "60 flights of 3 seeds" in text and "= 100.0 %<br>" in text and "(94.0–100.0) †</span>" in text
     (group,) = evidence_of([_campaign(twice)])["groups"]
     assert (group["flights"], group["seeds"], group["independent"]) == (60, 3, False)
     once = [_row(seed) for seed in range(60)]
