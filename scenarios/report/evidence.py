@@ -10,10 +10,11 @@ import numpy as np
 from dockair.rotations import Array
 from dockair.scenarios.report.acceptance import shortfalls_of
 from dockair.scenarios.report.folders import Campaign
-from dockair.scenarios.report.groups import Group, Paired, Share, groups_of, paired
+from dockair.scenarios.report.groups import Group, Paired, Share, drawn_of, groups_of, paired
 
 _MANIFEST = ("plan", "flights", "seeds", "commit", "uncommitted_changes", "code", "plug_ins", "versions", "begun")
-_OF_EACH = ("seed", "outcome", "attempts", "radial_offset_m", "closure_speed_m_s")
+_OF_EACH = ("seed", "outcome", "first_attempt", "success", "unsafe", "attempts", "radial_offset_m", "closure_speed_m_s")
+_DRAWN = "drawn"
 _LIST_OVER_LINES = re.compile(r"\[\n\s*([^\[\]{}]*?)\n\s*\]")  # one that holds neither list nor object
 
 
@@ -22,7 +23,7 @@ def evidence_of(campaigns: Sequence[Campaign]) -> dict[str, Any]:
     groups = groups_of([row for campaign in campaigns for row in campaign.rows])
     return {
         "groups": [_group(group, groups) for group in groups],
-        "each_flight": _OF_EACH,
+        "each_flight": (*_OF_EACH, _DRAWN),
         "campaigns": [
             {"flown": len(campaign.rows)} | {key: campaign.manifest.get(key) for key in _MANIFEST}
             for campaign in campaigns
@@ -63,7 +64,7 @@ def _group(group: Group, groups: Sequence[Group]) -> dict[str, Any]:
         "failed_seeds": [row["seed"] for row in group.flown if not row["first_attempt"]],
         "beside_perfect_navigation": None if pair is None else _pair(pair),
         "shortfalls": None if shortfalls is None else list(shortfalls),
-        "each": [[_rounded(row[name]) for name in _OF_EACH] for row in group.rows],
+        "each": [[*(_rounded(row[name]) for name in _OF_EACH), ", ".join(drawn_of(row))] for row in group.rows],
     }
 
 

@@ -1,6 +1,7 @@
 """Flights that may be pooled: same scenario, same keys set over it, same sensing, same navigator, same controller.
 
-A key that the plan draws differs from flight to flight of one group; of any other each value is a group of its own.
+A key that the plan draws differs from flight to flight of one group, which is apart from flights without that draw; of
+any other key each value is a group of its own.
 Perfect navigation, the measurement model and the camera never share a group: what one shows says nothing of the other
 until both stand side by side. Where a group on the truth has flown the same flights, `paired` puts it there.
 """
@@ -68,7 +69,7 @@ class Group:
     sensing: str
     navigator: str
     controller: str
-    settings: str  #: keys set over the scenario as in `--set`, but those of sensing, navigator and controller
+    settings: str  #: keys set over the scenario as in `--set` or "KEY drawn"; sensing, navigator, controller left out
     rows: tuple[Row, ...]
 
     @property
@@ -215,13 +216,20 @@ def file_and_settings(row: Row) -> tuple[str, list[str]]:
     return file, options[1::2]
 
 
+def drawn_of(row: Row) -> list[str]:
+    """Return what the plan has drawn for this flight: "key=value" each."""
+    return [text for text in file_and_settings(row)[1] if row.get(SET + _key(text)) is not None]
+
+
 def _settings_of(row: Row) -> str:
-    """Return what was set over the scenario, but for keys that have a column of their own."""
-    _, settings = file_and_settings(row)
-    keys = {text: text.partition("=")[0] for text in settings}
-    return ", ".join(
-        sorted(text for text, key in keys.items() if key not in _IN_COLUMNS and row.get(SET + key) is None)
-    )
+    """Return what was set over the scenario, of a draw the key alone; without keys that have a column of their own."""
+    drawn = drawn_of(row)
+    settings = [text for text in file_and_settings(row)[1] if _key(text) not in _IN_COLUMNS]
+    return ", ".join(sorted(f"{_key(text)} drawn" if text in drawn else text for text in settings))
+
+
+def _key(text: str) -> str:
+    return text.partition("=")[0]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -274,7 +282,7 @@ def _by_conditions(rows: Sequence[Row]) -> dict[tuple[str, ...], list[Row]]:
     found: dict[tuple[str, ...], list[Row]] = {}
     for row in rows:
         file, options = file_and_settings(row)
-        settings = [text for text in options if text.partition("=")[0] not in _SEES]
+        settings = [text for text in options if _key(text) not in _SEES]
         found.setdefault((normpath(file), str(row["seed"]), *sorted(settings)), []).append(row)
     return found
 

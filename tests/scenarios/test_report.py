@@ -91,7 +91,7 @@ def test_sensing_is_never_pooled():
     assert [(group.sensing, len(group.rows)) for group in groups] == [("camera", 3), ("measurements", 3), ("truth", 3)]
 
 
-def test_what_is_set_makes_a_group_of_its_own_and_what_is_drawn_does_not():
+def test_what_is_set_makes_a_group_of_its_own_and_so_does_a_draw():
     filters = [_row(0, command=_command("light_gusts", 0, **{"camera.filter": name})) for name in ("none", "band_pass")]
     column, sigma = {"set.turbulence.sigma_m_s": 0.5}, {"turbulence.sigma_m_s": 0.5}
     drawn = [
@@ -101,8 +101,8 @@ def test_what_is_set_makes_a_group_of_its_own_and_what_is_drawn_does_not():
     pid = _row(2, controller="pid", command=_command("light_gusts", 2, **{"guidance.controller": "pid"}))
     groups = groups_of([_row(0), *filters, *drawn, pid])
     assert {(group.settings, group.sensing, group.controller, len(group.rows)) for group in groups} == {
-        ("", "camera", "predictive", 2), ("", "truth", "predictive", 1), ("", "measurements", "predictive", 1),
-        ("", "camera", "pid", 1),
+        ("", "camera", "predictive", 1), ("", "camera", "pid", 1),
+        *(("turbulence.sigma_m_s drawn", kind, "predictive", 1) for kind in _SENSING),
         ('camera.filter="none"', "camera", "predictive", 1), ('camera.filter="band_pass"', "camera", "predictive", 1),
     }  # fmt: skip
     assert len({name for group in groups for name in (group.anchor, group.title, group.label)}) == 3 * len(groups)
@@ -229,7 +229,7 @@ def test_only_the_librarys_scenarios_as_they_are_written_are_held_to_their_claim
     assert shortfalls_of(written) and claim_of(written)
     changed = _row(9, attempts=bad, command=_command("light_gusts", 9, **{"turbulence.sigma_m_s": 3}))
     drawn = changed | {"set.turbulence.sigma_m_s": 3}
-    for other in (groups_of([*written.rows, drawn])[0], groups_of([changed])[0]):
+    for other in (groups_of([*written.rows, drawn])[1], groups_of([changed])[0]):
         assert shortfalls_of(other) is None and claim_of(other) == ""
     text = 'name = "mine"\nclaim = "it docks"\n[accept]\noutcome = "contact"\n'
     (tmp_path / "mine.toml").write_text(text)
@@ -293,12 +293,33 @@ def test_evidence_is_plain_json_with_counts_of_every_group():
     text = as_text(table_)
     assert json.loads(text) == json.loads(json.dumps(table_))
     camera, truth = table_["groups"]
-    assert table_["each_flight"] == ("seed", "outcome", "attempts", "radial_offset_m", "closure_speed_m_s")
-    assert camera["each"] == [[0, "contact", 1, 0.05, 1.2], [1, "miss", 1, None, None]]
-    assert '[1, "miss", 1, null, null]' in text and table_["campaigns"][0]["flown"] == 3
+    assert table_["each_flight"] == (
+        "seed", "outcome", "first_attempt", "success", "unsafe", "attempts", "radial_offset_m", "closure_speed_m_s",
+        "drawn",
+    )  # fmt: skip
+    assert camera["each"] == [
+        [0, "contact", True, True, "", 1, 0.05, 1.2, ""], [1, "miss", False, False, "", 1, None, None, ""],
+    ]  # fmt: skip
+    assert '[1, "miss", false, false, "", 1, null, null, ""]' in text and table_["campaigns"][0]["flown"] == 3
     assert camera["first_attempt"]["count"] == 1 and camera["failed_seeds"] == [1]
     assert camera["causes_of_failed_attempts"] == {"gust": 1}
     assert truth["shortfalls"] is None
+
+
+def test_evidence_says_what_each_flight_had_drawn():
+    sigma = {"turbulence.sigma_m_s": 0.5}
+    drawn = _row(1, command=_command("light_gusts", 1, **sigma)) | {"set.turbulence.sigma_m_s": 0.5}
+    as_written, with_draw = evidence_of([_campaign([_row(0), drawn])])["groups"]
+    assert (as_written["settings"], as_written["each"][0][-1]) == ("", "")
+    assert with_draw["settings"] == "turbulence.sigma_m_s drawn"
+    assert with_draw["each"][0][-1] == "turbulence.sigma_m_s=0.5"
+
+
+def test_flights_without_a_draw_keep_their_claim_beside_those_with_one():
+    sigma = {"turbulence.sigma_m_s": 9.0}
+    drawn = [_row(k, command=_command("light_gusts", k, **sigma)) | {"set.turbulence.sigma_m_s": 9.0} for k in (5, 6)]
+    judged = [group["shortfalls"] for group in evidence_of([_campaign([_row(0), _row(1), *drawn])])["groups"]]
+    assert judged[0] is not None and judged[1] is None
 
 
 def test_a_contact_outside_the_limits_has_its_cause_in_the_table():
