@@ -20,6 +20,8 @@ from dockair.rotations import Array
 
 Frame = PoseEstimate | LinesOfSight
 
+_STAMP_S = 1e-6  # to which stamps are even
+
 
 @dataclass(slots=True, eq=False)
 class Node:
@@ -140,12 +142,12 @@ class BeliefBuffer:
         return self._coasting(self._nodes[index - 1], time_s) if index else self._nodes[0].beliefs
 
     def foretold(self, time_s: float, horizon_s: float) -> tuple[Array, float]:
-        """Return what the newest frame that is `horizon_s` old or more has foretold of a time.
+        """Return what the newest frame that is `horizon_s` old (to the microsecond) or more has foretold of a time.
 
         Returns:
             (8, 3) state, and the frame's age [s]; NaN where no frame so old is kept.
         """
-        index = bisect_right(self._nodes, time_s - horizon_s, key=_time)
+        index = bisect_right(self._nodes, time_s - horizon_s + _STAMP_S, key=_time)
         for node in reversed(self._nodes[:index]):
             if node.frame is not None:
                 _, x, _ = self._propagated(node.beliefs[0], node.time_s, time_s, errors=False)

@@ -8,8 +8,9 @@ a time a without frames
     sigma(a)^2 = s^2 (a/h)^3 for a <= h,   s^2 (a/h)^5 beyond                                        (1)
 
 as by a white acceleration, and beyond as by one that itself changes at random. On flights it grew by something between
-the two (docs/integrity.md), so that neither below nor beyond too little is added. Protection levels grow by k sigma(a),
-with k of one axis along and of two across for the probability `risk`. So it is for a belief like those that were asked:
+the two (docs/integrity.md), so that neither below nor beyond too little is added; an error of another age is brought to
+the horizon by the other power of the two, so that s is not too small. Protection levels grow by k sigma(a), with k of
+one axis along and of two across for the probability `risk`. So it is for a belief like those that were asked:
 with an IMU, and with frames up to the last. Of any other (`is_of` says which) the covariance is asked, too.
 
 Not modelled: gusts that begin in the very moment in which the camera goes out, a drogue that is struck, that s is
@@ -40,7 +41,7 @@ class CoastingSettings:
     horizon_s: float = 0.3  #: h; drop-outs of a camera that a contact is flown through are as long
     interval_s: float = 0.1  # between two questions: nearer ones have nearly the same answer
     memory_s: float = 6.0  # two periods of the drogue's swing
-    sigma_m: float = 0.05  # before anything is measured: in light turbulence (docs/integrity.md)
+    sigma_m: float = 0.05  # before anything is measured: as in moderate turbulence
     prior_s: float = 0.3  # of measuring that weighs as much as that: one answer
     #: That the drogue is farther off. A frame that does not come is a fault that seldom falls in the 0.2 s in which it
     #: would matter; together with this it is as rare as `missed_detection`.
@@ -85,7 +86,7 @@ class CoastingError:
         since_s, self._asked_s = time_s - self._asked_s, time_s
         kept_s = self._weight_s * (np.exp(-since_s / s.memory_s) if np.isfinite(since_s) else 1.0)
         weight_s = min(since_s, s.horizon_s)
-        at_horizon = np.square(error_C) / _growth(age_s / s.horizon_s)
+        at_horizon = np.square(error_C) * _growth(s.horizon_s / age_s)  # back in time the most of Eq. (1), too
         self._weight_s = kept_s + weight_s
         self._squares = (kept_s * self._squares + weight_s * at_horizon) / self._weight_s
 

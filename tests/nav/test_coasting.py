@@ -39,9 +39,12 @@ def test_it_grows_as_by_white_acceleration_and_then_as_by_one_that_changes_at_ra
     assert coasting.sigma_m(2.0 * HORIZON_S) == pytest.approx(2.0**2.5 * h)
 
 
-def test_errors_of_another_age_are_brought_to_the_horizon():
-    later = asked(np.full(3, 0.02), age_s=1.2 * HORIZON_S)
-    assert later.sigma_m(1.2 * HORIZON_S) == pytest.approx(asked(np.full(3, 0.02)).sigma_m(HORIZON_S), rel=1e-4)
+@pytest.mark.parametrize("power", [3.2, 3.7, 4.1])
+@pytest.mark.parametrize("ratio", [0.8, 1.0, 1.2, 1.5])
+def test_errors_of_another_age_do_not_make_it_smaller_than_it_is(power, ratio):
+    """They grow by powers of the age between Eq. (1)'s two, as on flights."""
+    at_age = asked(np.full(3, 0.02 * ratio ** (power / 2.0)), age_s=ratio * HORIZON_S).sigma_m(HORIZON_S)
+    assert (at_age >= 0.999 * asked(np.full(3, 0.02)).sigma_m(HORIZON_S)).all()
 
 
 def test_stronger_gusts_are_known_within_the_memory():
