@@ -45,7 +45,7 @@ SWING, SWING_RATE, BIAS, FORMATION = slice(9, 12), slice(12, 15), slice(15, 18),
 REST, GUST = slice(21, 24), slice(24, 27)
 CALIBRATION, RING, HARDWARE = slice(27, 34), slice(34, 50), slice(27, 50)
 ERRORS = 50  #: how many errors a belief has
-S, V, N, M, B, C, U, G = range(8)  #: rows of the state (8, 3)
+S, V, B = 0, 1, 4  #: rows of the state (8, 3), which are s v n m b c u g
 _MOVING = 27  # errors that move; those of calibration and ring do not
 
 
@@ -201,7 +201,10 @@ def _noise_added(P: Array, x: Array, dt: float, gyro2: float, drive2: float, oth
 
 @njit(cache=True, error_model="numpy")
 def _gust_noise_added(P: Array, dt: float, gust2: Array) -> None:
-    """The same of what drives g' of Eq. (1), to second order in dt."""
+    """Add to P, symmetric, what drives g' of Eq. (1) in a step dt: of g to first order in dt, and its share of v and m.
+
+    The shares of third order are left out: without the white drive of v and m, P would not stay a covariance.
+    """
     for i in range(3):
         g, half = 24 + i, 0.5 * gust2[i] * dt * dt
         P[g, g] += gust2[i] * dt

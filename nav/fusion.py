@@ -11,7 +11,7 @@ again, in whatever order frames arrive. The gate is what frame and belief cost t
 freedom an LED (six for a pose alone). Several refusals in a row are taken for a drogue that was struck or let go: the
 belief is widened before the next frame.
 
-Not modelled: contact (the drogue moves with the probe then, and white acceleration has to follow), a formation that
+Not modelled: contact (the drogue moves with the probe then, and what stands for gusts has to follow), a formation that
 turns or speeds up but by the walk of c.
 """
 

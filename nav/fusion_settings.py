@@ -62,7 +62,7 @@ class FusionSettings:
     #: is forgotten within fifty, so that what they say for the wrong one does not add up.
     evidence_share: float = 0.3
     evidence_memory: float = 0.98
-    #: A drogue that is struck or let go changes its velocity at once, which white acceleration does not foresee. After
+    #: A drogue that is struck or let go changes its velocity at once, which no gust does. After
     #: so many frames refused in a row the belief is widened: by the closure speed, its way over the refused frames, and
     #: some degrees of swing.
     refusals_until_doubt: int = 3
@@ -91,6 +91,9 @@ class FusionSettings:
         exists = ("tight", "loose")
         if self.coupling not in exists:
             raise DockairError("fusion.coupling", expected="one that exists", got=self.coupling, exists=exists)
+        if not self.gust_time_s > self.longest_step_s:
+            expected = f"a number above longest_step_s = {self.longest_step_s:g}"
+            raise DockairError("fusion.gust_time_s", expected=expected, got=self.gust_time_s)
 
 
 def taking_of(settings: FusionSettings, camera_rate_hz: float) -> Taking:

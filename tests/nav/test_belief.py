@@ -7,8 +7,8 @@ import pytest
 from scipy.stats import chi2 as chi2_law
 
 from dockair.calibration import Camera, LedRing, Mounting
-from dockair.nav.belief import Taking, corrected, felt_first, mixture, rolled, widened
-from dockair.nav.belief_motion import CALIBRATION, ERRORS, HARDWARE, REST, RING
+from dockair.nav.belief import Taking, begun_again, corrected, felt_first, mixture, rolled, widened
+from dockair.nav.belief_motion import BIAS, CALIBRATION, ERRORS, FORMATION, GUST, HARDWARE, PHI, REST, RING
 from dockair.nav.belief_sight import Belief, Sight, ring_sensitivity
 from dockair.nav.pose.difference import pose_difference
 from dockair.nav.pose.estimate import solve_pose
@@ -374,3 +374,20 @@ def test_evidence_that_is_the_same_in_every_frame_does_not_add_up():
     weighed = [first, replace(second, log_weight=-5.0)]
     ends = [corrected(weighed, pose, SIGHT, OPEN, Taking(memory=memory)).beliefs[1] for memory in (1.0, 0.5)]
     assert ends[1].log_weight - ends[0].log_weight == pytest.approx(2.5, abs=0.1)
+
+
+def test_a_drogue_that_is_seen_again_moves_as_at_the_start_and_the_rest_is_kept():
+    rng = np.random.default_rng(7)
+    root = rng.normal(size=(ERRORS, ERRORS))
+    lost = belief(root @ root.T)
+    lost.x[:] = rng.normal(size=(8, 3))
+    start = belief(np.diag(np.arange(1.0, ERRORS + 1.0)))
+    start.x[:] = rng.normal(size=(8, 3))
+    again = begun_again(lost, start, np.array([20.0, 1.0, -2.0]), 0.1)
+    moving, kept = np.r_[3:15, GUST], np.r_[BIAS, FORMATION, REST, HARDWARE]
+    assert np.array_equal(again.x, np.vstack([[20.0, 1.0, -2.0], start.x[1:4], lost.x[4:7], start.x[7:]]))
+    assert np.array_equal(again.P[np.ix_(moving, moving)], start.P[np.ix_(moving, moving)])
+    assert not again.P[np.ix_(moving, np.r_[PHI, kept])].any() and not again.P[np.ix_(np.r_[PHI, kept], moving)].any()
+    assert np.array_equal(again.P[np.ix_(kept, kept)], lost.P[np.ix_(kept, kept)])
+    assert again.P[PHI, PHI] == pytest.approx(lost.P[PHI, PHI] + 0.01 * np.eye(3))
+    assert np.array_equal(again.R_BD, lost.R_BD)

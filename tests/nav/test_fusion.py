@@ -530,12 +530,17 @@ def test_accelerometers_take_the_receiver_s_share_out_of_a_blind_second():
     assert with_them < 0.12 and without > 3.0 * with_them
 
 
+@pytest.mark.parametrize(
+    ("turning", "wider"),
+    [({"attitude_density": 0.01, "attitude_time_s": 1.5}, 1.5), ({}, 1.2)],
+    ids=["a drogue that hardly turns", "a drogue as flown"],
+)
 @pytest.mark.parametrize("saturated", [False, True], ids=["IMU silent", "gyro at its limit"])
-def test_while_the_gyro_is_out_the_covariance_is_that_of_a_missing_rate(saturated):
+def test_while_the_gyro_is_out_the_covariance_is_that_of_a_missing_rate(saturated, turning, wider):
     """0.3 s without a rate, frames going on, the receiver turning at 9 deg/s: still honest, and wider than with it."""
     limit = 4.0
     settings = replace(SETTINGS, held_rate_sigma_rad_s=0.1, held_rate_time_s=0.5)  # the world's 0.2 rad/s^2
-    settings = replace(settings, attitude_density=0.01, attitude_time_s=1.5)  # a drogue that hardly turns hides nothing
+    settings = replace(settings, **turning)
     values, sigmas = [], {True: [], False: []}
     for seed in range(8):
         for out in sigmas:
@@ -556,7 +561,7 @@ def test_while_the_gyro_is_out_the_covariance_is_that_of_a_missing_rate(saturate
             if out:
                 values.append(nees(e[:6], P[:6, :6]))
     assert np.mean(values) < chi2.ppf(1.0 - 1e-4, 6 * len(values)) / len(values)
-    assert np.mean(sigmas[True]) > 1.5 * np.mean(sigmas[False])
+    assert np.mean(sigmas[True]) > wider * np.mean(sigmas[False])
 
 
 def test_single_leds_hold_the_place_when_no_pose_can_be_had():
@@ -596,6 +601,12 @@ def test_single_leds_are_refused_by_the_gate_and_by_a_loose_filter():
         )
     with pytest.raises(DockairError, match="tight, loose"):
         FusionSettings(coupling="tigth")
+
+
+@pytest.mark.parametrize("gust_time_s", [0.0, -1.0, 0.005, float("nan")])
+def test_gusts_that_last_no_longer_than_a_step_are_refused(gust_time_s):
+    with pytest.raises(DockairError, match=r"fusion\.gust_time_s"):
+        FusionSettings(gust_time_s=gust_time_s)
 
 
 def test_second_frame_of_the_same_stamp_is_refused_and_changes_nothing():
