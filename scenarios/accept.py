@@ -1,16 +1,6 @@
 """What one flight, and what a campaign of many, must show for its scenario's claim to hold.
 
 Of a campaign's rows (one a flight: dockair/scenarios/campaign) a flight that crashed counts as flown without success.
-
-| key                        | of a campaign                                                                          |
-|----------------------------|----------------------------------------------------------------------------------------|
-| first_attempt_rate_min     | part of the flights whose first attempt ended in a contact inside the limits           |
-| success_rate_min           | part of the flights with such a contact in any of their attempts                       |
-| clean_rate_min             | part of the flights that ended in such a contact, or went away without touching        |
-| closure_rate_min           | part of the contacts whose speed lies between closure_speed_min_m_s and _max_m_s       |
-| radial_offset_median_max_m | median over the contacts                                                               |
-| unsafe_max                 | flights in which anything was unsafe, 0 if not said                                    |
-
 Where no rate is asked for, every flight has to show what one flight must.
 """
 
@@ -33,16 +23,18 @@ _UNTOUCHED = ("abort", "miss")  # outcomes of a flight that ended clear without 
 class Accept(Table):
     """What must be shown for the claim to hold; empty when the scenario claims nothing in figures."""
 
-    outcome: OutcomeName | None = None
-    radial_offset_max_m: float | None = Field(default=None, gt=0.0)
-    closure_speed_min_m_s: float | None = Field(default=None, ge=0.0)
-    closure_speed_max_m_s: float | None = Field(default=None, gt=0.0)
+    outcome: OutcomeName | None = None  #: of one flight
+    radial_offset_max_m: float | None = Field(default=None, gt=0.0)  #: of one flight's contact
+    closure_speed_min_m_s: float | None = Field(default=None, ge=0.0)  #: of a contact
+    closure_speed_max_m_s: float | None = Field(default=None, gt=0.0)  #: of a contact
+    #: Part of a campaign's flights whose first attempt ended in a contact inside the limits.
     first_attempt_rate_min: _Rate = None
-    success_rate_min: _Rate = None
+    success_rate_min: _Rate = None  #: part of the flights with such a contact in any of their attempts
+    #: Part of the flights that ended in such a contact, or went away without touching, with nothing unsafe.
     clean_rate_min: _Rate = None
-    closure_rate_min: _Rate = None
-    radial_offset_median_max_m: float | None = Field(default=None, gt=0.0)
-    unsafe_max: int = Field(default=0, ge=0)
+    closure_rate_min: _Rate = None  #: part of the contacts whose speed lies between the two closure speeds
+    radial_offset_median_max_m: float | None = Field(default=None, gt=0.0)  #: median over a campaign's contacts
+    unsafe_max: int = Field(default=0, ge=0)  #: flights of a campaign in which anything was unsafe
 
     @property
     def claims_figures(self) -> bool:

@@ -24,7 +24,7 @@ class Turbulence(Table):
     """Gusts. One of `sigma_m_s` and `intensity`; without either the air is still."""
 
     model: Literal["none", "dryden"] = "none"  #: "dryden" as soon as one of the others is given; "none" overrules them
-    sigma_m_s: float | None = Field(default=None, ge=0.0, le=15.0)
+    sigma_m_s: float | None = Field(default=None, ge=0.0, le=15.0)  #: standard deviation of each component of the gusts
     intensity: Literal["light", "moderate", "severe"] | None = None  #: MIL-F-8785C, at the flight's altitude
 
     @model_validator(mode="before")
@@ -62,13 +62,13 @@ class SingleGust(Table):
 class Wake(Table):
     """The tanker's wake; sheet `wake`."""
 
-    present: bool = True
+    present: bool = True  #: whether there is one
 
 
 class BowWave(Table):
     """The receiver's bow wave; sheet `bow_wave`."""
 
-    present: bool = True
+    present: bool = True  #: whether there is one
 
 
 Gusts = Annotated[

@@ -9,6 +9,7 @@ import errno
 import json
 import os
 import sys
+from dataclasses import asdict
 from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -90,14 +91,28 @@ def fly(
 
 @app.command()
 def scenarios(
-    name: Annotated[str | None, typer.Argument(metavar="[NAME]", help="What to show whole; without, the list.")] = None,
+    name: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="[NAME]", help="What to show whole; without, the list. With --keys a part of their names."
+        ),
+    ] = None,
+    keys: Annotated[bool, typer.Option("--keys", help="Show the keys that a scenario may set, and --set.")] = False,
     as_json: Json = False,
 ) -> None:
-    """List the library's scenarios, what each is there to show and what it is held to; or show one whole."""
+    """List the library's scenarios, what each is there to show and what it is held to; show one whole, or all keys."""
     from dockair.scenarios import library_output
+    from dockair.scenarios.cli_keys import scenario_keys
     from dockair.scenarios.scenario_file import scenario_names
     from dockair.scenarios.schema import load_scenario
 
+    if keys:
+        found = scenario_keys(name or "")
+        if as_json:
+            print_json({"keys": [asdict(key) for key in found]})
+        else:
+            library_output.show_keys(found)
+        return
     if name is not None:
         chosen = load_scenario(name)
         if as_json:

@@ -18,7 +18,7 @@ class Navigation(Table):
         str,
         Field(pattern=r"^(truth|[A-Za-z_][\w.]*:[A-Za-z_]\w*)$"),
         Expected('"truth" or "module:Class"'),
-    ] = OUR_NAVIGATOR
+    ] = OUR_NAVIGATOR  #: a class, from where one stands or installed; "truth" is perfect navigation
     heading: bool = False  #: it keeps the receiver's heading, too, by frames that it asks for (docs/heading.md)
     heading_every_s: float = Field(default=2.0, ge=0.5, le=5.0)  #: between two such frames
 
@@ -38,10 +38,10 @@ class Navigation(Table):
 class Guidance(Table):
     """How the receiver docks."""
 
-    controller: Literal["predictive", "pid"] = "predictive"
-    attempts_max: int = Field(default=3, ge=1, le=20)  #: 1: no retry
+    controller: Literal["predictive", "pid"] = "predictive"  #: "pid" is the baseline without foresight
+    attempts_max: int = Field(default=3, ge=1, le=20)  #: attempts in one flight; 1: no retry
     capture_radius_m: float = Field(default=0.12, gt=0.0, le=1.0)  #: predicted miss inside which it closes, at first
-    closure_speed_m_s: float = Field(default=1.2, ge=0.3, le=2.6)  #: 2.6 m/s (5 kt) is the service limit
-    hold_s: float = Field(default=5.0, ge=0.0, le=300.0)
+    closure_speed_m_s: float = Field(default=1.2, ge=0.3, le=2.6)  #: at contact; 2.6 m/s (5 kt) is the service limit
+    hold_s: float = Field(default=5.0, ge=0.0, le=300.0)  #: on the probe in the refuelling range, before disconnecting
     take_in_m: float = Field(default=1.5, ge=0.0, le=6.0)  #: hose pushed in before holding
     stabilise_s: float = Field(default=3.0, ge=0.0, le=60.0)  #: steady in pre-contact before closing

@@ -97,25 +97,26 @@ _Step = Annotated[float, Field(ge=-5000.0, le=5000.0)]  # deg/s
 class FaultTable(Table):
     """One fault. Which of the optional keys it must have, `kind` says."""
 
-    kind: FaultKind
-    start_s: float = Field(default=0.0, ge=0.0)
-    stop_s: float | None = Field(default=None, gt=0.0)
+    kind: FaultKind  #: what breaks
+    start_s: float = Field(default=0.0, ge=0.0)  #: when, in the flight
+    stop_s: float | None = Field(default=None, gt=0.0)  #: when it ends; without, it lasts to the end
     leds: Annotated[
         tuple[_Led, ...] | None, BeforeValidator(tuple_from_list), Expected("numbers of LEDs, from 0 to 7")
-    ] = None
-    factor: float | None = Field(default=None, ge=0.0, le=1.0)
-    frequency_hz: float | None = Field(default=None, gt=0.0, le=1e5)
+    ] = None  #: which LEDs; without, all
+    factor: float | None = Field(default=None, ge=0.0, le=1.0)  #: part of their intensity that is left
+    frequency_hz: float | None = Field(default=None, gt=0.0, le=1e5)  #: of the flicker
     duty: float | None = Field(default=None, ge=0.0, le=1.0)  #: part of a period in which the LED is bright
-    depth: float | None = Field(default=None, ge=0.0, le=1.0)  #: how much of its intensity is missing in the dark part
-    count: int | None = Field(default=None, ge=1, le=100_000)
+    depth: float | None = Field(default=None, ge=0.0, le=1.0)  #: how much is missing in the dark part; 1 if not given
+    count: int | None = Field(default=None, ge=1, le=100_000)  #: of white pixels
     cover: float | None = Field(default=None, ge=0.0, le=1.0)  #: part of the window under smudges
+    #: At which the exposure stays; also inside the limits of the sheet `exposure`.
     exposure_us: float | None = Field(default=None, gt=0.0, le=20_000.0)
     rate_deg_s: Annotated[
         tuple[_Step, _Step, _Step] | None,
         BeforeValidator(tuple_from_list),
         Expected("three numbers, each from -5000 to 5000"),
-    ] = None
-    limit_deg_s: float | None = Field(default=None, gt=0.0, le=5000.0)
+    ] = None  #: jump of the gyros' biases, IMU axes
+    limit_deg_s: float | None = Field(default=None, gt=0.0, le=5000.0)  #: range that is left to each gyro
 
     def check(self, where: str) -> None:
         """Refuse a table without a key that its kind must have, or with one that it cannot have.

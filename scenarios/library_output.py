@@ -1,10 +1,11 @@
-"""What `dockair scenarios` shows to people: the library with its claims and what each is held to, or one scenario."""
+"""What `dockair scenarios` shows: the library with its claims and what each is held to, one scenario, or keys."""
 
 from collections.abc import Sequence
 
 from rich.console import Console
 from rich.table import Table
 
+from dockair.scenarios.cli_keys import Key
 from dockair.scenarios.scenario_file import scenario_text
 from dockair.scenarios.schema import Scenario
 
@@ -17,6 +18,17 @@ def show_scenarios(scenarios: Sequence[Scenario]) -> None:
         table.add_column(heading)
     for scenario in scenarios:
         table.add_row(scenario.name, scenario.claim, scenario.accept.in_words)
+    Console(highlight=False, markup=False).print(table)
+
+
+def show_keys(keys: Sequence[Key]) -> None:
+    """Print keys that a scenario may set."""
+    table = Table(box=None, padding=(0, 1))
+    table.add_column("key", no_wrap=True)
+    for heading in ("default", "range", "meaning"):
+        table.add_column(heading)
+    for key in keys:
+        table.add_row(key.name, key.default, f"{key.range} {key.unit}".strip(), key.meaning)
     Console(highlight=False, markup=False).print(table)
 
 

@@ -14,7 +14,7 @@ class Sun(Table):
 
     present: bool = True  #: false: daylight from above, but no disc, glints or stray light; `weather.night` is dark
     azimuth_deg: float = Field(default=180.0, ge=-360.0, le=360.0)  #: 0 straight ahead, positive to the left
-    elevation_deg: float = Field(default=35.0, ge=-10.0, le=90.0)
+    elevation_deg: float = Field(default=35.0, ge=-10.0, le=90.0)  #: above the horizon
 
     @property
     def direction_W(self) -> Array | None:
@@ -39,7 +39,8 @@ class CameraOptions(Table):
     """How the camera is run and simulated."""
 
     sensing: Literal["frames", "measurements"] = "frames"  #: "measurements": no picture, LEDs with fitted errors
-    filter: Literal["long_pass", "band_pass"] = "long_pass"
-    exposure: Literal["auto", "fixed"] = "auto"  #: "fixed": sheet `exposure`, exposure_s
-    #: "analytic" is quicker and the same on every machine; "auto": MuJoCo's where the machine has OpenGL
+    filter: Literal["long_pass", "band_pass"] = "long_pass"  #: before the lens: sheet `filter_<name>`
+    exposure: Literal["auto", "fixed"] = "auto"  #: "auto": metered; "fixed": sheet `exposure`, exposure_s
+    #: How solids are drawn: "analytic" is quicker and the same on every machine; "auto": MuJoCo's where the machine has
+    #: OpenGL.
     background: Literal["auto", "mujoco", "analytic"] = "analytic"

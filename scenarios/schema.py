@@ -28,10 +28,10 @@ from dockair.scenarios.table import Table, tuple_from_list
 class Hardware(Table):
     """The receiver, the grade of its IMU; calibration sheets of one's own, as paths from the scenario's file."""
 
-    airframe: Literal["fighter", "unmanned"] = "fighter"
-    imu: Literal["tactical", "mti", "consumer"] = "mti"
-    camera: str | None = None
-    ring: str | None = None
+    airframe: Literal["fighter", "unmanned"] = "fighter"  #: the receiver's; "unmanned" is meant for 120 m/s and 3000 m
+    imu: Literal["tactical", "mti", "consumer"] = "mti"  #: grade of the IMU: sheet `imu_<grade>`
+    camera: str | None = None  #: calibration sheet of a camera of one's own
+    ring: str | None = None  #: the same of a ring of LEDs
 
     @model_validator(mode="after")
     def _exist(self) -> Self:
@@ -48,9 +48,10 @@ class Hardware(Table):
 class Scenario(Table):
     """One flight as data."""
 
+    #: Of the scenario, and of the folder that its flights are written to.
     name: Annotated[str, Field(pattern=r"^\w[\w.-]*$"), Expected("a name of letters, digits, _ . -")]
     claim: str = ""  #: the sentence that the flight is there to show
-    seed: int = Field(default=0, ge=0, le=2**63 - 1)
+    seed: int = Field(default=0, ge=0, le=2**63 - 1)  #: of every random stream, where `--seed` says no other
     flight: FlightConditions = FlightConditions()
     tanker: Tanker = Tanker()
     rates: Rates = Rates()

@@ -304,6 +304,16 @@ def test_the_library_is_listed_with_its_claims(command):
     assert all(name in out for name in listed)
 
 
+def test_the_keys_are_listed_all_or_those_with_a_part_of_their_name(command):
+    status, out, _ = command("scenarios", "--keys", "--json")
+    assert status == 0
+    assert len(json.loads(out)["keys"]) > 60
+    status, out, _ = command("scenarios", "--keys", "elevation", "--json")
+    assert [key["name"] for key in json.loads(out)["keys"]] == ["sun.elevation_deg"]
+    status, out, _ = command("scenarios", "--keys", "elevation")
+    assert status == 0 and "sun.elevation_deg" in out and "-10 to 90 deg" in out
+
+
 def test_help_and_version_need_no_command(command):
     status, out, _ = command()
     assert status == 0
