@@ -68,7 +68,7 @@ def bench_world() -> dict[str, Any]:
 def _bare_step(world: World) -> Callable[[], None]:
     """A step of MuJoCo alone, contacts looked for, from where the world is, under the forces of now."""
     model = copy.copy(world.model)
-    model.opt.disableflags &= ~mujoco.mjtDisableBit.mjDSBL_CONTACT
+    model.opt.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
     data = mujoco.MjData(model)
     state = mujoco.mjtState.mjSTATE_INTEGRATION
     here = np.empty(mujoco.mj_stateSize(model, state))

@@ -42,11 +42,11 @@ def import_by_name(name: str) -> Any:
     except (ImportError, AttributeError, ValueError) as error:
         raise DockairError(name, expected=expected, got=str(error)) from None
     except (Exception, SystemExit) as error:  # somebody's own module may raise anything, and may end the process
-        raise DockairError(name, expected=expected, got=_said(error)) from error
+        raise DockairError(name, expected=expected, got=said_by(error)) from error
     return found
 
 
-def _said(error: BaseException) -> str:
+def said_by(error: BaseException) -> str:
     """Return what an exception says, and where it was raised, in one line."""
     said = " ".join(f"{type(error).__name__}: {error}".split())
     if isinstance(error, SyntaxError):  # it names the place itself

@@ -35,7 +35,8 @@ from dockair.calibration import NavigationSheets
 from dockair.errors import DockairError, MachineError
 from dockair.messages import CameraFrame, ImuSample, Navigates, NavSolution, TankerAnnouncement, Window
 from dockair.rotations import Array
-from dockair.scenarios.exact_json import decode, encode, import_by_name
+from dockair.scenarios.exact_json import decode, encode, said_by
+from dockair.scenarios.plug_in import navigator_class_of
 
 QUEUE_TICKS = 200  # ticks waiting for the encoder; at 50 frames/s of 2.2 MB full frames at most 220 MB
 ROW_GROUP_TICKS = 100
@@ -70,10 +71,20 @@ class NavigatorRecipe:
     settings: Any = None  #: second argument of the constructor; None leaves it to the class
 
     def build(self) -> Navigates:
-        """Return a new navigator in its first state."""
-        navigator_class = import_by_name(self.class_name)
-        made = navigator_class(self.sheets) if self.settings is None else navigator_class(self.sheets, self.settings)
-        return made  # type: ignore[no-any-return]
+        """Return a new navigator in its first state.
+
+        Raises:
+            DockairError: no such class, it is no navigator, or its constructor raises an exception.
+        """
+        given = (self.sheets,) if self.settings is None else (self.sheets, self.settings)
+        navigator_class = navigator_class_of(self.class_name)
+        try:
+            return navigator_class(*given)
+        except DockairError:
+            raise
+        except Exception as error:  # somebody's own code
+            expected = "a navigator that can be made of the sheets"
+            raise DockairError(self.class_name, expected=expected, got=said_by(error)) from error
 
     def write(self, out_dir: Path) -> None:
         """Write `navigator.json`."""

@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from dockair.errors import DockairError
 from dockair.scenarios.cli_options import Json, print_json
 
 
@@ -22,9 +23,12 @@ def report(
     from dockair.scenarios.report.folders import read_campaigns
     from dockair.scenarios.report.page import page, write_text
 
+    out = out or folders[0] / "report.html"
+    if evidence is not None and evidence.resolve() == out.resolve():
+        raise DockairError(f"--evidence {evidence}", expected="a file of its own", got="the page's")
     campaigns = read_campaigns(folders)
     title = title or ", ".join(campaign.name for campaign in campaigns)
-    path = write_text(page(title, campaigns), out or folders[0] / "report.html")
+    path = write_text(page(title, campaigns), out)
     found = table.evidence_of(campaigns)
     if evidence is not None:
         write_text(table.as_text(found), evidence)

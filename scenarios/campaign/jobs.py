@@ -229,9 +229,9 @@ def _refuse_twins(source: PlanFile, jobs: Sequence[Job]) -> None:
 
 
 def _require_navigator(source: PlanFile, name: str) -> None:
-    from dockair.scenarios.exact_json import import_by_name
+    from dockair.scenarios.plug_in import navigator_class_of
 
     try:
-        import_by_name(name)
+        navigator_class_of(name)
     except DockairError as error:
         raise DockairError(source.place("navigation.navigator"), expected=error.expected, got=error.got) from None

@@ -105,12 +105,15 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     """
     path = folder / FILE_NAME
     try:
-        table: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        table: Any = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise DockairError(str(path), expected="the manifest of a campaign", got=error.strerror) from None
     except ValueError as error:
         raise DockairError(str(path), expected="the manifest of a campaign", got=str(error)) from None
-    return table
+    plan = table.get("plan") if isinstance(table, dict) else None
+    if not isinstance(plan, dict) or "name" not in plan:
+        raise DockairError(str(path), expected="the manifest of a campaign", got="no plan with a name in it")
+    return dict(table)
 
 
 def commit_of_the_code() -> tuple[str | None, bool | None]:

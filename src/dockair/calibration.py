@@ -34,7 +34,9 @@ def _from_toml(cls: type[Any], path: str | Path) -> Any:
         raise DockairError(str(path), expected="a calibration file", got="no such file")
     try:
         table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except tomllib.TOMLDecodeError as error:
+    except OSError as error:
+        raise DockairError(str(path), expected="a file that can be read", got=str(error.strerror)) from None
+    except ValueError as error:  # no TOML, or not even UTF-8
         raise DockairError(str(path), expected="TOML", got=str(error)) from None
     names = [f.name for f in fields(cls)]
     unknown = sorted(set(table) - set(names))
@@ -233,7 +235,7 @@ class StartGeometry:
     """Nominal pre-contact geometry and how far it may be off: all that the navigation knows before its first frame."""
 
     p_PD_B: Array  #: (3,) drogue ring centre from the probe's tip, body axes [m]
-    sigma_p_m: Array  #: (3,) its standard deviation
+    sigma_p_m: Array  #: (3,) its standard deviation, body axes [m]
     R_BD: Array  #: (3, 3) drogue axes in body axes
     sigma_R_rad: Array  #: (3,) standard deviation of the attitude that it returns to, about each axis
 

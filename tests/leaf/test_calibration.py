@@ -172,6 +172,13 @@ def test_wrong_sheet_is_refused_with_its_path(tmp_path, text, got):
     assert got is None or (error.value.got == got and "diameter_m" in error.value.exists)
 
 
+def test_a_sheet_that_is_no_text_is_refused_with_its_path(tmp_path):
+    file = tmp_path / "camera.toml"
+    file.write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(DockairError, match=r"camera.toml: expected TOML, got .*utf-8"):
+        Camera.from_toml(file)
+
+
 def test_missing_sheet_is_refused_with_its_path(tmp_path):
     with pytest.raises(DockairError, match="no such file"):
         Camera.from_toml(tmp_path / "nothing.toml")

@@ -63,3 +63,13 @@ def test_identification_is_timed_on_forty_candidates_of_which_eight_are_a_ring()
     found = identify(points, camera=Camera())
     assert found.status.name == "FOUND"
     assert len(found.members) == 8
+
+
+def test_the_world_bench_times_mujoco_and_every_part_of_ours(monkeypatch):
+    from dockair.scenarios import bench_world as bench_of_world
+
+    for name in ("_SETTLE_TICKS", "_ROUNDS", "_TICKS", "_WARM_TICKS"):
+        monkeypatch.setattr(bench_of_world, name, 2)
+    figures = bench_of_world.bench_world()
+    assert set(bench_of_world._PARTS) < set(figures["microseconds"])
+    assert all(value > 0.0 for values in figures.values() for value in values.values())

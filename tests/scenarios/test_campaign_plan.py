@@ -253,6 +253,10 @@ def test_every_packaged_plan_can_be_flown_and_says_what_for(name):
             'navigation.navigator: expected an importable "module:Class"',
         ),
         (
+            'scenarios = ["default"]\n[set]\n"navigation.navigator" = "os:path"',
+            "navigation.navigator: expected a class that is made of (sheets) and has step(imu, frame)",
+        ),
+        (
             'scenarios = ["default"]\n[set]\n"start.aft_m" = 2020-01-01',
             "p.toml: set.start.aft_m: expected a number, a text, true or false, a list or a table, got '2020-01-01'",
         ),

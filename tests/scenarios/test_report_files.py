@@ -114,3 +114,21 @@ def test_a_link_stays_a_link_and_a_pipe_a_pipe(tmp_path):
     assert os.read(reader, 10) == b"text"
     os.close(reader)
     assert stat.S_ISFIFO((tmp_path / "pipe").stat().st_mode)
+
+
+def test_a_page_and_its_evidence_are_two_files(campaign, tmp_path, monkeypatch, capsys):
+    folder = campaign("a")
+    monkeypatch.setattr(sys, "argv", ["dockair", "report", str(folder), "--evidence", f"{tmp_path}/a/../a/report.html"])
+    with pytest.raises(SystemExit) as ended:
+        cli.main()
+    assert ended.value.code == 2
+    assert "expected a file of its own, got" in capsys.readouterr().err
+    assert not (folder / "report.html").exists()
+
+
+@pytest.mark.parametrize("text", ["{}", "[]", '{"plan": {}}', '{"plan": null}', '{"plan": "levels"}'])
+def test_a_manifest_without_a_plan_is_refused(campaign, text):
+    folder = campaign("a")
+    (folder / manifest.FILE_NAME).write_text(text)
+    with pytest.raises(DockairError, match=r"manifest.json: expected the manifest of a campaign, got 'no plan"):
+        read_campaigns([folder])

@@ -34,6 +34,15 @@ def test_an_unknown_id_is_refused_with_those_that_exist():
         registry.reproduce("sensor")
 
 
+def test_a_folder_that_cannot_be_made_is_refused_before_anything_is_reckoned(tmp_path, monkeypatch):
+    monkeypatch.setitem(registry._REPRODUCTIONS, "made/up", ("", pytest.fail))
+    file = tmp_path / "file"
+    file.touch()
+    for out in (file, file / "inside"):
+        with pytest.raises(DockairError, match=f"--out {out}: expected a folder that can be made, got "):
+            registry.reproduce("made/up", out)
+
+
 def test_sunlight_in_the_camera_band_is_the_standards(band):
     rows = _rows(band, "sunlight")
     assert [row["case"] for row in rows][:2] == ["sunlight, 800-1000 nm", "sunlight, 840-860 nm"]
