@@ -19,9 +19,9 @@ class Sight:
 class Wanted:
     """Where to be: at a distance, or closing."""
 
-    distance_m: float | None  #: behind `Sight.place_m`; None: close
+    distance_m: float | None  #: tip behind the ring centre; None: close
     speed_m_s: float  #: closing, or the most to go to the distance with
-    aim_m: Array  #: (2,) off the place, left and up
+    aim_m: Array  #: (2,) where the tip is to go, off the ring centre, left and up in stabilised axes
     patient: bool = False  #: across, with a share of the limits
     must_follow: bool = False  #: a swing, too, that is more than the receiver can bear
     to_contact_s: float | None = None  #: until the tip is at the place, where it can no longer be called back
@@ -74,11 +74,20 @@ class Controller(Protocol):
         ...
 
     def error_to_come(self, aim_m: Array) -> Array:
-        """(2,) off the drogue across, when what has been commanded has been flown."""
+        """(2,) from the tip to where it is to go, left and up [m], when what has been commanded has been flown.
+
+        Args:
+            aim_m: (2,) that of `Wanted`.
+        """
         ...
 
     def rate(self, u: Array, wanted: Wanted) -> Array:
-        """(3,) du/dt of the commanded velocity u (3,) [m/s^2]."""
+        """(3,) du/dt of the commanded velocity [m/s^2], stabilised axes forward, left, up.
+
+        Args:
+            u: (3,) velocity commanded now, beyond the trim flight path [m/s], in the same axes.
+            wanted: where to be.
+        """
         ...
 
 

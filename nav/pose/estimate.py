@@ -162,9 +162,14 @@ def solve_pose(
         camera: calibration, distortion included.
         sigma_px: standard deviation of a pixel coordinate, one for all or (n,).
         method: "lm" (Levenberg-Marquardt), or for the reproductions the source's "glsdc", "levenberg" or "gradient".
-        initial: start (R_CD, p_CD); without it and a prior at least four LEDs must be seen, with one of them three.
+        initial: start (R_CD (3, 3), p_CD (3,) [m]); without it and a prior at least four LEDs must be seen, with one of
+            them three.
         prior: what is known beside, used as a measurement, and as start if there is no other; for "lm".
         options: residuals, weight, loss, and whether the mirror image is looked for.
+
+    Returns:
+        Pose of the drogue in camera axes with its covariance (6, 6) [rad, m]. `status` says whether there is one: LEDs
+        that allow none raise nothing, and leave NaN.
 
     Raises:
         DockairError: wrong shapes, unknown method, sigma not positive, a start that is not finite.

@@ -9,7 +9,9 @@
 | NavSolution     | nav        | loop, log, gymnasium| control rate    | B, C  |
 | TankerAnnouncement | sim tanker | nav, if it listens | before a change |    |
 
-A test freezes the fields of the two sensor messages: no LED index, visibility, pose or gust may ever enter them.
+A test freezes the fields of the two sensor messages: no LED index, visibility, pose or gust may ever enter them. All
+stamps and times are on one clock, that of the flight. Pixels are (u, v), u to the right and v down, counted on the full
+sensor.
 """
 
 from collections.abc import Sequence
@@ -64,7 +66,7 @@ class LedObservation:
 
     time_stamp_s: float  #: of the frame
     led_numbers: NDArray[np.int64]  #: (n,) which LED of the sheet's ring each is; n may be 0
-    centroids_px: Array  #: (n, 2) full-frame coordinates
+    centroids_px: Array  #: (n, 2) pixels (u, v), full-frame coordinates
     sigma_px: Array  #: (n,) standard deviation of each coordinate
 
 
@@ -88,17 +90,21 @@ class NavSolution:
 
     time_stamp_s: float
     valid: bool
-    phase: str  #: name of the docking phase
+    #: Name of the docking phase. On these names the loop acts, whoever navigates: "clear" ends the flight; "approach"
+    #: begins an attempt, which goes on in "approach" and "contact"; any other ends it, "breakaway" as a breakaway.
+    phase: str
     status: str  #: outcome of the last frame: what the pose solver or the stage before it said
     p_PD_B: Array  #: (3,) drogue ring centre from the probe's tip, body axes [m]
-    v_PD_B: Array  #: (3,) its velocity relative to the receiver, body axes [m/s]
+    #: (3,) velocity of the ring centre less that of the probe's tip, body axes, not seen from turning axes [m/s]:
+    #: d/dt of p_PD_B is v_PD_B - w_WB_B x p_PD_B.
+    v_PD_B: Array
     R_BD: Array  #: (3, 3) drogue axes in body axes
     covariance: Array  #: (9, 9) of (phi, p_PD_B, v_PD_B): R_BD <- exp(phi) R_BD [rad, m, m/s]
     command: ReceiverCommand
     window: Window | None  #: what the camera should read next; None for the full frame
     frame_time_stamp_s: float  #: stamp of the newest frame used, NaN before the first
-    candidates_px: Array  #: (n, 2) centroids of the newest frame, full-frame coordinates
-    led_pixels_px: Array  #: (8, 2) where each LED was seen; NaN where it was not
+    candidates_px: Array  #: (n, 2) centroids (u, v) of the newest frame, full-frame coordinates
+    led_pixels_px: Array  #: (8, 2) pixels (u, v) where each LED was seen, full-frame coordinates; NaN where it was not
     contact_usable: bool = True  #: whether contact may be flown on it, as far as the navigation's integrity can tell
     phase_reason: str = ""  #: why the present phase was entered
     exposure_s: float = float("nan")  #: asked of the camera for its next frame; NaN: what it sets itself
@@ -111,7 +117,7 @@ class TankerAnnouncement:
     """What the tanker says by radio that it is about to do: from one steady flight to another. Not quite exact."""
 
     time_stamp_s: float  #: when it was said
-    starts_s: float
+    starts_s: float  #: when it begins, on the clock of `time_stamp_s`
     entry_s: float  #: from its start until the new steady flight
     turn_rate_rad_s: float  #: of the heading then, positive to the left
     climb_rad: float  #: of the way through the air then
@@ -120,12 +126,16 @@ class TankerAnnouncement:
 class Navigates(Protocol):
     """Anything that can stand where `nav.navigator.Navigator` stands; a scenario may name any such class.
 
-    One that has a method `announce(TankerAnnouncement)` is told of the tanker's changes, before the tick's `step`.
+    It is made once a flight, of nothing but `calibration.NavigationSheets`: `Class(sheets)`. One that has a method
+    `announce(TankerAnnouncement)` is told of the tanker's changes, before the tick's `step`.
     """
 
     def step(self, imu: Sequence[ImuSample], frame: CameraFrame | None) -> NavSolution:
         """Take what arrived since the last control tick; return what is believed and commanded now.
 
-        One whose scenario senses by measurements gets a `LedObservation` in place of the frame.
+        Args:
+            imu: the samples, oldest first; none while the IMU has dropped out.
+            frame: the one that arrived, None if none did; in a scenario with `camera.sensing = "measurements"` always a
+                `LedObservation` in place of a `CameraFrame`.
         """
         ...
