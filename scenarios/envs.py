@@ -8,10 +8,10 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
-from dockair.errors import DockairError
+from dockair.errors import DockairError, check_choice
 from dockair.messages import CameraFrame
 from dockair.rotations import Array
-from dockair.scenarios.envs_episode import Episodes, check_choice
+from dockair.scenarios.envs_episode import Episodes
 from dockair.scenarios.envs_picture import PICTURE, pooled_picture
 from dockair.scenarios.envs_tables import (
     ACTION,

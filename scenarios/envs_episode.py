@@ -14,7 +14,7 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
-from dockair.errors import DockairError
+from dockair.errors import DockairError, check_choice, check_integer
 from dockair.messages import ImuSample, ReceiverCommand
 from dockair.scenarios.attempts import succeeded
 from dockair.scenarios.envs_judge import AttemptJudge
@@ -236,17 +236,3 @@ class Episodes(gymnasium.Env[Obs, NDArray[np.float32]], Generic[Obs]):
     def _docked_well(self) -> bool:
         assert self._flight is not None and self._tick is not None
         return succeeded(self._flight.referee.attempt_log(self._tick.truth.time_s, self._outcome))
-
-
-def check_integer(name: str, value: Any, least: int) -> int:
-    """Return a whole number as an int; refuse what is none, or less than the least."""
-    if isinstance(value, (int, np.integer)) and not isinstance(value, bool) and value >= least:
-        return int(value)
-    raise DockairError(name, expected=f"an integer from {least} on", got=value)
-
-
-def check_choice(name: str, value: str | None, exists: tuple[str | None, ...]) -> None:
-    """Refuse a value that is none of those that exist."""
-    if value not in exists:
-        expected = "None or one of" if None in exists else "one of"
-        raise DockairError(name, expected=expected, got=value, exists=[one for one in exists if one is not None])

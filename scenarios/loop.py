@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from dockair.errors import DockairError, check_integer
 from dockair.messages import ImuSample, NavSolution, ReceiverCommand, TankerAnnouncement
 from dockair.scenarios.attempts import RefereeLimits
 from dockair.scenarios.build import build
@@ -171,8 +172,14 @@ def fly(
             "none" keeps no frame.
         progress: called at every control tick.
         overlap: let the camera work in a process of its own where it can, unless other flights use the cores.
+
+    Raises:
+        DockairError: no scenario, a seed that is no whole number from 0 on, hardware or a navigator that cannot be.
     """
-    seed = scenario.seed if seed is None else seed
+    if not isinstance(scenario, Scenario):
+        expected = "a Scenario, as load_scenario(name) returns it"
+        raise DockairError("fly: scenario", expected=expected, got=type(scenario).__name__)
+    seed = scenario.seed if seed is None else check_integer("fly: seed", seed, 0)
     begun = time.perf_counter()
     flight = Flight(scenario, seed, full_frames=record == "full", overlap=overlap)
     try:

@@ -127,6 +127,12 @@ def load_scenario(name_or_path: str | Path, overrides: Mapping[str, object] | No
     Raises:
         DockairError: no such scenario; not TOML; unknown key, wrong type or value out of range.
     """
+    if not isinstance(name_or_path, (str, Path)):
+        expected = "a name in the library, or the path of a TOML file"
+        raise DockairError("load_scenario: name_or_path", expected=expected, got=type(name_or_path).__name__)
+    if overrides is not None and not isinstance(overrides, Mapping):
+        expected = "a mapping of dotted keys to values"
+        raise DockairError("load_scenario: overrides", expected=expected, got=type(overrides).__name__)
     source = ScenarioFile(name_or_path, overrides or {})
     try:
         return Scenario.model_validate(source.table)

@@ -60,12 +60,13 @@ def remove_results(folder: Path) -> None:
         (folder / name).unlink(missing_ok=True)
 
 
-def rows_of(folder: Path) -> list[dict[str, object]]:
+def rows_of(folder: str | Path) -> list[dict[str, object]]:
     """Return the rows of a campaign, of one that is not over those that are done, in the order in which they were.
 
     Raises:
         DockairError: there is no campaign.
     """
+    folder = Path(folder)
     if (folder / table.FILE_NAME).is_file():
         return table.read_table(folder)
     path = folder / journal.FILE_NAME

@@ -1,6 +1,8 @@
 """What a person can do wrong, said in one line: where, what was expected, what was got, what exists."""
 
 from collections.abc import Iterable
+from numbers import Integral
+from typing import Any
 
 
 class DockairError(Exception):
@@ -43,3 +45,17 @@ class MachineError(DockairError):
         super().__init__(where, expected=expected)
         if remedy:
             self.args = (f"{self}; {remedy}",)
+
+
+def check_integer(name: str, value: Any, least: int) -> int:
+    """Return a whole number, numpy's too, as an int; refuse what is none, or less than the least."""
+    if not isinstance(value, bool) and isinstance(value, Integral) and int(value) >= least:
+        return int(value)
+    raise DockairError(name, expected=f"an integer from {least} on", got=value)
+
+
+def check_choice(name: str, value: str | None, exists: tuple[str | None, ...]) -> None:
+    """Refuse a value that is none of those that exist."""
+    if value not in exists:
+        expected = "None or one of" if None in exists else "one of"
+        raise DockairError(name, expected=expected, got=value, exists=[one for one in exists if one is not None])
