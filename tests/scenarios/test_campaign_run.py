@@ -256,17 +256,24 @@ def test_the_digest_of_the_code_is_of_what_decides_flights(tmp_path, monkeypatch
     assert (digests[0] != digests[1]) is counts
 
 
+#: Never flown: all flights here are made up.
+NAVIGATOR = """class Mine:
+    def __init__(self, sheets): ...
+    def step(self, imu, frame): ...
+"""
+
+
 @pytest.fixture
 def own_navigator(fakes, monkeypatch):
     """A module and a package with a navigator each; returns their folder."""
     folder = fakes.parent / "modules"
     (folder / "my_package/parts").mkdir(parents=True)
     files = {
-        "my_module.py": "class Mine:\n    pass\n",
+        "my_module.py": NAVIGATOR,
         "my_package/__init__.py": "",
         "my_package/gains.py": "gain = 1\n",
     }
-    files |= {"my_package/parts/__init__.py": "", "my_package/parts/navigator.py": "class Mine:\n    pass\n"}
+    files |= {"my_package/parts/__init__.py": "", "my_package/parts/navigator.py": NAVIGATOR}
     for name, text in files.items():
         (folder / name).write_text(text)
     importlib.invalidate_caches()
@@ -306,7 +313,7 @@ def test_a_navigator_of_ones_own_is_part_of_the_code(here, own_navigator, tmp_pa
 def test_another_navigator_may_come_and_one_that_has_not_flown_may_change(here, own_navigator, tmp_path):
     fly(plan(tmp_path, 2, scenarios='"truth_navigation"'), tmp_path / "out")
     both = f'"truth_navigation", {flown_by("my_module:Mine")}'
-    (own_navigator / "my_module.py").write_text("class Mine:\n    gain = 2\n")
+    (own_navigator / "my_module.py").write_text(NAVIGATOR + "    gain = 2\n")
     assert len(fly(plan(tmp_path, 2, scenarios=both), tmp_path / "out").rows) == 4
     assert list(read_manifest(tmp_path / "out")["plug_ins"]) == ["my_module"]
 
@@ -325,7 +332,7 @@ def test_code_that_changes_meanwhile_ends_the_campaign_and_restored_goes_on(here
 
     def edited(job):
         if job.seed == 2:
-            path.write_text(as_it_was.replace("pass", "halt"))  # as long as before
+            path.write_text(as_it_was.replace("imu", "IMU"))  # as long as before
         return quick(job)
 
     monkeypatch.setattr(fake_flights, "quick", edited)
