@@ -25,6 +25,7 @@ UNITS = {"rad/s": 1.0, "deg/s": float(np.pi / 180.0)}  #: in rad/s
 _NAMED = {"rad/s": re.compile(r"rad[/_]s(?![a-z])"), "deg/s": re.compile(r"deg[/_]s(?![a-z])")}
 _SHEET = "imu_mti"  # whose keys, units and ranges are written
 _LONG = 10.0  # correlation times that a record should last for B and K to be told apart
+_OPTIONS = {"sample_rate_hz": "--rate-hz", "bias_correlation_s": "--bias-correlation-s", "terms": "--terms"}
 _SUFFIXES = (".csv", ".txt", ".npy")
 _DEG_H = 3600.0 * 180.0 / np.pi  # in a rad/s
 
@@ -97,7 +98,11 @@ def report(
         DockairError: a file, unit, rate or term that cannot be; a record that is too short or not finite.
     """
     rates = read_record(path, unit)
-    noise = identify_gyro_noise(rates, rate_hz, bias_correlation_s=bias_correlation_s, terms=terms)
+    try:
+        noise = identify_gyro_noise(rates, rate_hz, bias_correlation_s=bias_correlation_s, terms=terms)
+    except DockairError as error:
+        where = str(path) if error.where == "rates" else _OPTIONS.get(error.where, error.where)
+        raise DockairError(where, expected=error.expected, got=error.got, exists=error.exists) from None
     range_s, T = read_sheet(_SHEET)["gyro_bias_correlation_s"], noise.bias_correlation_s
     dropped_s = T if T < range_s.low or T > range_s.high else float("nan")  # no in-run bias that a sheet could hold
     if np.isfinite(dropped_s) and terms != "B":

@@ -22,7 +22,7 @@ from dockair.parameters import load_parameters
 from dockair.rotations import Array, matrix_from_yaw_pitch_roll
 from dockair.scenarios import build_receiver
 from dockair.scenarios.build_air import air_motion
-from dockair.scenarios.build_measured import measured_leds
+from dockair.scenarios.build_measured import measured_leds, refuse_unmodelled
 from dockair.scenarios.exact_json import name_of
 from dockair.scenarios.measured_leds import MeasuredLeds
 from dockair.scenarios.message_log import NavigatorRecipe
@@ -122,7 +122,7 @@ def build(scenario: Scenario, seed: int) -> Parts:
     """
     clock = Clock(scenario.rates.physics_hz)
     air = standard_atmosphere(scenario.flight.altitude_m)
-    mounting = _sheet(scenario, scenario.hardware.receiver_sheet("mounting"), MountingParameters).mounting()
+    mounting = _mounting(scenario)
     airframe = build_receiver.airframe(scenario, scenario.parameters)
     receiver = Receiver(
         airframe=airframe,
@@ -185,6 +185,16 @@ def build(scenario: Scenario, seed: int) -> Parts:
     )
 
 
+def require_measurable(scenario: Scenario) -> None:
+    """Refuse, before anything is built, what measurements without a picture would silently leave out.
+
+    Raises:
+        DockairError: the scenario has something that acts through the picture alone.
+    """
+    camera = scenario.hardware.camera
+    refuse_unmodelled(scenario, Camera() if camera is None else Camera.from_toml(camera), _mounting(scenario))
+
+
 def guidance_settings(scenario: Scenario) -> GuidanceSettings:
     """Return the guidance that the scenario asks for, with what the nominal sheets say of the receiver."""
     g, duration_s = scenario.guidance, scenario.flight.duration_s
@@ -231,6 +241,10 @@ def _commanded(limits: Array) -> tuple[float, float, float]:
 
 def _sheet(scenario: Scenario, name: str, cls: type[T]) -> T:
     return load_parameters(name, cls, scenario.parameters.get(name))
+
+
+def _mounting(scenario: Scenario) -> Mounting:
+    return _sheet(scenario, scenario.hardware.receiver_sheet("mounting"), MountingParameters).mounting()
 
 
 def _world_parameters(scenario: Scenario, air: Air, mounting: Mounting) -> WorldParameters:

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from dockair.calibration import Camera, Mounting
 from dockair.errors import DockairError
 from dockair.parameters import load_parameters
 from dockair.scenarios.measured_leds import MeasuredLeds, MeasurementParameters
@@ -25,7 +26,7 @@ def measured_leds(scenario: Scenario, seed: int, as_built: AsBuilt, faults: Faul
     Raises:
         DockairError: the scenario has something that acts through the picture alone.
     """
-    refuse_unmodelled(scenario, as_built)
+    refuse_unmodelled(scenario, as_built.camera, as_built.mounting)
     sheets, noise = CameraSheets.load(scenario.camera.filter, scenario.parameters), CameraNoise.of(seed)
     return MeasuredLeds(
         load_parameters(SHEET, MeasurementParameters, scenario.parameters.get(SHEET)),
@@ -42,12 +43,18 @@ def measured_leds(scenario: Scenario, seed: int, as_built: AsBuilt, faults: Faul
     )
 
 
-def refuse_unmodelled(scenario: Scenario, as_built: AsBuilt) -> None:
-    """Refuse what measurements without a picture would silently leave out."""
+def refuse_unmodelled(scenario: Scenario, camera: Camera, mounting: Mounting) -> None:
+    """Refuse what measurements without a picture would silently leave out.
+
+    Args:
+        scenario: that is to be flown so.
+        camera: as it was built, or nominal before anything is built.
+        mounting: of the camera, likewise.
+    """
     reasons = {
         "hot pixels": any(table.kind == "hot_pixels" for table in scenario.faults),
         "clouds": scenario.weather.cloud_cover > 0.0,
-        "the Sun in the camera's field": _sun_in_field(scenario, as_built),
+        "the Sun in the camera's field": _sun_in_field(scenario, camera, mounting),
     }
     for reason, holds in reasons.items():
         if holds:
@@ -55,10 +62,10 @@ def refuse_unmodelled(scenario: Scenario, as_built: AsBuilt) -> None:
             raise DockairError("camera.sensing", expected=expected, got="measurements")
 
 
-def _sun_in_field(scenario: Scenario, as_built: AsBuilt) -> bool:
-    camera, sun_W = as_built.camera, scenario.sun_W
+def _sun_in_field(scenario: Scenario, camera: Camera, mounting: Mounting) -> bool:
+    sun_W = scenario.sun_W
     if sun_W is None:
         return False
     half_px = 0.5 * np.hypot(camera.width_px, camera.height_px)
     half_field = float(np.arctan(half_px / camera.focal_length_px)) + _ATTITUDE_RAD
-    return bool(sun_W @ as_built.mounting.R_BC[:, 0] > np.cos(half_field))
+    return bool(sun_W @ mounting.R_BC[:, 0] > np.cos(half_field))

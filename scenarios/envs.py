@@ -8,9 +8,10 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
-from dockair.errors import DockairError, check_choice
+from dockair.errors import check_choice
 from dockair.messages import CameraFrame
 from dockair.rotations import Array
+from dockair.scenarios.build import require_measurable
 from dockair.scenarios.envs_episode import Episodes
 from dockair.scenarios.envs_picture import PICTURE, pooled_picture
 from dockair.scenarios.envs_tables import (
@@ -49,6 +50,12 @@ class DockFastEnv(DockEnv):
 
     sensing = "measurements"
 
+    def chosen_scenario(self, options: Mapping[str, Any]) -> Scenario:
+        """As of `Episodes`, and one in which nothing acts through the picture alone."""
+        scenario = super().chosen_scenario(options)
+        require_measurable(scenario)
+        return scenario
+
 
 class DockPixelsEnv(Episodes[Pixels]):
     """Dock on the camera's picture and the IMU, the navigation's belief left out."""
@@ -84,13 +91,6 @@ class DockPixelsEnv(Episodes[Pixels]):
         """Keep the newest frame."""
         if isinstance(tick.frame, CameraFrame):
             self._frame = tick.frame
-
-    def chosen_scenario(self, options: Mapping[str, Any]) -> Scenario:
-        """As of `Episodes`, with a camera."""
-        scenario = super().chosen_scenario(options)
-        if scenario.navigation.is_truth:
-            raise DockairError("navigation.navigator", expected="one that looks through the camera", got="truth")
-        return scenario
 
     def observation(self) -> Pixels:
         """Picture and state."""

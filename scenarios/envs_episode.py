@@ -201,6 +201,9 @@ class Episodes(gymnasium.Env[Obs, NDArray[np.float32]], Generic[Obs]):
             scenario = source
         if self.sensing is None:
             return scenario
+        if scenario.navigation.is_truth:
+            expected = "one that looks through the camera, or at what is measured in its place"
+            raise DockairError("navigation.navigator", expected=expected, got="truth")
         camera = scenario.camera.model_copy(update={"sensing": self.sensing})
         changed = scenario.model_copy(update={"camera": camera})
         return Scenario.model_validate(changed.model_dump(exclude_unset=True))  # a copy alone is not checked

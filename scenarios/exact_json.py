@@ -46,13 +46,20 @@ def import_by_name(name: str) -> Any:
     return found
 
 
-def said_by(error: BaseException) -> str:
-    """Return what an exception says, and where it was raised, in one line."""
+def said_by(error: BaseException, package: str = "") -> str:
+    """Return what an exception says, and where it was raised, in one line.
+
+    Args:
+        error: that was raised.
+        package: whose deepest line is named if it had a part in it, rather than that of the library it called.
+    """
     said = " ".join(f"{type(error).__name__}: {error}".split())
     if isinstance(error, SyntaxError):  # it names the place itself
         return said
-    raised = traceback.extract_tb(error.__traceback__)[-1]
-    return f"{said} ({raised.filename}, line {raised.lineno})"
+    calls = list(traceback.walk_tb(error.__traceback__))
+    own = [call for call in calls if str(call[0].f_globals.get("__name__")).partition(".")[0] == package]
+    frame, line = (own or calls)[-1]
+    return f"{said} ({frame.f_code.co_filename}, line {line})"
 
 
 def encode(value: Any) -> Any:

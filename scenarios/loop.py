@@ -18,7 +18,7 @@ from dockair.scenarios.attempts import RefereeLimits
 from dockair.scenarios.build import build
 from dockair.scenarios.camera_process import OverlappedExposures, can_overlap
 from dockair.scenarios.exposures import Exposures, ExposuresInTurn, Frame
-from dockair.scenarios.message_log import announce_to
+from dockair.scenarios.plug_in import announce_to, step_navigator
 from dockair.scenarios.recorder import Recorder
 from dockair.scenarios.referee import Outcome, Referee
 from dockair.scenarios.result import Result
@@ -102,7 +102,8 @@ class Flight:
         announcement = self._announcer.due(truth.time_s)
         if announcement is not None:
             announce_to(self.navigator, announcement)
-        solution = self.navigator.step(imu, frame)  # type: ignore[arg-type]  # LEDs only where they are asked for
+        # LEDs in place of a frame only where they are asked for
+        solution = step_navigator(self.navigator, imu, frame)  # type: ignore[arg-type]
         self._next_command = solution.command
         self._window, self._exposure_s = solution.window or self.sheets.camera.full_window, solution.exposure_s
         outcome = self.referee.judge(

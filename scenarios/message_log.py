@@ -35,8 +35,8 @@ from dockair.calibration import NavigationSheets
 from dockair.errors import DockairError, MachineError
 from dockair.messages import CameraFrame, ImuSample, Navigates, NavSolution, TankerAnnouncement, Window
 from dockair.rotations import Array
-from dockair.scenarios.exact_json import decode, encode, said_by
-from dockair.scenarios.plug_in import navigator_class_of
+from dockair.scenarios.exact_json import decode, encode
+from dockair.scenarios.plug_in import make_navigator, navigator_class_of
 
 QUEUE_TICKS = 200  # ticks waiting for the encoder; at 50 frames/s of 2.2 MB full frames at most 220 MB
 ROW_GROUP_TICKS = 100
@@ -77,14 +77,7 @@ class NavigatorRecipe:
             DockairError: no such class, it is no navigator, or its constructor raises an exception.
         """
         given = (self.sheets,) if self.settings is None else (self.sheets, self.settings)
-        navigator_class = navigator_class_of(self.class_name)
-        try:
-            return navigator_class(*given)
-        except DockairError:
-            raise
-        except Exception as error:  # somebody's own code
-            expected = "a navigator that can be made of the sheets"
-            raise DockairError(self.class_name, expected=expected, got=said_by(error)) from error
+        return make_navigator(navigator_class_of(self.class_name), *given)
 
     def write(self, out_dir: Path) -> None:
         """Write `navigator.json`."""
@@ -102,13 +95,6 @@ class NavigatorRecipe:
         table = json.loads(_existing(out_dir, NAVIGATOR).read_text(encoding="utf-8"))
         sheets, settings = decode(table["sheets"]), decode(table["settings"])
         return cls(class_name=table["navigator"], sheets=sheets, settings=settings)
-
-
-def announce_to(navigator: Navigates, announcement: TankerAnnouncement) -> None:
-    """Tell a navigator what the tanker is about to do, if it listens."""
-    announce = getattr(navigator, "announce", None)
-    if announce is not None:
-        announce(announcement)
 
 
 def code_fingerprint() -> str:

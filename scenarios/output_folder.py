@@ -1,5 +1,6 @@
-"""Where a flight is written: a folder that is empty or holds an earlier flight, and nobody else's files."""
+"""Where results are written: a flight's into an empty folder or over an earlier flight, never over others' files."""
 
+import tempfile
 from pathlib import Path
 
 from dockair.errors import DockairError
@@ -52,3 +53,18 @@ def prepare_output_folder(folder: Path) -> None:
         probe.unlink()
     except OSError as error:
         raise DockairError(f"--out {folder}", expected="a folder that can be written", got=error.strerror) from None
+
+
+def made_folder(folder: Path) -> Path:
+    """Return the folder, made if there was none and tried: better asked now than after what is to be written there.
+
+    Raises:
+        DockairError: it cannot be made, or no file in it.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise DockairError(f"--out {folder}", expected="a folder that can be written", got=error.strerror) from None
+    return folder

@@ -1,12 +1,18 @@
-"""A navigator of one's own, named in a scenario: what it has to be, before anything is flown with it."""
+"""A navigator of one's own, named in a scenario: what it has to be, and what is said when it fails.
+
+An exception out of somebody's own navigator is that somebody's mistake: one line that names the place. One out of
+Dockair's navigators is a mistake of ours and keeps its traceback.
+"""
 
 import inspect
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import Any, TypeVar
 
 from dockair.errors import DockairError
-from dockair.messages import Navigates
-from dockair.scenarios.exact_json import import_by_name
+from dockair.messages import CameraFrame, ImuSample, Navigates, NavSolution, TankerAnnouncement
+from dockair.scenarios.exact_json import import_by_name, name_of, said_by
+
+T = TypeVar("T")
 
 
 def navigator_class_of(name: str) -> Callable[..., Navigates]:
@@ -25,6 +31,52 @@ def navigator_class_of(name: str) -> Callable[..., Navigates]:
         expected = "a class that is made of (sheets) and has step(imu, frame) -> NavSolution"
         raise DockairError(name, expected=expected, got=got)
     return found  # type: ignore[no-any-return]
+
+
+def make_navigator(navigator_class: Callable[..., Navigates], *given: Any) -> Navigates:
+    """Return a navigator, made of what it is given.
+
+    Raises:
+        DockairError: it is somebody's own, and its constructor raises an exception.
+    """
+    return _called(navigator_class, "a navigator that can be made of the sheets", navigator_class, *given)
+
+
+def step_navigator(navigator: Navigates, imu: Sequence[ImuSample], frame: CameraFrame | None) -> NavSolution:
+    """Return what a navigator answers in a control tick.
+
+    Raises:
+        DockairError: it is somebody's own and raises an exception, or answers something else than a NavSolution.
+    """
+    answer = _called(type(navigator), "step(imu, frame) without an exception", navigator.step, imu, frame)
+    if not isinstance(answer, NavSolution):
+        expected = "a NavSolution from step(imu, frame)"
+        raise DockairError(name_of(type(navigator)), expected=expected, got=type(answer).__name__)
+    return answer
+
+
+def announce_to(navigator: Navigates, announcement: TankerAnnouncement) -> None:
+    """Tell a navigator what the tanker is about to do, if it listens.
+
+    Raises:
+        DockairError: it is somebody's own and raises an exception.
+    """
+    announce = getattr(navigator, "announce", None)
+    if announce is not None:
+        _called(type(navigator), "announce(announcement) without an exception", announce, announcement)
+
+
+def _called(owner: Any, expected: str, function: Callable[..., T], *given: Any) -> T:
+    """Call a navigator's class or method; turn what somebody's own raises into one line."""
+    try:
+        return function(*given)
+    except DockairError:
+        raise
+    except (Exception, SystemExit) as error:  # somebody's own code may raise anything
+        package = owner.__module__.partition(".")[0]
+        if package == "dockair":
+            raise
+        raise DockairError(name_of(owner), expected=expected, got=said_by(error, package)) from error
 
 
 def _takes_one(made: Callable[..., Any]) -> bool:

@@ -25,13 +25,13 @@ from dockair.errors import DockairError
 from dockair.rotations import Array
 from dockair.scenarios.message_log import (
     NavigatorRecipe,
-    announce_to,
     code_fingerprint,
     estimate_row,
     read_estimates,
     read_messages,
     recorded_code,
 )
+from dockair.scenarios.plug_in import announce_to, step_navigator
 
 FORBIDDEN = ("dockair.sim", "mujoco", "dockair.assets", "dockair.parameters")
 
@@ -105,7 +105,7 @@ def replay_in_this_process(out_dir: str | Path) -> ReplayReport:
             raise DockairError(str(folder), expected="as many messages as estimates", got="a cut-off recording")
         if messages.announcement is not None:
             announce_to(navigator, messages.announcement)
-        replayed = estimate_row(navigator.step(messages.imu, messages.frame))
+        replayed = estimate_row(step_navigator(navigator, messages.imu, messages.frame))
         for name in replayed:
             if name not in recorded or not same_bits(recorded[name], replayed[name]):
                 values = {"recorded": str(recorded.get(name, "nothing")), "replayed": str(replayed[name])}

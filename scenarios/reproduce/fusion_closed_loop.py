@@ -26,6 +26,7 @@ from dockair.nav.pose.planar import mirrored
 from dockair.rotations import Array, log
 from dockair.scenarios.loop import Flight
 from dockair.scenarios.metrics import normalised_error_squared, state_error
+from dockair.scenarios.output_folder import made_folder
 from dockair.scenarios.reproduce.reference import picture_name
 from dockair.scenarios.schema import load_scenario
 from dockair.sim.truth import Truth
@@ -86,8 +87,9 @@ class Rows:
 def reproduce(out: Path | None, seeds: int = SEEDS) -> dict[str, Any]:
     """Fly what has not been flown; table by range, and errors against range in `out`."""
     rows, shown = [], {}
+    folders = {name: None if out is None else made_folder(out / "closed_loop" / _file_name(name)) for name in CASES}
     for name, overrides in CASES.items():
-        folder = None if out is None else out / "closed_loop" / name.replace(",", "").replace(" ", "_")
+        folder = folders[name]
         count = 2 * seeds if "camera.sensing" in overrides else seeds
         flown = [_kept(folder, seed, partial(fly, overrides, seed)) for seed in range(count)]
         rows.append({"case": name, "ours": figures(flown) | {"flights": len(flown)}, "reference": _WANTED})
@@ -101,11 +103,14 @@ def reproduce(out: Path | None, seeds: int = SEEDS) -> dict[str, Any]:
     return {"id": ID, "source": _SOURCE, "rows": rows}
 
 
+def _file_name(case: str) -> str:
+    return case.replace(",", "").replace(" ", "_")
+
+
 def _kept(folder: Path | None, seed: int, flying: Callable[[], Rows]) -> Rows:
     """A flight that is in the folder, or flown now and put there whole or not at all."""
     if folder is None:
         return flying()
-    folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"seed_{seed:03d}.json"
     if not path.is_file():
         flown = flying()

@@ -16,6 +16,7 @@ from typing import Any
 
 from dockair.errors import DockairError
 from dockair.scenarios import reproduce as _package
+from dockair.scenarios.output_folder import made_folder
 
 Reproduction = Callable[[Path | None], dict[str, Any]]
 
@@ -50,17 +51,10 @@ def reproduce(wanted: str, out: Path | None = None) -> dict[str, Any]:
     """Run one reproduction; with `out`, a folder that need not exist, its picture is put there.
 
     Raises:
-        DockairError: no such id, or a folder that cannot be made.
+        DockairError: no such id, or a folder that cannot be written.
     """
     if wanted not in _REPRODUCTIONS:
         raise DockairError("reproduce", expected="the id of a reproduction", got=wanted, exists=ids())
     if out is not None:
-        _make(out)
+        made_folder(out)
     return _REPRODUCTIONS[wanted][1](out)
-
-
-def _make(folder: Path) -> None:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise DockairError(f"--out {folder}", expected="a folder that can be made", got=error.strerror) from None

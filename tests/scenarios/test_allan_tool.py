@@ -156,6 +156,26 @@ def test_a_mistake_is_told_in_one_line_and_ends_with_status_two(command, tmp_pat
     assert said in err and err.count("\n") == 1
 
 
+@pytest.mark.parametrize(
+    ("rate_hz", "options", "said"),
+    [
+        ("0", (), "--rate-hz: expected a rate > 0, got 0.0"),
+        ("100", ("--bias-correlation-s", "-1"), "--bias-correlation-s: expected a time > 0, got -1.0"),
+        ("100", ("--terms", "X"), "--terms: expected letters of the terms, each once, got 'X'; exists: Q, N, B, K"),
+    ],
+)
+def test_a_mistake_in_an_option_is_told_by_its_name(command, tmp_path, rate_hz, options, said):
+    np.save(tmp_path / "gyro.npy", _white(n=100))
+    record = ("allan", tmp_path / "gyro.npy", "--unit", "rad/s")
+    assert command(*record, "--rate-hz", rate_hz, *options) == (2, "", f"dockair: {said}\n")
+
+
+def test_a_record_that_cannot_be_is_told_by_its_file(command, tmp_path):
+    np.save(tmp_path / "gyro.npy", np.array([1.0, np.nan, 3.0]))
+    _, _, err = command("allan", tmp_path / "gyro.npy", "--unit", "rad/s", "--rate-hz", "100")
+    assert err == f"dockair: {tmp_path / 'gyro.npy'}: expected finite samples, got '1 that are not'\n"
+
+
 def test_a_rate_or_a_folder_that_cannot_be_ends_with_status_two(command, tmp_path):
     np.save(tmp_path / "gyro.npy", _white())
     record = ("allan", tmp_path / "gyro.npy", "--unit", "rad/s")

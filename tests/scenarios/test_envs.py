@@ -331,6 +331,17 @@ def test_a_wrong_option_is_refused_and_the_flight_goes_on(env, options, line):
 def test_the_fast_environment_refuses_what_needs_pictures():
     with pytest.raises(DockairError, match=r"navigation\.heading: expected false"):
         DockFastEnv(load_scenario("default", {"navigation.heading": True}))
+    for name, reason in (("low_sun_clouds", "clouds"), ("sun_in_view", "the Sun in the camera's field")):
+        with pytest.raises(DockairError, match=f"has what acts through the picture, {reason}"):
+            DockFastEnv(name)
+    with pytest.raises(DockairError, match="acts through the picture, clouds"):
+        DockFastEnv().reset(seed=0, options={"set": {"weather.cloud_cover": 0.3}})
+
+
+@pytest.mark.parametrize("made", [DockFastEnv, DockPixelsEnv])
+def test_what_does_not_navigate_by_sight_is_refused_where_sight_is_the_point(made):
+    with pytest.raises(DockairError, match=r"navigation\.navigator: expected one that looks through the camera"):
+        made("truth_navigation")
 
 
 def test_an_attempt_that_goes_on_when_time_is_over_has_failed_and_one_that_did_not_begin_has_not(env):

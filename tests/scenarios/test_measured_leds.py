@@ -219,10 +219,10 @@ def test_latency_follows_the_window_of_a_ring_that_is_tracked_and_the_full_frame
 )
 def test_what_acts_through_the_picture_alone_is_refused(settings, reason):
     with pytest.raises(DockairError, match=reason):
-        refuse_unmodelled(load_scenario("default", settings), Stand().built)
+        refuse_unmodelled(load_scenario("default", settings), Stand().built.camera, Stand().built.mounting)
 
 
 def test_the_default_scenario_and_a_night_with_the_sun_below_are_not_refused():
     built: AsBuilt = Stand().built
-    refuse_unmodelled(load_scenario("default"), built)
-    refuse_unmodelled(load_scenario("default", {"sun.azimuth_deg": 5.0, "weather.night": True}), built)
+    for settings in ({}, {"sun.azimuth_deg": 5.0, "weather.night": True}):
+        refuse_unmodelled(load_scenario("default", settings), built.camera, built.mounting)

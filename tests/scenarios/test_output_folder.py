@@ -4,7 +4,7 @@ import pytest
 
 from dockair.errors import DockairError
 from dockair.scenarios.loop import fly
-from dockair.scenarios.output_folder import FLIGHT_FILES, check_output_folder, prepare_output_folder
+from dockair.scenarios.output_folder import FLIGHT_FILES, check_output_folder, made_folder, prepare_output_folder
 from dockair.scenarios.schema import load_scenario
 
 
@@ -47,3 +47,9 @@ def test_a_flight_that_cannot_be_built_leaves_the_earlier_one(tmp_path):
     with pytest.raises(DockairError, match="nobody:Here"):
         fly(load_scenario("still_air", {"navigation.navigator": "nobody:Here"}), out=folder)
     assert sorted(path.name for path in folder.iterdir()) == ["episode.rrd", "result.json"]
+
+
+def test_a_folder_is_made_and_nothing_is_left_in_it(tmp_path):
+    assert made_folder(tmp_path / "a" / "b") == tmp_path / "a" / "b"
+    assert made_folder(tmp_path / "a") == tmp_path / "a"
+    assert [path.name for path in tmp_path.rglob("*")] == ["a", "b"]

@@ -1,12 +1,13 @@
 """Reproductions stand beside their sources, in the form that the command prints."""
 
 import json
+from pathlib import Path
 
 import cv2
 import pytest
 
 from dockair.errors import DockairError
-from dockair.scenarios.reproduce import registry
+from dockair.scenarios.reproduce import fusion_closed_loop, registry
 
 
 @pytest.fixture(scope="module")
@@ -34,13 +35,21 @@ def test_an_unknown_id_is_refused_with_those_that_exist():
         registry.reproduce("sensor")
 
 
-def test_a_folder_that_cannot_be_made_is_refused_before_anything_is_reckoned(tmp_path, monkeypatch):
+def test_a_folder_that_cannot_be_written_is_refused_before_anything_is_reckoned(tmp_path, monkeypatch):
     monkeypatch.setitem(registry._REPRODUCTIONS, "made/up", ("", pytest.fail))
     file = tmp_path / "file"
     file.touch()
-    for out in (file, file / "inside"):
-        with pytest.raises(DockairError, match=f"--out {out}: expected a folder that can be made, got "):
+    for out in (file, file / "inside", Path("/proc"), Path("/proc/x")):
+        with pytest.raises(DockairError, match=f"--out {out}: expected a folder that can be written, got "):
             registry.reproduce("made/up", out)
+
+
+def test_a_folder_of_flights_that_cannot_be_written_is_refused_before_the_first(tmp_path, monkeypatch):
+    monkeypatch.setattr(fusion_closed_loop, "fly", pytest.fail)
+    (tmp_path / "closed_loop").mkdir()
+    (tmp_path / "closed_loop" / "as_its_sheets_say").touch()  # the last of the cases
+    with pytest.raises(DockairError, match="as_its_sheets_say: expected a folder that can be written, got "):
+        registry.reproduce("fusion/closed-loop", tmp_path)
 
 
 def test_sunlight_in_the_camera_band_is_the_standards(band):
