@@ -203,7 +203,8 @@ def _noise_added(P: Array, x: Array, dt: float, gyro2: float, drive2: float, oth
 def _gust_noise_added(P: Array, dt: float, gust2: Array) -> None:
     """Add to P, symmetric, what drives g' of Eq. (1) in a step dt: of g to first order in dt, and its share of v and m.
 
-    The shares of third order are left out: without the white drive of v and m, P would not stay a covariance.
+    Shares of third order are left out. What is added is by itself a covariance, with the white drive, in steps shorter
+    than the ratio of that drive's density to this one's (8 ms as flown).
     """
     for i in range(3):
         g, half = 24 + i, 0.5 * gust2[i] * dt * dt

@@ -19,13 +19,14 @@ from dockair.nav.guidance.phases import PhaseLimits
 from dockair.nav.heading.own_heading import OwnHeadingSettings
 from dockair.nav.navigator import Navigator, NavigatorSettings
 from dockair.parameters import load_parameters
-from dockair.rotations import Array, matrix_from_yaw_pitch_roll
+from dockair.rotations import Array
 from dockair.scenarios import build_receiver
 from dockair.scenarios.build_air import air_motion
-from dockair.scenarios.build_measured import measured_leds, refuse_unmodelled
+from dockair.scenarios.build_measured import measured_leds
 from dockair.scenarios.exact_json import name_of
 from dockair.scenarios.measured_leds import MeasuredLeds
 from dockair.scenarios.message_log import NavigatorRecipe
+from dockair.scenarios.mounting_parameters import MountingParameters
 from dockair.scenarios.nominal_sheets import nominal_sheets
 from dockair.scenarios.schema import Scenario
 from dockair.scenarios.truth_navigation import TruthNavigator
@@ -69,21 +70,6 @@ T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class MountingParameters:
-    """Sheet `mounting`."""
-
-    probe_tip_m: Array
-    camera_position_m: Array
-    camera_yaw_rad: float
-    imu_position_m: Array
-
-    def mounting(self) -> Mounting:
-        """Return the nominal mounting; the camera's axis lies in the body's x-y plane."""
-        R_BC = matrix_from_yaw_pitch_roll(self.camera_yaw_rad, 0.0, 0.0)
-        return Mounting(R_BC=R_BC, p_BC=self.camera_position_m, p_BP=self.probe_tip_m, p_BI=self.imu_position_m)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Periods:
     """Physics ticks between two samples, control ticks, frames."""
 
@@ -122,7 +108,7 @@ def build(scenario: Scenario, seed: int) -> Parts:
     """
     clock = Clock(scenario.rates.physics_hz)
     air = standard_atmosphere(scenario.flight.altitude_m)
-    mounting = _mounting(scenario)
+    mounting = _sheet(scenario, scenario.hardware.receiver_sheet("mounting"), MountingParameters).mounting()
     airframe = build_receiver.airframe(scenario, scenario.parameters)
     receiver = Receiver(
         airframe=airframe,
@@ -185,16 +171,6 @@ def build(scenario: Scenario, seed: int) -> Parts:
     )
 
 
-def require_measurable(scenario: Scenario) -> None:
-    """Refuse, before anything is built, what measurements without a picture would silently leave out.
-
-    Raises:
-        DockairError: the scenario has something that acts through the picture alone.
-    """
-    camera = scenario.hardware.camera
-    refuse_unmodelled(scenario, Camera() if camera is None else Camera.from_toml(camera), _mounting(scenario))
-
-
 def guidance_settings(scenario: Scenario) -> GuidanceSettings:
     """Return the guidance that the scenario asks for, with what the nominal sheets say of the receiver."""
     g, duration_s = scenario.guidance, scenario.flight.duration_s
@@ -241,10 +217,6 @@ def _commanded(limits: Array) -> tuple[float, float, float]:
 
 def _sheet(scenario: Scenario, name: str, cls: type[T]) -> T:
     return load_parameters(name, cls, scenario.parameters.get(name))
-
-
-def _mounting(scenario: Scenario) -> Mounting:
-    return _sheet(scenario, scenario.hardware.receiver_sheet("mounting"), MountingParameters).mounting()
 
 
 def _world_parameters(scenario: Scenario, air: Air, mounting: Mounting) -> WorldParameters:

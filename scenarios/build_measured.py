@@ -6,6 +6,7 @@ from dockair.calibration import Camera, Mounting
 from dockair.errors import DockairError
 from dockair.parameters import load_parameters
 from dockair.scenarios.measured_leds import MeasuredLeds, MeasurementParameters
+from dockair.scenarios.mounting_parameters import MountingParameters
 from dockair.scenarios.schema import Scenario
 from dockair.sim.as_built import AsBuilt
 from dockair.sim.camera.camera import CameraNoise
@@ -41,6 +42,17 @@ def measured_leds(scenario: Scenario, seed: int, as_built: AsBuilt, faults: Faul
         extinction_1_m=extinction_1_m(scenario.weather.visibility_m),
         automatic_exposure=scenario.camera.exposure == "auto",
     )
+
+
+def require_measurable(scenario: Scenario) -> None:
+    """Refuse by the nominal sheets, before anything is built, what `measured_leds` would refuse.
+
+    Raises:
+        DockairError: the scenario has something that acts through the picture alone.
+    """
+    path, sheet = scenario.hardware.camera, scenario.hardware.receiver_sheet("mounting")
+    mounting = load_parameters(sheet, MountingParameters, scenario.parameters.get(sheet)).mounting()
+    refuse_unmodelled(scenario, Camera() if path is None else Camera.from_toml(path), mounting)
 
 
 def refuse_unmodelled(scenario: Scenario, camera: Camera, mounting: Mounting) -> None:

@@ -14,12 +14,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
+from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from dockair.errors import DockairError
-from dockair.scenarios.refusal import Expected
+from dockair.scenarios.refusal import Expected, inner_model
 from dockair.scenarios.schema import Scenario
-from dockair.scenarios.table import Table
 
 _UNITS = {"_m_s": "m/s", "_deg_s": "deg/s", "_m": "m", "_s": "s", "_us": "us", "_hz": "Hz", "_deg": "deg"}
 _MARK = "#:"  # begins the comment that says what a key means
@@ -120,7 +120,7 @@ def _section(table: str, keys: Sequence[Key]) -> str:
 
 
 def _introduction(table: str) -> str:
-    inner = _table_of(Scenario.model_fields[table])
+    inner = inner_model(Scenario.model_fields[table])
     words = inspect.cleandoc(inner.__doc__ or "") if inner is not None else _PARAMETERS
     return f"{words} {_MORE.get(table, '')}".strip()
 
@@ -130,11 +130,11 @@ def _row(key: Key) -> str:
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
 
 
-def _keys_of(table: type[Table], prefix: str, outermost: str) -> list[Key]:
+def _keys_of(table: type[BaseModel], prefix: str, outermost: str) -> list[Key]:
     """The keys of a table and of those in it."""
     meanings, keys = _meanings(table), []
     for name, field in table.model_fields.items():
-        inner = _table_of(field)
+        inner = inner_model(field)
         where = f"{prefix}{name}"
         if inner is not None:
             is_array = get_origin(field.annotation) is tuple
@@ -147,15 +147,7 @@ def _keys_of(table: type[Table], prefix: str, outermost: str) -> list[Key]:
     return keys
 
 
-def _table_of(field: FieldInfo) -> type[Table] | None:
-    """The table that a key holds, or of which it holds an array; None for any other key."""
-    annotation = field.annotation
-    if get_origin(annotation) is tuple:
-        annotation = get_args(annotation)[0]
-    return annotation if isinstance(annotation, type) and issubclass(annotation, Table) else None
-
-
-def _meanings(table: type[Table]) -> dict[str, str]:
+def _meanings(table: type[BaseModel]) -> dict[str, str]:
     """Key -> the `#:` comment on its lines, or on those right above it."""
     source = inspect.getsource(table)
     lines = source.splitlines()

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from dockair.errors import check_choice
 from dockair.messages import CameraFrame
 from dockair.rotations import Array
-from dockair.scenarios.build import require_measurable
+from dockair.scenarios.build_measured import require_measurable
 from dockair.scenarios.envs_episode import Episodes
 from dockair.scenarios.envs_picture import PICTURE, pooled_picture
 from dockair.scenarios.envs_tables import (

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from dockair.parameters import load_parameters
 from dockair.rotations import Array, matrix_from_yaw_pitch_roll
-from dockair.scenarios.build import MountingParameters
+from dockair.scenarios.mounting_parameters import MountingParameters
 from dockair.sim.camera.sheets import SkyParameters
 from dockair.sim.camera.sky import Sky
 from dockair.sim.camera.sky_radiance import SkyRadiance

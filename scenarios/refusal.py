@@ -54,13 +54,13 @@ def _dotted(location: Sequence[int | str]) -> str:
 def _model_at(model: type[BaseModel], location: Sequence[int | str]) -> type[BaseModel]:
     for part in location:
         if isinstance(part, str):
-            inner = _inner_model(model.model_fields[part])
+            inner = inner_model(model.model_fields[part])
             assert inner is not None
             model = inner
     return model
 
 
-def _inner_model(field: FieldInfo) -> type[BaseModel] | None:
+def inner_model(field: FieldInfo) -> type[BaseModel] | None:
     """Return the model of a table, or of the elements of an array of tables; None for any other field."""
     annotation = field.annotation
     if get_origin(annotation) is tuple:
@@ -70,7 +70,7 @@ def _inner_model(field: FieldInfo) -> type[BaseModel] | None:
 
 def _field_at(model: type[BaseModel], location: Sequence[int | str]) -> FieldInfo:
     """Return the field of the location; of an element (or of what lies deeper) the field that holds it."""
-    field, inner = model.model_fields[str(location[0])], _inner_model(model.model_fields[str(location[0])])
+    field, inner = model.model_fields[str(location[0])], inner_model(model.model_fields[str(location[0])])
     rest = [part for part in location[1:] if isinstance(part, str)]
     return _field_at(inner, rest) if inner is not None and rest else field
 

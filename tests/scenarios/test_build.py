@@ -12,8 +12,9 @@ from dockair.errors import DockairError
 from dockair.messages import Window
 from dockair.nav.guidance.approach import GuidanceSettings
 from dockair.parameters import load_parameters
-from dockair.scenarios.build import MountingParameters, build, guidance_settings
+from dockair.scenarios.build import build, guidance_settings
 from dockair.scenarios.message_log import numbers
+from dockair.scenarios.mounting_parameters import MountingParameters
 from dockair.scenarios.schema import load_scenario
 from dockair.scenarios.truth_navigation import TruthNavigator
 from dockair.sim.hose.coupling import CouplingParameters
