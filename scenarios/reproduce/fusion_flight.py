@@ -149,14 +149,17 @@ class _Motion:
     def __init__(self, approach: Approach, sheets: NavigationSheets, rng: np.random.Generator) -> None:
         self._approach, self._rng, self._dt = approach, rng, 1.0 / approach.imu_rate_hz
         belief, start, mounting = approach.belief, sheets.start, sheets.mounting
-        omega = 2.0 * np.pi * np.array(belief.swing_frequency_hz) * approach.swing_frequency_factor
+        left_hz, up_hz = belief.swing_frequency_hz
+        swing_hz = left_hz * approach.swing_frequency_factor, up_hz * approach.swing_frequency_factor
+        omega = 2.0 * np.pi * np.array(swing_hz)
         self._stiffness = np.append(0.0, omega**2)
         self._friction = np.append(0.0, 2.0 * belief.swing_damping * omega)
         self._drive = belief.drogue_acceleration_density * approach.drive_factor
         self._gust_drive = np.array(belief.gust_density) * approach.drive_factor
-        blown = [np.linalg.cholesky(swing_covariance(belief, axis) + _TINY) for axis in range(3)]
-        n, m, g = approach.drive_factor * np.stack([root @ rng.standard_normal(3) for root in blown], axis=1)
-        self._n, self._m, self._drogue_gust = n / approach.swing_frequency_factor, m, g
+        swings = replace(belief, swing_frequency_hz=swing_hz)  # as they are, not as they are believed
+        blown = [np.linalg.cholesky(swing_covariance(swings, axis) + _TINY) for axis in range(3)]
+        start_of_swing = np.stack([root @ rng.standard_normal(3) for root in blown], axis=1)
+        self._n, self._m, self._drogue_gust = approach.drive_factor * start_of_swing
         self._tip = mounting.p_BP - mounting.p_BI
         self._s = start.p_PD_B + self._tip + start.sigma_p_m * rng.standard_normal(3)
         self._v = self._m + belief.start_velocity_sigma_m_s * rng.standard_normal(3)
