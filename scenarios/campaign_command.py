@@ -29,12 +29,14 @@ def campaign(
     settings: Settings = None,
     fresh: Annotated[bool, typer.Option("--fresh", help="Forget what was flown in the folder.")] = False,
     retry_errors: Annotated[bool, typer.Option("--retry-errors", help="Fly again what ended in an error.")] = False,
+    dry: Annotated[bool, typer.Option("--dry-run", help="Say what would be flown; fly and write nothing.")] = False,
     as_json: Json = False,
 ) -> None:
     """Fly a plan's scenarios with many seeds on all cores; killed at any moment, the same command goes on."""
+    from dockair.scenarios.campaign.dry_run import dry_run
     from dockair.scenarios.campaign.folder import default_folder
     from dockair.scenarios.campaign.plan_file import PlanFile
-    from dockair.scenarios.campaign.progress import CampaignProgress, show_campaign
+    from dockair.scenarios.campaign.progress import CampaignProgress, show_campaign, show_dry_run
     from dockair.scenarios.campaign.run import run
 
     if plan is None:
@@ -43,6 +45,10 @@ def campaign(
     changes: dict[str, object] = {} if sampler is None else {"sampler": sampler.value}
     source = PlanFile(plan, changes | ({} if seeds is None else {"seeds": seeds}), overrides(settings))
     folder = out or default_folder(source.plan.name)
+    if dry:
+        planned = dry_run(source, folder).to_dict()
+        print_json(planned) if as_json else show_dry_run(planned)
+        return
     with CampaignProgress() as progress:
         over = run(
             source,

@@ -11,7 +11,9 @@ from rich.table import Table
 from rich.text import Text
 
 from dockair.scenarios.campaign.jobs import Job
+from dockair.scenarios.campaign.row import flight_of, unflown
 from dockair.scenarios.output import plain_console
+from dockair.scenarios.report.groups import groups_of
 from dockair.scenarios.statistics import wilson_interval
 
 _LINE_INTERVAL_S = 30.0  # between two lines where stderr is no terminal
@@ -20,7 +22,7 @@ Row = Mapping[str, Any]
 
 
 class CampaignProgress:
-    """Bars on a terminal, one for each scenario and sensing; else a line every half minute.
+    """Bars on a terminal, one for each group of flights that may be pooled; else a line every half minute.
 
     Args:
         console: where to; stderr by default.
@@ -35,8 +37,9 @@ class CampaignProgress:
             TextColumn("{task.fields[said]}", markup=False),
         )
         self._bars = Progress(*columns, console=self._console, transient=True)
-        self._tasks: dict[tuple[str, str], Any] = {}
-        self._counts: dict[tuple[str, str], list[int]] = {}  # successes, done
+        self._labels: dict[tuple[str, int], str] = {}  # scenario's hash and seed -> group
+        self._tasks: dict[str, Any] = {}
+        self._counts: dict[str, list[int]] = {}  # successes, done
         self._total = self._earlier = self._now = self._errors = 0
         self._begun_s = self._next_s = time.monotonic()
 
@@ -53,13 +56,11 @@ class CampaignProgress:
     def begin(self, jobs: list[Job], entries: dict[str, Any]) -> "CampaignProgress":
         """Take the jobs, and the journal's entries of those that are not flown again."""
         self._total = len(jobs)
+        for group in groups_of([unflown(job) for job in jobs]):
+            self._labels |= dict.fromkeys(map(flight_of, group.rows), group.label)
+            self._counts[group.label] = [0, 0]
+            self._tasks[group.label] = self._bars.add_task(group.label, total=len(group.rows), said="")
         for job in jobs:
-            key = (job.scenario.name, job.scenario.sensing)
-            if key not in self._tasks:
-                self._counts[key] = [0, 0]
-                self._tasks[key] = self._bars.add_task(f"{key[0]} ({key[1]})", total=0, said="")
-            task = self._bars.tasks[list(self._tasks).index(key)]
-            task.total = (task.total or 0) + 1
             if job.key in entries:
                 self._earlier += 1
                 self._count(entries[job.key]["row"])
@@ -90,12 +91,12 @@ class CampaignProgress:
         self._console.print(text, markup=False, soft_wrap=True)  # an error may say anything, brackets too
 
     def _count(self, row: Row) -> None:
-        key = (row["scenario"], row["sensing"])
-        counts = self._counts[key]
+        label = self._labels[flight_of(row)]
+        counts = self._counts[label]
         counts[0] += bool(row["success"])
         counts[1] += 1
         self._errors += bool(row["error"])
-        self._bars.update(self._tasks[key], completed=counts[1], said=docked(*counts))
+        self._bars.update(self._tasks[label], completed=counts[1], said=docked(*counts))
 
     def _pace(self) -> str:
         elapsed_s = time.monotonic() - self._begun_s
@@ -106,7 +107,7 @@ class CampaignProgress:
         return f"{60.0 * self._now / elapsed_s:.1f} a minute, {_in_words(left_s)} left{errors}"
 
     def _rates(self) -> str:
-        return "; ".join(f"{key[0]} ({key[1]}) {docked(*counts)}" for key, counts in self._counts.items() if counts[1])
+        return "; ".join(f"{label} {docked(*counts)}" for label, counts in self._counts.items() if counts[1])
 
 
 def docked(successes: int, flights: int) -> str:
@@ -141,6 +142,19 @@ def show_campaign(table: Mapping[str, Any]) -> None:
             console.print(f"not as claimed: {where}: {shortfall}", style="yellow", soft_wrap=True)
     _show_gate(console, table["gate"])
     console.print(f"  {table['folder']}", soft_wrap=True)
+
+
+def show_dry_run(planned: Mapping[str, Any]) -> None:
+    """Print what `dockair campaign --dry-run --json` would, but for the commands."""
+    console, shown = plain_console(), Table(box=None, padding=(0, 1))
+    for heading in ("scenario", "sensing", "controller", "flights", "done", "set"):
+        shown.add_column(heading, no_wrap=True)
+    for group in planned["groups"]:
+        counts = str(group["flights"]), str(group["done"] or "")
+        shown.add_row(group["scenario"], group["sensing"], group["controller"], *counts, Text(group["settings"]))
+    console.print(shown)
+    left = planned["flights"] - planned["done"]
+    console.print(f"  {left} of {planned['flights']} flights would be flown; {planned['folder']}", soft_wrap=True)
 
 
 def _show_gate(console: Console, gate: Mapping[str, Any] | None) -> None:

@@ -55,6 +55,16 @@ def row_of(job: Job, answer: Answer) -> Row:
     return row | _asked(job) | (answer.columns or {})
 
 
+def unflown(job: Job) -> Row:
+    """Return the row of a job that has not been flown: what was asked, and nothing that came of it."""
+    return row_of(job, Answer(columns=None))
+
+
+def flight_of(row: Mapping[str, Any]) -> tuple[str, int]:
+    """Return which flight a row is of: the scenario's hash, and the seed."""
+    return row["scenario_hash"], row["seed"]
+
+
 def _asked(job: Job) -> Row:
     scenario = job.scenario
     row: Row = {"scenario": scenario.name, "seed": job.seed, "scenario_hash": job.scenario_hash}

@@ -16,10 +16,10 @@ from dockair.scenarios.campaign.journal import Journal
 from dockair.scenarios.campaign.manifest import FILE_NAME, manifest_of, read_manifest, require_same, write_json
 from dockair.scenarios.campaign.plan_file import PlanFile
 from dockair.scenarios.campaign.pool import Done, Pool
-from dockair.scenarios.campaign.row import row_of
+from dockair.scenarios.campaign.row import row_of, unflown
 from dockair.scenarios.campaign.summary import summary_of
 from dockair.scenarios.campaign.table import write_table
-from dockair.scenarios.campaign.worker import FLIGHT, Answer
+from dockair.scenarios.campaign.worker import FLIGHT
 
 #: Called with a row and its wall time as it is done, and with None now and then.
 Watcher = Callable[[dict[str, Any] | None, float], None]
@@ -72,9 +72,7 @@ def run(
             was flown is kept.
         MachineError: there is no room; what was flown is kept.
     """
-    jobs = jobs_of(source)
-    if source.plan.asked is not None:
-        require_power(source.plan.asked, [row_of(job, Answer(columns=None)) for job in jobs], source.place("gate"))
+    jobs = checked_jobs(source)
     code = code_of(jobs)
     check = partial(code.require_unchanged, f"--out {out}")
     now = manifest_of(source.plan, jobs, flight, code)
@@ -103,6 +101,18 @@ def run(
                     told(entry["row"], outcome.answer.wall_time_s)
         timing = {"workers": workers, "flown_last": len(left), "wall_time_last_s": time.perf_counter() - begun}
         return _finish(source, out, jobs, [journal.entries[job.key] for job in jobs], timing)
+
+
+def checked_jobs(source: PlanFile) -> list[Job]:
+    """Return the plan's jobs.
+
+    Raises:
+        DockairError: the plan cannot be flown, or its gate would say nothing.
+    """
+    jobs = jobs_of(source)
+    if source.plan.asked is not None:
+        require_power(source.plan.asked, [unflown(job) for job in jobs], source.place("gate"))
+    return jobs
 
 
 def _begun_once(journal: Journal, out: Path, now: dict[str, Any], jobs: Sequence[Job]) -> dict[str, Any]:

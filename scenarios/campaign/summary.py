@@ -9,6 +9,7 @@ import numpy as np
 from dockair.rotations import Array
 from dockair.scenarios.accept import Accept
 from dockair.scenarios.campaign.jobs import Job
+from dockair.scenarios.campaign.row import flight_of
 from dockair.scenarios.report.groups import Group, Row, Share, groups_of
 
 
@@ -25,7 +26,7 @@ def summary_of(rows: Sequence[Mapping[str, Any]], jobs: Sequence[Job]) -> list[d
 
 def _claimed(rows: Sequence[Row], claims: Mapping[tuple[str, int], Accept]) -> Accept | None:
     """Return what all of a group's flights claim; None where one of them is not as written, or they differ."""
-    found = [claims.get((row["scenario_hash"], row["seed"])) for row in rows]
+    found = [claims.get(flight_of(row)) for row in rows]
     return found[0] if all(claim == found[0] for claim in found) else None
 
 

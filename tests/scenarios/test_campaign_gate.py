@@ -10,8 +10,7 @@ from dockair.scenarios.campaign.gate import judge, require_power
 from dockair.scenarios.campaign.jobs import jobs_of
 from dockair.scenarios.campaign.plan import Gate
 from dockair.scenarios.campaign.plan_file import PlanFile
-from dockair.scenarios.campaign.row import row_of
-from dockair.scenarios.campaign.worker import Answer
+from dockair.scenarios.campaign.row import unflown
 
 
 def rows(docked: int, flights: int, scenario: str = "light", **changes):
@@ -122,4 +121,4 @@ def test_a_test_names_the_navigator_that_is_neither_ours_nor_the_truth():
 
 def test_the_packaged_plan_with_a_gate_may_be_flown():
     source = PlanFile("ci")
-    require_power(source.plan.gate, [row_of(job, Answer(columns=None)) for job in jobs_of(source)], "gate")
+    require_power(source.plan.gate, [unflown(job) for job in jobs_of(source)], "gate")

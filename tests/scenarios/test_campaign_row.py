@@ -8,7 +8,7 @@ import pytest
 from dockair.scenarios.attempts import Attempt
 from dockair.scenarios.campaign.jobs import jobs_of
 from dockair.scenarios.campaign.plan_file import PlanFile
-from dockair.scenarios.campaign.row import COLUMNS, column_names, columns_of, row_of
+from dockair.scenarios.campaign.row import COLUMNS, column_names, columns_of, row_of, unflown
 from dockair.scenarios.campaign.summary import summary_of
 from dockair.scenarios.campaign.table import read_table, write_table
 from dockair.scenarios.campaign.worker import Answer
@@ -101,7 +101,7 @@ def test_the_table_gives_back_the_rows(job, tmp_path):
     ],
 )
 def test_a_drawn_keys_column_has_the_kind_of_its_values(job, tmp_path, values, kept):
-    rows = [row_of(job, Answer(columns=None)) | {"set.start.aft_m": value} for value in values]
+    rows = [unflown(job) | {"set.start.aft_m": value} for value in values]
     write_table(rows, tmp_path)
     back = [row["set.start.aft_m"] for row in read_table(tmp_path)]
     assert [(type(value), value) for value in back] == [(type(value), value) for value in kept]

@@ -606,6 +606,36 @@ def test_the_exit_status_is_that_of_the_gate_and_json_is_one_object(command, her
     assert command("p.toml")[0] == 0
 
 
+def test_a_dry_run_says_what_would_be_flown_and_writes_nothing(command, here, tmp_path):
+    drawn = '[draw."turbulence.sigma_m_s"]\nlow = 0.1\nhigh = 0.4'
+    plan(tmp_path, 3, drawn, '{ scenario = "truth_navigation", seeds = 2 }, "default"')
+    status, out, err = command("p.toml", "--dry-run", "--json")
+    said = json.loads(out)
+    assert (status, err, said["flights"], said["done"], sorted(tmp_path.glob("out"))) == (0, "", 5, 0, [])
+    counts = {(group["scenario"], group["settings"]): (group["flights"], group["done"]) for group in said["groups"]}
+    drawn_key = "turbulence.sigma_m_s drawn"
+    assert counts == {("default", drawn_key): (3, 0), ("truth_navigation", drawn_key): (2, 0)}
+    assert said["commands"][0].startswith("dockair fly truth_navigation --seed 0 --set turbulence.sigma_m_s=0.")
+    assert command("p.toml")[0] == 0
+    plan(tmp_path, 4, drawn, '"default"')
+    assert "4 of 4 flights would be flown" in command("p.toml", "--dry-run")[1]  # other draws of four
+    plan(tmp_path, 4)
+    command("p.toml", "--fresh")
+    plan(tmp_path, 6)
+    assert "2 of 6 flights would be flown" in command("p.toml", "--dry-run")[1]
+    assert command("p.toml", "--dry-run", "--set", "start.aft=1")[0] == 2
+
+
+def test_flights_with_other_settings_are_told_apart_while_they_are_flown(here, tmp_path):
+    source = plan(tmp_path, 2, "", '"default", { scenario = "default", set = { "guidance.hold_s" = 2.0 } }')
+    console = Console(file=io.StringIO(), width=200)
+    progress = CampaignProgress(console)
+    fly(source, tmp_path / "out", watch=progress.begin)
+    said = progress._rates()
+    assert said.count("1 of 2 docked") == 2
+    assert "default with guidance.hold_s=2.0 (camera, predictive)" in said
+
+
 def test_without_a_plan_the_packaged_ones_are_listed_with_their_claims(command):
     status, out, _ = command("--json")
     assert status == 0
@@ -655,7 +685,7 @@ def test_flights_that_are_flown_again_count_once(here, tmp_path):
     progress = CampaignProgress(Console(file=text, width=200))
     fly(plan(tmp_path, 4), tmp_path / "out", watch=progress.begin, retry_errors=True)
     bars = {task.description: (task.completed, task.total) for task in progress._bars.tasks}
-    assert bars == {"truth_navigation (truth)": (4, 4), "all": (4, 4)}
+    assert bars == {"truth_navigation (truth, predictive)": (4, 4), "all": (4, 4)}
     assert progress._pace().endswith(" 0 s left")
     assert "2 of 4 docked" in progress._rates()
     assert "were done before" not in text.getvalue()

@@ -1,0 +1,51 @@
+"""What a campaign would fly, group by group, without flying or writing anything."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from dockair.scenarios.campaign import journal
+from dockair.scenarios.campaign.plan_file import PlanFile
+from dockair.scenarios.campaign.row import flight_of, unflown
+from dockair.scenarios.campaign.run import checked_jobs
+from dockair.scenarios.report.groups import groups_of
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DryRun:
+    """A campaign that has not been flown, or not to its end."""
+
+    name: str
+    folder: Path
+    groups: list[dict[str, Any]]  #: scenario, sensing, navigator, controller, settings, flights, of them done
+    commands: list[str]  #: that fly the flights one by one, in the order of the plan
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what `dockair campaign --dry-run --json` prints."""
+        flights, done = (sum(group[name] for group in self.groups) for name in ("flights", "done"))
+        head = {"campaign": self.name, "folder": str(self.folder), "flights": flights, "done": done}
+        return head | {"groups": self.groups, "commands": self.commands}
+
+
+def dry_run(source: PlanFile, folder: Path) -> DryRun:
+    """Return what a campaign would fly; flights in the folder's journal count as done, errors among them.
+
+    Raises:
+        DockairError: the plan cannot be flown; the folder's journal is damaged.
+    """
+    jobs, path = checked_jobs(source), folder / journal.FILE_NAME
+    entries = journal.read(path)[0] if path.is_file() else {}
+    done = {flight_of(entry["row"]) for entry in entries.values()}
+    groups = [
+        {
+            "scenario": group.scenario,
+            "sensing": group.sensing,
+            "navigator": group.navigator,
+            "controller": group.controller,
+            "settings": group.settings,
+            "flights": len(group.rows),
+            "done": sum(flight_of(row) in done for row in group.rows),
+        }
+        for group in groups_of([unflown(job) for job in jobs])
+    ]
+    return DryRun(name=source.plan.name, folder=folder, groups=groups, commands=[job.command for job in jobs])
