@@ -15,7 +15,7 @@ import numpy as np
 
 from dockair.calibration import LedRing, NavigationSheets
 from dockair.errors import DockairError
-from dockair.messages import CameraFrame, ImuSample, LedObservation, NavSolution, TankerAnnouncement
+from dockair.messages import CameraFrame, ImuSample, LedObservation, NavSolution, PodSignal, TankerAnnouncement
 from dockair.nav.fusion import FilterState, FusionSettings, RelativeFilter
 from dockair.nav.guidance.approach import Guidance, GuidanceSettings, RelativeState
 from dockair.nav.guidance.phases import Phase
@@ -104,6 +104,10 @@ class Navigator:
     def announce(self, announcement: TankerAnnouncement) -> None:
         """Take note of what the tanker is about to do."""
         self._guidance.announce(announcement)
+
+    def signal(self, signal: PodSignal) -> None:
+        """Take note of what the pod's light begins to show."""
+        self._guidance.signal(signal)
 
     def step(self, imu: Sequence[ImuSample], frame: CameraFrame | LedObservation | None) -> NavSolution:
         """Take the gyro samples and the frame, or its LEDs, that arrived since the last control tick."""

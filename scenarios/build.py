@@ -46,6 +46,7 @@ from dockair.sim.faults import Faults
 from dockair.sim.hose.chain import DrogueParameters, HoseParameters
 from dockair.sim.hose.coupling import CouplingParameters
 from dockair.sim.hose.fuel import FuelParameters
+from dockair.sim.hose.pod_light import PodLight, PodLightParameters
 from dockair.sim.hose.reel import ReelParameters
 from dockair.sim.imu import Imu, ImuParameters
 from dockair.sim.outlines import TankerParameters
@@ -93,6 +94,7 @@ class Parts:
     clock: Clock
     periods: Periods
     announcer: Announcer
+    pod_light: PodLight
 
 
 def build(scenario: Scenario, seed: int) -> Parts:
@@ -168,6 +170,7 @@ def build(scenario: Scenario, seed: int) -> Parts:
         clock=clock,
         periods=periods,
         announcer=announcer,
+        pod_light=PodLight(faults.reel_known_dead, _sheet(scenario, "pod_light", PodLightParameters)),
     )
 
 

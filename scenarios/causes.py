@@ -56,7 +56,9 @@ from dockair.sim.truth import Truth
 
 #: Causes that faults of LEDs, camera and IMU can bring about, and those of the reel.
 _OF_SENSORS = ("detection", "integrity", "ambiguity", "navigation_error", "called_off", "never_steady")
-_OF_REEL = ("gust", "bow_wave", "control_limit", "outside_limits", "not_held", "collision", "never_steady")
+_OF_REEL = (
+    "called_off", "gust", "bow_wave", "control_limit", "outside_limits", "not_held", "collision", "never_steady",
+)  # fmt: skip
 
 CAUSES = (
     "diverged", "departed", "out_of_time", "collision", "detection", "integrity", "outside_limits", "not_held",

@@ -13,7 +13,7 @@
 | gyro_bias_step  | rate_deg_s                                  | the gyros' biases jump by this much                |
 | gyro_saturation | limit_deg_s                                 | the gyros' range shrinks to this                   |
 | gyro_drop_out   |                                             | no IMU sample arrives                              |
-| dead_reel       |                                             | the reel's drum is locked                          |
+| dead_reel       | unnoticed                                   | the reel's drum is locked                          |
 
 Without `leds` all LEDs are meant; without `stop_s` a fault lasts to the end.
 """
@@ -117,6 +117,7 @@ class FaultTable(Table):
         Expected("three numbers, each from -5000 to 5000"),
     ] = None  #: jump of the gyros' biases, IMU axes
     limit_deg_s: float | None = Field(default=None, gt=0.0, le=5000.0)  #: range that is left to each gyro
+    unnoticed: bool | None = None  #: whether the pod's light stays amber; false if not given
 
     def check(self, where: str) -> None:
         """Refuse a table without a key that its kind must have, or with one that it cannot have.

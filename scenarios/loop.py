@@ -13,12 +13,12 @@ from pathlib import Path
 import numpy as np
 
 from dockair.errors import DockairError, check_integer
-from dockair.messages import ImuSample, NavSolution, ReceiverCommand, TankerAnnouncement
+from dockair.messages import ImuSample, NavSolution, PodSignal, ReceiverCommand, TankerAnnouncement
 from dockair.scenarios.attempts import RefereeLimits
 from dockair.scenarios.build import build
 from dockair.scenarios.camera_process import OverlappedExposures, can_overlap
 from dockair.scenarios.exposures import Exposures, ExposuresInTurn, Frame
-from dockair.scenarios.plug_in import announce_to, step_navigator
+from dockair.scenarios.plug_in import announce_to, signal_to, step_navigator
 from dockair.scenarios.recorder import Recorder
 from dockair.scenarios.referee import Outcome, Referee
 from dockair.scenarios.result import Result
@@ -40,6 +40,7 @@ class Tick:
     solution: NavSolution
     outcome: Outcome | None
     announcement: TankerAnnouncement | None = None
+    signal: PodSignal | None = None
     touched: bool = False  #: the probe touched the drogue at one of the tick's physics ticks; most touches are shorter
 
 
@@ -58,6 +59,7 @@ class Flight:
         self.scenario, self.clock, self.sheets = scenario, parts.clock, parts.sheets
         self.world, self.camera, self.imu, self.navigator = parts.world, parts.camera, parts.imu, parts.navigator
         self.as_built, self._faults, self._announcer = parts.as_built, parts.faults, parts.announcer
+        self._pod_light = parts.pod_light
         self.referee = Referee(RefereeLimits(rim_radius_m=0.5 * parts.sheets.ring.diameter_m))
         self._full_frames = full_frames
         self._periods = parts.periods
@@ -102,6 +104,9 @@ class Flight:
         announcement = self._announcer.due(truth.time_s)
         if announcement is not None:
             announce_to(self.navigator, announcement)
+        signal = self._pod_light.due(truth.time_s)
+        if signal is not None:
+            signal_to(self.navigator, signal)
         # LEDs in place of a frame only where they are asked for
         solution = step_navigator(self.navigator, imu, frame)  # type: ignore[arg-type]
         self._next_command = solution.command
@@ -122,6 +127,7 @@ class Flight:
             solution=solution,
             outcome=outcome,
             announcement=announcement,
+            signal=signal,
             touched=touched,
         )
 

@@ -3,7 +3,7 @@
 | file               | one row a control tick                                                             |
 |--------------------|------------------------------------------------------------------------------------|
 | messages.parquet   | IMU samples and, if they arrived, the frame (lossless PNG, window, stamp, exposure, gain) and |
-|                    | what the tanker announced                                                          |
+|                    | what the tanker announced, what the pod's light began to show                      |
 | estimates.parquet  | every field of `NavSolution`; all numbers as 64-bit floats                         |
 | navigator.json     | the navigator's class, its calibration sheets and settings, floats to the last bit,      |
 |                    | and a digest of the navigation's sources                                                 |
@@ -33,7 +33,7 @@ from numpy.typing import NDArray
 
 from dockair.calibration import NavigationSheets
 from dockair.errors import DockairError, MachineError
-from dockair.messages import CameraFrame, ImuSample, Navigates, NavSolution, TankerAnnouncement, Window
+from dockair.messages import CameraFrame, ImuSample, Navigates, NavSolution, PodSignal, TankerAnnouncement, Window
 from dockair.rotations import Array
 from dockair.scenarios.exact_json import decode, encode
 from dockair.scenarios.plug_in import make_navigator, navigator_class_of
@@ -56,6 +56,7 @@ _MESSAGE_SCHEMA = pa.schema(
         ("exposure_s", pa.float64()),
         ("gain", pa.float64()),
         ("announcement", _FLOATS),
+        ("pod_signal", _FLOATS),
         ("png", pa.binary()),
     ]
 )
@@ -123,6 +124,7 @@ class TickMessages:
     frame: CameraFrame | None
     png: bytes | None  #: the frame's pixels as stored
     announcement: TankerAnnouncement | None = None
+    signal: PodSignal | None = None
 
 
 def numbers(value: Any) -> Array:
@@ -140,7 +142,7 @@ def estimate_row(solution: NavSolution) -> dict[str, Array | str]:
     return {name: value if isinstance(value, str) else numbers(value) for name, value in values.items()}
 
 
-_Entry = tuple[tuple[ImuSample, ...], CameraFrame | None, TankerAnnouncement | None, NavSolution]
+_Entry = tuple[tuple[ImuSample, ...], CameraFrame | None, TankerAnnouncement | None, PodSignal | None, NavSolution]
 
 
 class MessageLog:
@@ -164,6 +166,7 @@ class MessageLog:
         frame: CameraFrame | None,
         solution: NavSolution,
         announcement: TankerAnnouncement | None = None,
+        signal: PodSignal | None = None,
     ) -> None:
         """Take one control tick; blocks while the encoder is too far behind.
 
@@ -171,7 +174,7 @@ class MessageLog:
             MachineError: the disk refused an earlier tick.
         """
         self._raise_failure()
-        self._queue.put((tuple(imu), frame, announcement, solution))
+        self._queue.put((tuple(imu), frame, announcement, signal, solution))
 
     def close(self) -> None:
         """Write what is still waiting and close the files.
@@ -211,8 +214,8 @@ class MessageLog:
             if self._failure is not None:
                 continue  # keep taking, so that the flight is not blocked before it is told
             try:
-                messages.append(_message_row(*entry[:3]))
-                estimates.append(estimate_row(entry[3]))
+                messages.append(_message_row(*entry[:4]))
+                estimates.append(estimate_row(entry[4]))
                 if len(messages) == ROW_GROUP_TICKS:
                     self._flush(messages, estimates)
             except BaseException as failure:  # noqa: B036 - handed to the flight's thread
@@ -236,13 +239,17 @@ def _compressed() -> list[str]:
 
 
 def _message_row(
-    imu: tuple[ImuSample, ...], frame: CameraFrame | None, announcement: TankerAnnouncement | None
+    imu: tuple[ImuSample, ...],
+    frame: CameraFrame | None,
+    announcement: TankerAnnouncement | None,
+    signal: PodSignal | None,
 ) -> dict[str, Any]:
     row: dict[str, Any] = {
         "gyro_time_stamp_s": [sample.time_stamp_s for sample in imu],
         "gyro_angular_rate_rad_s": [float(rate) for sample in imu for rate in sample.angular_rate_rad_s],
         "accelerometer_specific_force_m_s2": [float(f) for sample in imu for f in sample.specific_force_m_s2],
         "announcement": numbers(announcement).tolist(),
+        "pod_signal": numbers(signal).tolist(),
     }
     if frame is not None:
         row |= {name: getattr(frame.window, name) for name in _WINDOW_COLUMNS}
@@ -281,11 +288,12 @@ def _tick_from_row(row: dict[str, Any], pixels: bool) -> TickMessages:
         ImuSample(time_stamp_s=t, angular_rate_rad_s=rate, specific_force_m_s2=force)
         for t, rate, force in zip(row["gyro_time_stamp_s"], rates, forces, strict=True)
     )
-    png, said = row["png"], row.get("announcement")
+    png, said, shown = row["png"], row.get("announcement"), row.get("pod_signal")
     names = [f.name for f in fields(TankerAnnouncement)]
     announcement = TankerAnnouncement(**dict(zip(names, said, strict=True))) if said else None
+    signal = PodSignal(time_stamp_s=shown[0], red=bool(shown[1])) if shown else None
     if png is None:
-        return TickMessages(imu=imu, frame=None, png=None, announcement=announcement)
+        return TickMessages(imu=imu, frame=None, png=None, announcement=announcement, signal=signal)
     window = Window(*(row[name] for name in _WINDOW_COLUMNS))
     frame = CameraFrame(
         time_stamp_s=row["frame_time_stamp_s"],
@@ -294,7 +302,7 @@ def _tick_from_row(row: dict[str, Any], pixels: bool) -> TickMessages:
         exposure_s=row["exposure_s"],
         gain=row["gain"],
     )
-    return TickMessages(imu=imu, frame=frame, png=png, announcement=announcement)
+    return TickMessages(imu=imu, frame=frame, png=png, announcement=announcement, signal=signal)
 
 
 def png_from_pixels(pixels: NDArray[np.uint8]) -> bytes:

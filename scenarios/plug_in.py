@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
 from dockair.errors import DockairError
-from dockair.messages import CameraFrame, ImuSample, Navigates, NavSolution, TankerAnnouncement
+from dockair.messages import CameraFrame, ImuSample, Navigates, NavSolution, PodSignal, TankerAnnouncement
 from dockair.scenarios.exact_json import import_by_name, name_of, said_by
 
 T = TypeVar("T")
@@ -61,9 +61,22 @@ def announce_to(navigator: Navigates, announcement: TankerAnnouncement) -> None:
     Raises:
         DockairError: it is somebody's own and raises an exception.
     """
-    announce = getattr(navigator, "announce", None)
-    if announce is not None:
-        _called(type(navigator), "announce(announcement) without an exception", announce, announcement)
+    _tell(navigator, "announce", announcement)
+
+
+def signal_to(navigator: Navigates, signal: PodSignal) -> None:
+    """Show a navigator what the pod's light begins to show, if it looks.
+
+    Raises:
+        DockairError: it is somebody's own and raises an exception.
+    """
+    _tell(navigator, "signal", signal)
+
+
+def _tell(navigator: Navigates, method: str, message: TankerAnnouncement | PodSignal) -> None:
+    listens = getattr(navigator, method, None)
+    if listens is not None:
+        _called(type(navigator), f"{method}(message) without an exception", listens, message)
 
 
 def _called(owner: Any, expected: str, function: Callable[..., T], *given: Any) -> T:

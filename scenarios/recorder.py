@@ -49,7 +49,7 @@ class Recorder:
         self._log.append(tick.truth, tick.imu, tick.frame, tick.solution)
         if self._messages is not None:
             assert not isinstance(tick.frame, LedObservation), "a flight without frames has no recipe"
-            self._messages.append(tick.imu, tick.frame, tick.solution, tick.announcement)
+            self._messages.append(tick.imu, tick.frame, tick.solution, tick.announcement, tick.signal)
 
     def __enter__(self) -> Self:
         return self

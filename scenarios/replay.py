@@ -31,7 +31,7 @@ from dockair.scenarios.message_log import (
     read_messages,
     recorded_code,
 )
-from dockair.scenarios.plug_in import announce_to, step_navigator
+from dockair.scenarios.plug_in import announce_to, signal_to, step_navigator
 
 FORBIDDEN = ("dockair.sim", "mujoco", "dockair.assets", "dockair.parameters")
 
@@ -105,6 +105,8 @@ def replay_in_this_process(out_dir: str | Path) -> ReplayReport:
             raise DockairError(str(folder), expected="as many messages as estimates", got="a cut-off recording")
         if messages.announcement is not None:
             announce_to(navigator, messages.announcement)
+        if messages.signal is not None:
+            signal_to(navigator, messages.signal)
         replayed = estimate_row(step_navigator(navigator, messages.imu, messages.frame))
         for name in replayed:
             if name not in recorded or not same_bits(recorded[name], replayed[name]):

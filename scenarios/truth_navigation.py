@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from dockair.calibration import NavigationSheets
-from dockair.messages import CameraFrame, ImuSample, NavSolution, TankerAnnouncement
+from dockair.messages import CameraFrame, ImuSample, NavSolution, PodSignal, TankerAnnouncement
 from dockair.nav.guidance.approach import Guidance, GuidanceSettings, RelativeState
 from dockair.rotations import Array
 from dockair.sim.truth import Truth
@@ -33,6 +33,10 @@ class TruthNavigator:
     def announce(self, announcement: TankerAnnouncement) -> None:
         """Take note of what the tanker is about to do."""
         self._guidance.announce(announcement)
+
+    def signal(self, signal: PodSignal) -> None:
+        """Take note of what the pod's light begins to show."""
+        self._guidance.signal(signal)
 
     def step(self, imu: Sequence[ImuSample], frame: CameraFrame | None) -> NavSolution:
         """Return the true relative state and what the guidance commands on it."""

@@ -120,6 +120,8 @@ class GyroDropOut(Fault):
 class DeadReel(Fault):
     """The reel's drum is locked: it neither takes hose up nor pays it out."""
 
+    unnoticed: bool = False  #: by the hose unit, so that the pod's light stays amber
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CameraFault:
@@ -218,6 +220,10 @@ class Faults:
     def reel_locked(self, time_s: float) -> bool:
         """Whether the reel is dead at a time."""
         return bool(self._faults) and bool(self._acting(DeadReel, time_s))
+
+    def reel_known_dead(self, time_s: float) -> bool:
+        """Whether the hose unit knows at a time that the reel is dead."""
+        return bool(self._faults) and any(not fault.unnoticed for fault in self._acting(DeadReel, time_s))
 
     def _acting(self, kind: type[T], time_s: float) -> list[T]:
         return [f for f in self._faults if isinstance(f, kind) and f.start_s <= time_s < f.stop_s]

@@ -21,7 +21,7 @@ the next one's aim (`bow_wave_push`).
 
 import numpy as np
 
-from dockair.messages import ReceiverCommand, TankerAnnouncement
+from dockair.messages import PodSignal, ReceiverCommand, TankerAnnouncement
 from dockair.nav.guidance.announced_path import AnnouncedPath
 from dockair.nav.guidance.closing import PredictedMiss, time_to_contact_s
 from dockair.nav.guidance.closure import Closure
@@ -65,7 +65,7 @@ class Guidance:
         self._entered_m = 0.0  # how far off when the tip last came past it
         speeds = settings.closure_speed_m_s, settings.closure_acceleration_m_s2
         self._closure = Closure(settings.closing, *speeds, self._dt)
-        self._attempts, self._has_seen = 0, False
+        self._attempts, self._has_seen, self._light_is_red = 0, False, False
         self._time_s = self._in_phase_s = self._steady_s = self._patient_s = 0.0
         self._unusable_s = self._track_lost_s = self._blind_s = self._doubtful_s = 0.0
         self._inside_s = self._pushed_in_m = 0.0
@@ -73,6 +73,10 @@ class Guidance:
     def announce(self, announcement: TankerAnnouncement) -> None:
         """Take note of what the tanker is about to do."""
         self._path.announce(announcement)
+
+    def signal(self, signal: PodSignal) -> None:
+        """Take note of what the pod's light begins to show."""
+        self._light_is_red = signal.red
 
     def step(self, state: RelativeState) -> ReceiverCommand:
         """Advance by one control tick.
@@ -200,6 +204,7 @@ class Guidance:
             committed=self._closure.committed,
             pushed_in_m=self._pushed_in_m,
             attempts=self._attempts,
+            light_is_red=self._light_is_red,
         )
 
     def _change_phase(self, situation: Situation) -> None:

@@ -80,6 +80,7 @@ class Situation:
     committed: bool  #: too near to be called back
     pushed_in_m: float  #: way flown toward the tanker since the coupling was reached
     attempts: int  #: approaches begun
+    light_is_red: bool = False  #: of the pod: the hose is dead
 
 
 _Condition = Callable[[PhaseLimits, Situation], bool]
@@ -151,7 +152,7 @@ TRANSITIONS: dict[Phase, tuple[Transition, ...]] = {
         Transition(
             Phase.APPROACH,
             "steady",
-            lambda limits, s: s.steady_s >= limits.stabilise_s and s.spread_m <= s.radius_m,
+            lambda limits, s: s.steady_s >= limits.stabilise_s and s.spread_m <= s.radius_m and not s.light_is_red,
         ),
     ),
     Phase.APPROACH: (
@@ -161,6 +162,7 @@ TRANSITIONS: dict[Phase, tuple[Transition, ...]] = {
         Transition(Phase.BREAKAWAY, "far off axis", _off_axis),
         Transition(Phase.BREAKAWAY, "beside the basket", _beside),
         _LOST_FOR_GOOD,
+        Transition(Phase.BACK_OFF, "red light", lambda limits, s: s.light_is_red and not s.committed),
         Transition(Phase.BACK_OFF, "time slot over", lambda limits, s: s.time_s >= limits.slot_s and s.waiting_s > 0.0),
         Transition(Phase.BACK_OFF, "no good moment to close", lambda limits, s: s.waiting_s >= limits.waiting_s),
         Transition(Phase.BACK_OFF, "coupling not reached", lambda limits, s: s.inside_s >= limits.inside_s),
@@ -169,6 +171,7 @@ TRANSITIONS: dict[Phase, tuple[Transition, ...]] = {
     Phase.CONTACT: (
         _TOO_FAST,
         Transition(Phase.BREAKAWAY, "beside the basket", _beside),
+        Transition(Phase.BACK_OFF, "red light", lambda limits, s: s.light_is_red),
         Transition(Phase.BACK_OFF, "drogue has not come along", _left),
         Transition(
             Phase.HOLD, "in the refuelling range", lambda limits, s: s.pushed_in_m >= limits.taken_in * limits.take_in_m
@@ -176,6 +179,7 @@ TRANSITIONS: dict[Phase, tuple[Transition, ...]] = {
     ),
     Phase.HOLD: (
         Transition(Phase.BREAKAWAY, "drogue has left the probe", _left),
+        Transition(Phase.DISCONNECT, "red light", lambda limits, s: s.light_is_red),
         Transition(Phase.DISCONNECT, "refuelled", lambda limits, s: s.in_phase_s >= limits.hold_s),
     ),
     Phase.DISCONNECT: (Transition(Phase.CLEAR, "drogue well ahead", _far_enough),),

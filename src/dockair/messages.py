@@ -123,11 +123,20 @@ class TankerAnnouncement:
     climb_rad: float  #: of the way through the air then
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PodSignal:
+    """What the light of the refuelling pod begins to show; amber, the hose is ready, until the first of these."""
+
+    time_stamp_s: float  #: when it was seen
+    red: bool  #: the hose is not ready: no contact is to be made; else amber
+
+
 class Navigates(Protocol):
     """Anything that can stand where `nav.navigator.Navigator` stands; a scenario may name any such class.
 
     It is made once a flight, of nothing but `calibration.NavigationSheets`: `Class(sheets)`. One that has a method
-    `announce(TankerAnnouncement)` is told of the tanker's changes, before the tick's `step`.
+    `announce(TankerAnnouncement)` is told of the tanker's changes, one that has `signal(PodSignal)` of those of the
+    pod's light, before the tick's `step`.
     """
 
     def step(self, imu: Sequence[ImuSample], frame: CameraFrame | None) -> NavSolution:

@@ -34,6 +34,7 @@ RIGHT = [
     ("kind = 'gyro_saturation', limit_deg_s = 5.0", faults.GyroSaturation(limit_rad_s=np.pi / 36.0)),
     ("kind = 'gyro_drop_out'", faults.GyroDropOut()),
     ("kind = 'dead_reel', start_s = 4.0", faults.DeadReel(start_s=4.0)),
+    ("kind = 'dead_reel', unnoticed = true", faults.DeadReel(unnoticed=True)),
 ]
 
 

@@ -1,5 +1,7 @@
 """Faults through the whole loop: what the navigation gets while something is broken, and that it goes on."""
 
+import pytest
+
 from dockair.messages import CameraFrame, ImuSample
 from dockair.scenarios.loop import Flight
 from dockair.scenarios.schema import load_scenario
@@ -43,6 +45,24 @@ def test_messages_stop_stick_and_jump_as_the_scenario_says_and_time_goes_on():
     assert yaw_rate(0.94) < 0.05  # 3 deg/s
     assert yaw_rate(1.05) > 0.45  # 26 deg/s
     assert 0.17 < yaw_rate(1.20) < 0.18  # 10 deg/s and a quantum
+
+
+@pytest.mark.parametrize(
+    ("start_s", "unnoticed", "reasons"),
+    [(5.0, False, ["steady", "red light"]), (5.0, True, ["steady", "coupling reached"]), (1.0, False, [])],
+)
+def test_the_pods_red_light_calls_an_approach_back_and_lets_none_begin(start_s, unnoticed, reasons):
+    fault = {"kind": "dead_reel", "start_s": start_s, "unnoticed": unnoticed}
+    flight = Flight(load_scenario("truth_navigation", {"faults": [fault]}), 0)
+    found: list[str] = []
+    try:
+        while flight.truth.time_s < 12.0 and found[-1:] != ["coupling reached"]:
+            reason = flight.step().solution.phase_reason
+            if reason not in found:
+                found.append(reason)
+    finally:
+        flight.close()
+    assert [reason for reason in found if reason in ("steady", "red light", "coupling reached")] == reasons
 
 
 def test_reel_that_the_scenario_kills_holds_the_hose_from_then_on():

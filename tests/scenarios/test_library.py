@@ -10,6 +10,7 @@ from dockair.scenarios.schema import load_scenario
 
 NAMES = scenario_names()
 PAGE = (Path(__file__).parents[2] / "docs" / "scenarios.md").read_text(encoding="utf-8")
+HARMLESS = {"severe_gusts", "dead_reel"}  # held to doing no harm: nobody is to dock at any price
 FREE = {"name", "claim", "accept"}  # keys that do not change a flight
 
 
@@ -21,9 +22,9 @@ def test_a_scenario_claims_something_in_a_sentence_and_is_held_to_figures(name):
     assert scenario.accept.claims_rates and scenario.accept.unsafe_max == 0
 
 
-@pytest.mark.parametrize("name", [name for name in NAMES if name != "severe_gusts"])
+@pytest.mark.parametrize("name", [name for name in NAMES if name not in HARMLESS])
 def test_whoever_is_to_dock_is_held_to_the_limits_of_service_practice(name):
-    """Contact within 0.15 m of the centre at 1.0 to 1.5 m/s; severe turbulence is held to doing no harm instead."""
+    """Contact within 0.15 m of the centre at 1.0 to 1.5 m/s; before severe gusts and red lights, no harm instead."""
     accept = load_scenario(name).accept
     assert (accept.outcome, accept.radial_offset_max_m) == ("contact", 0.15)
     assert (accept.closure_speed_min_m_s, accept.closure_speed_max_m_s, accept.closure_rate_min) == (1.0, 1.5, 0.95)
@@ -39,6 +40,12 @@ def test_the_levels_of_turbulence_are_held_to_the_figures_of_the_project():
     ]
     assert figures == [(0.95, 0.99, 0.05), (0.70, 0.95, 0.08)]
     assert severe.accept.clean_rate_min == 1.0 and severe.accept.outcome is None
+
+
+def test_a_dead_reel_that_is_noticed_keeps_the_receiver_away_and_another_is_flown_as_any_hose():
+    noticed, unnoticed = load_scenario("dead_reel"), load_scenario("dead_reel_unnoticed")
+    assert (noticed.accept.outcome, noticed.accept.clean_rate_min) == ("abort", 1.0)
+    assert [fault.unnoticed for fault in (*noticed.faults, *unnoticed.faults)] == [None, True]
 
 
 def test_no_two_scenarios_fly_the_same():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dockair.errors import DockairError, MachineError
-from dockair.messages import NavSolution, TankerAnnouncement
+from dockair.messages import NavSolution, PodSignal, TankerAnnouncement
 from dockair.scenarios import message_log
 from dockair.scenarios.exact_json import decode, encode
 from dockair.scenarios.message_log import (
@@ -60,6 +60,14 @@ def test_announcement_is_read_back_in_the_tick_it_was_made_in_and_in_no_other(ha
         for k, (_, imu, frame, solution) in enumerate(hand_made.ticks(5)):
             log.append(imu, frame, solution, said if k == 3 else None)
     assert [messages.announcement for messages in read_messages(tmp_path)] == [None, None, None, said, None]
+
+
+def test_what_the_light_shows_is_read_back_in_its_tick(hand_made, tmp_path):
+    red = PodSignal(time_stamp_s=0.1 + 0.2, red=True)
+    with MessageLog(tmp_path, NavigatorRecipe(class_name="a:B", sheets=hand_made.sheets)) as log:
+        for k, (_, imu, frame, solution) in enumerate(hand_made.ticks(3)):
+            log.append(imu, frame, solution, signal=red if k == 1 else None)
+    assert [messages.signal for messages in read_messages(tmp_path)] == [None, red, None]
 
 
 def test_estimates_are_read_back_to_the_last_bit(hand_made, tmp_path):

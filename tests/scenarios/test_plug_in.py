@@ -11,7 +11,7 @@ from dockair.messages import NavSolution
 from dockair.nav.navigator import Navigator
 from dockair.scenarios.loop import fly
 from dockair.scenarios.message_log import NavigatorRecipe
-from dockair.scenarios.plug_in import announce_to, navigator_class_of, step_navigator
+from dockair.scenarios.plug_in import announce_to, navigator_class_of, signal_to, step_navigator
 from dockair.scenarios.schema import load_scenario
 
 HERE = __name__
@@ -102,6 +102,9 @@ class Fails(Steps):
     def announce(self, announcement):
         return {}["no such\nkey"]
 
+    def signal(self, signal):
+        return {}["nor such"]
+
 
 class Ends(Steps):
     def step(self, imu, frame):
@@ -116,11 +119,16 @@ def _announce(navigator):
     return announce_to(navigator, None)
 
 
+def _signal(navigator):
+    return signal_to(navigator, None)
+
+
 @pytest.mark.parametrize(
     ("failing", "tell", "kind", "line"),
     [
         (Fails, _step, np.linalg.LinAlgError, "np.linalg.inv("),
         (Fails, _announce, KeyError, 'return {}["no such'),
+        (Fails, _signal, KeyError, 'return {}["nor such"]'),
         (Ends, _step, SystemExit, "raise SystemExit(7)"),
     ],
 )
