@@ -12,64 +12,68 @@ _SEGMENT = 64  # pixels that are passed over at once
 
 
 @njit(cache=True)
-def _best_contrast(centre, above, below, left, right, zero):  # type: ignore[no-untyped-def]
-    """Largest 13/16 x - n of a segment.
+def _may_hold(centre, above, below, left, right, contrast):  # type: ignore[no-untyped-def]
+    """Whether a pixel of a segment has the contrast.
 
-    A constant length, indices from 0 and no type but the image's: only so does it become vector instructions.
+    A constant length, indices from 0, no type but the image's, and a flag instead of the largest contrast, which would
+    have to be found across a vector: only so do 64 pixels become a few vector instructions.
     """
-    best = zero
+    found = False
     for k in range(_SEGMENT):
         high_1, low_1 = max(above[k], below[k]), min(above[k], below[k])
         high_2, low_2 = max(left[k], right[k]), min(left[k], right[k])
         second = max(min(high_1, high_2), max(low_1, low_2))
         x = centre.dtype.type(centre[k] - (((centre[k] >> 1) + 1) >> 2) - (centre[k] >> 4))
-        best = max(best, centre.dtype.type(max(x, second) - second))
-    return best
+        if centre.dtype.type(max(x, second) - second) >= contrast:
+            found = True
+    return found
 
 
 @njit(cache=True)
-def _segments(image, i, zero, contrast, reach, found):  # type: ignore[no-untyped-def]
-    """First columns of the segments of row i that may hold a pixel of a spot; their number."""
-    n = 0
-    end = image.shape[1] - reach
-    for first in range(reach, end, _SEGMENT):
-        s = min(first, end - _SEGMENT)  # the last segment begins earlier than its own pixels
-        if s >= reach:
+def _segments(image, reach, row_step, contrast, found):  # type: ignore[no-untyped-def]
+    """Rows and first columns of the segments that may hold a pixel of a spot, into `found`; their number.
+
+    A loop of its own, which nothing else keeps from the registers.
+    """
+    n, end = 0, image.shape[1] - reach
+    for i in range(reach, image.shape[0] - reach, row_step):
+        for first in range(reach, end, _SEGMENT):
+            s = min(first, end - _SEGMENT)  # the last segment begins earlier than its own pixels
             e = s + _SEGMENT
-            above, below = image[i - reach, s:e], image[i + reach, s:e]
-            left, right = image[i, s - reach : e - reach], image[i, s + reach : e + reach]
-            if _best_contrast(image[i, s:e], above, below, left, right, zero) < contrast:
+            if s >= reach and not _may_hold(
+                image[i, s:e], image[i - reach, s:e], image[i + reach, s:e],
+                image[i, s - reach : e - reach], image[i, s + reach : e + reach], contrast,
+            ):  # fmt: skip
                 continue
-        found[n] = first
-        n += 1
+            found[n, 0], found[n, 1] = i, first
+            n += 1
     return n
 
 
 @njit(cache=True)
-def find_hits(image, zero, reaches, row_steps, contrasts, wide):  # type: ignore[no-untyped-def]
+def find_hits(image, reaches, row_steps, contrasts, wide):  # type: ignore[no-untyped-def]
     """(n, 4) which reach, row, column and n of the pixels that may belong to a spot, reach by reach.
 
     Args:
         image: contiguous.
-        zero: of the image's type.
         reaches: to look at.
         row_steps: of each, how many rows from one that is looked at to the next.
-        contrasts: of each, what a pixel has to have, whole.
+        contrasts: of each, what a pixel has to have, whole and not above the image's largest level.
         wide: reach from which on a spot may have many pixels of one level.
     """
-    columns = image.shape[1]
-    found = np.empty(columns // _SEGMENT + 1, np.int64)
+    rows, columns = image.shape
+    found = np.empty((rows * (columns // _SEGMENT + 1), 2), np.int64)  # touched only as far as it is used
     hits, n = np.empty((512, 4), np.int32), 0
     for k in range(len(reaches)):
         reach, contrast = reaches[k], contrasts[k]
         # the brightest of the neighbours that are looked at too speaks for its spot; 0 compares a pixel with itself
         beside, above = int(reach < wide), int(reach < wide and row_steps[k] == 1)
-        for i in range(reach, image.shape[0] - reach, row_steps[k]):
-            for first in found[: _segments(image, i, zero, contrast, reach, found)]:
-                while n + _SEGMENT > len(hits):
-                    hits = _grown(hits)
-                end = min(first + _SEGMENT, columns - reach)
-                n = _look_at(image, i, first, end, k, reach, contrast, beside, above, hits, n)
+        for f in range(_segments(image, reach, row_steps[k], image.dtype.type(contrast), found)):
+            i, first = found[f, 0], found[f, 1]
+            while n + _SEGMENT > len(hits):
+                hits = _grown(hits)
+            end = min(first + _SEGMENT, columns - reach)
+            n = _look_at(image, i, first, end, k, reach, contrast, beside, above, hits, n)
     return hits[:n]
 
 

@@ -76,7 +76,7 @@ def find_spots(image: Image, limits: SpotLimits) -> Spots:
     """All spots of an image (rows, columns) of uint8 or uint16, by Eqs. (1) to (3)."""
     contrasts, model = _numbers(limits, (1 << 8 * image.dtype.itemsize) - 1)
     image = np.ascontiguousarray(image)
-    hits = find_hits(image, image.dtype.type(0), REACHES_PX, ROW_STEPS, contrasts, WIDE_PX)
+    hits = find_hits(image, REACHES_PX, ROW_STEPS, contrasts, WIDE_PX)
     row, start, stop, offset, threshold, background = grow(image, hits, contrasts, model)
     runs = Runs(row=row, start=start, stop=stop, offset=offset)
     return Spots(runs=runs, threshold_dn=threshold, background_dn=background)
