@@ -40,7 +40,7 @@ from dockair.errors import DockairError
 from dockair.messages import Window
 from dockair.nav.identify.perspective import SLOTS
 from dockair.nav.identify.ring import Identification, IdentificationStatus
-from dockair.nav.track_kernels import predicted, process_noise, turned
+from dockair.nav.track_kernels import ahead, innovation_squared, process_noise, turn
 from dockair.rotations import Array
 
 if TYPE_CHECKING:
@@ -51,6 +51,7 @@ _AXES = 4  # u, v, r, phi: their rates follow in the same order
 _PLACES, _RATES = np.arange(_AXES), np.arange(_AXES, 2 * _AXES)
 _CENTRE = np.array([0, 1, _AXES, _AXES + 1])
 _COMPLEX = np.array([1.0, 1.0j])
+_NO_TURN = np.zeros(3)
 _HALF_PLACE = np.pi / SLOTS  # a roll off by more is another numbering
 
 
@@ -99,10 +100,13 @@ class RingTracker:
         if not frame_interval_s > 0.0:
             raise DockairError("tracker.frame_interval_s", expected="a number > 0", got=frame_interval_s)
         self._camera, self._dt, self._settings = camera, frame_interval_s, settings or TrackSettings()
-        self._ring_radius_m, self._lever_C = ring_radius_m, np.zeros(3) if lever_C is None else lever_C
+        lever_C = np.zeros(3) if lever_C is None else _row(lever_C)
+        self._optics = camera.focal_length_px, camera.principal_point_px, ring_radius_m, lever_C  # of the kernels
+        s = self._settings
+        self._noise = s.process_variance, s.acceleration_radii_s2, s.roll_acceleration_rad_s2
         self._gate = float(chdtri(3, 1.0 - self._settings.gate_probability))
         self._kalman: KalmanFilter | None = None
-        self._places: Array = np.full(SLOTS, np.nan + 0j)  # q_k of Eq. (2), as complex numbers
+        self._newest: Identification | None = None  # whose ring has the places q_k of Eq. (2)
         self._misses = 0
         self.normalised_innovation_squared = float("nan")  #: of the last measurement, 3 degrees of freedom
 
@@ -154,10 +158,12 @@ class RingTracker:
     @property
     def expected_led_px(self) -> Array | None:
         """(8, 2) where each numbered LED should be now, for `identify`; None when there is no ring."""
-        if self._kalman is None or not self.tracking:
+        if self._kalman is None or self._newest is None or not self.tracking:
             return None
         u, v, r, phi = self._kalman.x[:_AXES, 0]
-        z = r * np.exp(1j * phi) * self._places  # Eq. (2)
+        offset = (self._newest.led_pixels_px - self._newest.centre_px) @ _COMPLEX
+        places = offset / self._newest.radius_px * np.exp(-1j * self._newest.roll_rad)  # q_k
+        z = r * np.exp(1j * phi) * places  # Eq. (2)
         return np.column_stack([u + z.real, v + z.imag])
 
     @property
@@ -178,11 +184,7 @@ class RingTracker:
         self._kalman.F[_PLACES, _RATES] = dt
         self._kalman.predict(Q=self._process_noise(dt))
         if turn_C is not None:
-            x = self._kalman.x[:, 0]
-            x[0], x[1], x[_R], roll = self._turned(x, turn_C)
-            x[_PHI] += roll
-            velocity = (x[_AXES] + 1j * x[_AXES + 1]) * np.exp(1j * roll)
-            x[_AXES], x[_AXES + 1] = velocity.real, velocity.imag
+            turn(self._kalman.x[:, 0], _row(turn_C), *self._optics)
 
     def update(self, identification: Identification) -> bool:
         """Take what was identified in the frame; true when it was accepted (or began a track)."""
@@ -191,13 +193,14 @@ class RingTracker:
             if found:
                 self._begin(identification)
             return found
-        if not found or not self._passes(identification):
+        z, variance = _measured(identification), self._measurement_noise(identification.radius_px)
+        if not found or not self._passes(z, variance):
             self._misses += 1
             if not self.tracking:
                 self.lose()
             return False
-        self._correct(identification)
-        self._remember(identification)
+        self._correct(z, variance)
+        self._misses, self._newest = 0, identification
         return True
 
     def window(self, turn_C: Array | None = None, interval_s: float | None = None) -> Window | None:
@@ -211,12 +214,10 @@ class RingTracker:
             return None
         s, camera = self._settings, self._camera
         dt = self._dt if interval_s is None else interval_s
-        places, sigma = predicted(
-            np.ascontiguousarray(self._kalman.x[:, 0]), self._kalman.P, dt, self._process_noise(dt)
-        )
-        u, v, r, _ = places.tolist()
-        if turn_C is not None:
-            u, v, _, _ = self._turned(places, turn_C)
+        u, v, r, sigma = ahead(
+            self._kalman.x[:, 0], self._kalman.P, dt, self._noise, _NO_TURN if turn_C is None else _row(turn_C),
+            *self._optics,
+        )  # fmt: skip
         sigma_u, sigma_v, sigma_r, _ = sigma.tolist()
         radius = (r + s.window_sigmas * sigma_r) * (1.0 + s.window_margin_radii) + s.window_margin_px
         growth = s.growth_per_miss**self._misses
@@ -236,21 +237,10 @@ class RingTracker:
             return np.full(2 * _AXES, np.nan)
         return np.array(self._kalman.x[:, 0])
 
-    def _turned(self, state: Array, turn_C: Array) -> tuple[float, float, float, float]:
-        """u, v, r of a ring at rest when the camera has turned, and by what its roll has changed."""
-        camera = self._camera
-        return turned(
-            np.ascontiguousarray(state), np.ascontiguousarray(turn_C, dtype=float), camera.focal_length_px,
-            camera.principal_point_px, self._ring_radius_m, self._lever_C,
-        )  # fmt: skip
-
     def _process_noise(self, dt: float) -> Array:
         """(8, 8) Q, Eq. (1)."""
         assert self._kalman is not None
-        s = self._settings
-        return process_noise(
-            float(self._kalman.x[_R, 0]), dt, s.process_variance, s.acceleration_radii_s2, s.roll_acceleration_rad_s2
-        )
+        return process_noise(float(self._kalman.x[_R, 0]), dt, *self._noise)
 
     def _measurement_noise(self, radius_px: float) -> Array:
         variance = self._settings.measurement_variance
@@ -267,30 +257,29 @@ class RingTracker:
         kalman.x = np.concatenate([_measured(found), np.zeros(_AXES)]).reshape(-1, 1)
         self._kalman = kalman
         self.normalised_innovation_squared = float("nan")
-        self._remember(found)
+        self._misses, self._newest = 0, found
 
-    def _correct(self, found: Identification) -> None:
+    def _correct(self, z: Array, variance: Array) -> None:
         assert self._kalman is not None
-        z, x, P = _measured(found), self._kalman.x, self._kalman.P
+        x, P = self._kalman.x, self._kalman.P
         off = math.remainder(z[_PHI] - x[_PHI, 0], 2.0 * math.pi)
         if abs(off) > _HALF_PLACE:  # the numbers have changed: a code was read
             x[_PHI], off, P[_PHI], P[:, _PHI] = z[_PHI], 0.0, 0.0, 0.0
             P[_PHI, _PHI] = _HALF_PLACE**2
         z[_PHI] = x[_PHI, 0] + off  # without a jump at half a turn
-        self._kalman.update(z, R=np.diag(self._measurement_noise(found.radius_px)))
+        self._kalman.update(z, R=np.diag(variance))
 
-    def _remember(self, found: Identification) -> None:
-        self._misses = 0
-        offset = (found.led_pixels_px - found.centre_px) @ _COMPLEX
-        self._places = offset / found.radius_px * np.exp(-1j * found.roll_rad)
-
-    def _passes(self, found: Identification) -> bool:
+    def _passes(self, z: Array, variance: Array) -> bool:
+        """Whether centre and radius do; a roll that is off is another numbering, which `identify` has to settle."""
         assert self._kalman is not None
-        kept = slice(0, _PHI)  # a roll that is off is another numbering, which `identify` has to settle
-        S = self._kalman.P[kept, kept] + np.diag(self._measurement_noise(found.radius_px)[kept])
-        innovation = _measured(found)[kept] - self._kalman.x[kept, 0]
-        self.normalised_innovation_squared = float(innovation @ np.linalg.solve(S, innovation))
+        square = innovation_squared(z, self._kalman.x[:, 0], self._kalman.P, variance)
+        self.normalised_innovation_squared = float(square)
         return self.normalised_innovation_squared <= self._gate
+
+
+def _row(vector: Array) -> Array:
+    """(3,) as the kernels take it."""
+    return np.ascontiguousarray(vector, dtype=float)
 
 
 def _measured(found: Identification) -> Array:

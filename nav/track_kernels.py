@@ -1,4 +1,4 @@
-"""Kernels of `track`: the ring after a turn of the camera, process noise, and the window."""
+"""Kernels of `track`: the ring after a turn of the camera, process noise, the gate, and the ring of the next window."""
 
 import numpy as np
 from numba import njit
@@ -62,3 +62,60 @@ def predicted(x: Array, P: Array, dt: float, Q: Array) -> tuple[Array, Array]:
         places[i] = x[i] + dt * x[4 + i]
         sigma[i] = np.sqrt(P[i, i] + 2.0 * dt * P[i, 4 + i] + dt**2 * P[4 + i, 4 + i] + Q[i, i])
     return places, sigma
+
+
+@njit(cache=True)
+def turn(
+    x: Array, turn_C: Array, focal_px: float, centre_px: tuple[float, float], ring_radius_m: float, lever_C: Array
+) -> None:
+    """Turn a track's state (8,) with the camera, rates of the centre included; arguments as for `turned`."""
+    x[0], x[1], x[2], roll = turned(x, turn_C, focal_px, centre_px, ring_radius_m, lever_C)
+    x[3] += roll
+    c, s, du, dv = np.cos(roll), np.sin(roll), x[4], x[5]
+    x[4], x[5] = du * c - dv * s, du * s + dv * c
+
+
+@njit(cache=True)
+def ahead(
+    x: Array, P: Array, dt: float, noise: tuple[float, float, float], turn_C: Array, focal_px: float,
+    centre_px: tuple[float, float], ring_radius_m: float, lever_C: Array,
+) -> tuple[float, float, float, Array]:  # fmt: skip
+    """u, v after a time and a turn of the camera, r after the time alone, and (4,) standard deviations before the turn.
+
+    Args:
+        x: (8,) of the track.
+        P: (8, 8) its covariance.
+        dt: the time [s].
+        noise: of `process_noise`, its last three arguments.
+        turn_C: (3,) rotation vector of the camera in that time, in its own axes [rad]; the rest as for `turned`.
+        focal_px: focal length.
+        centre_px: principal point.
+        ring_radius_m: for the range.
+        lever_C: (3,) the camera from the point about which it turns, in its own axes [m].
+    """
+    variance, acceleration_radii_s2, roll_acceleration_rad_s2 = noise
+    Q = process_noise(x[2], dt, variance, acceleration_radii_s2, roll_acceleration_rad_s2)
+    places, sigma = predicted(x, P, dt, Q)
+    u, v, _, _ = turned(places, turn_C, focal_px, centre_px, ring_radius_m, lever_C)
+    return u, v, places[2], sigma
+
+
+@njit(cache=True)
+def innovation_squared(z: Array, x: Array, P: Array, variance: Array) -> float:
+    """Normalised square of the innovation of centre and radius, three degrees of freedom.
+
+    Args:
+        z: (4,) measured.
+        x: (8,) of the track.
+        P: (8, 8) its covariance.
+        variance: (4,) of z.
+    """
+    S, innovation = np.empty((3, 3)), np.empty(3)
+    for i in range(3):
+        innovation[i] = z[i] - x[i]
+        for j in range(3):
+            S[i, j] = P[i, j] + (variance[i] if i == j else 0.0)
+    weighed, total = np.linalg.solve(S, innovation), 0.0
+    for i in range(3):
+        total += innovation[i] * weighed[i]
+    return total

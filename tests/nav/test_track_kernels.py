@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from dockair.calibration import Camera
-from dockair.nav.track_kernels import predicted, process_noise, turned
+from dockair.nav.track_kernels import ahead, innovation_squared, predicted, process_noise, turn, turned
 from dockair.rotations import exp
 
 CAMERA, RADIUS_M = Camera(), 0.25
@@ -43,3 +43,38 @@ def test_prediction_is_the_constant_velocity_model_written_out():
     np.testing.assert_allclose(sigma**2, np.diag(F @ P @ F.T + Q)[:4], rtol=1e-12)
     np.testing.assert_allclose(Q[0, [0, 4]], [0.01 + 0.25 * dt**4 * 640.0**2, 0.5 * dt**3 * 640.0**2], rtol=1e-12)
     np.testing.assert_allclose(Q[3, [3, 7]], [0.01 / 6400.0 + 4.0 * dt**4, 8.0 * dt**3], rtol=1e-12)
+
+
+def test_the_ring_of_the_next_window_is_predicted_first_and_turned_then():
+    rng, dt, optics = np.random.default_rng(2), 0.02, (CAMERA.focal_length_px, CAMERA.principal_point_px, RADIUS_M)
+    shape, noise, turn_C, lever_C = (
+        rng.standard_normal((8, 8)),
+        (0.01, 8.0, 4.0),
+        np.array([0.02, 0.01, -0.03]),
+        np.ones(3),
+    )
+    x, P = np.array([900.0, 500.0, 80.0, 0.3, 40.0, -30.0, 5.0, 0.2]), shape @ shape.T
+    places, sigma = predicted(x, P, dt, process_noise(80.0, dt, *noise))
+    u, v, r, ours = ahead(x, P, dt, noise, turn_C, *optics, lever_C)
+    assert (u, v) == turned(places, turn_C, *optics, lever_C)[:2]
+    assert r == places[2] and (ours == sigma).all()
+
+
+def test_a_turn_about_the_boresight_turns_the_velocity_with_the_image():
+    x = np.array([*CAMERA.principal_point_px, 100.0, 0.5, 30.0, 40.0, 0.0, 0.0])
+    turn(x, np.array([0.02, 0.0, 0.0]), CAMERA.focal_length_px, CAMERA.principal_point_px, RADIUS_M, np.zeros(3))
+    velocity = (30.0 + 40.0j) * np.exp(-0.02j)
+    np.testing.assert_allclose(x[3:6], [0.48, velocity.real, velocity.imag], rtol=1e-12)
+
+
+def test_the_innovation_s_square_is_that_of_centre_and_radius_alone():
+    rng = np.random.default_rng(3)
+    shape, x, z, variance = (
+        rng.standard_normal((8, 8)),
+        rng.standard_normal(8),
+        rng.standard_normal(4),
+        np.arange(1.0, 5.0),
+    )
+    P = shape @ shape.T
+    S = P[:3, :3] + np.diag(variance[:3])
+    assert innovation_squared(z, x, P, variance) == pytest.approx((z - x[:4])[:3] @ np.linalg.inv(S) @ (z - x[:4])[:3])
