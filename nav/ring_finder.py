@@ -82,7 +82,7 @@ class RingFinder:
     ) -> None:
         self._sheets, self._belief, self._detect_settings = sheets, belief, detect_settings
         self._turned_rad, self._few_settings, self._misplaced_m = turned_rad, few_settings or FewSettings(), misplaced_m
-        self._coded = code_of(sheets.ring, CodeSettings()).says_something
+        self._code = code_of(sheets.ring, CodeSettings())
         self._few = False  #: whether the newest frame's LEDs were named one by one
         self._tracker = RingTracker(
             sheets.camera, 1.0 / sheets.camera_rate_hz, track_settings,
@@ -114,7 +114,7 @@ class RingFinder:
             if not self._shown(expected_px, frame.window):
                 self._tracker.lose()
             members, numbers = _NONE, _NONE
-            if followed and (found.status is IdentificationStatus.NOT_FOUND or not self._coded):
+            if followed and (found.status is IdentificationStatus.NOT_FOUND or not self._code.says_something):
                 members, numbers = self._named_singly(blobs, frame.time_stamp_s)
             self._few = len(members) > 0
             return _named(blobs, members, numbers, frame.time_stamp_s)
@@ -182,8 +182,10 @@ class RingFinder:
         return window if rows > 0 and columns > 0 and window != camera.full_window else None
 
     def _identified(self, blobs: Blobs, **expected: Any) -> Identification:
-        camera, ring = self._sheets.camera, self._sheets.ring
-        return identify(blobs.centroids_px, camera=camera, ring=ring, brightness=blobs.flux, **expected)
+        return identify(
+            blobs.centroids_px, camera=self._sheets.camera, ring=self._sheets.ring, code=self._code,
+            brightness=blobs.flux, **expected,
+        )  # fmt: skip
 
     def _look_for_roll(self, blobs: Blobs, expected_rad: float, time_s: float) -> float:
         """Roll of the ring where the belief has it, however it is rolled; the expected one if there is no ring.

@@ -75,8 +75,9 @@ def brightness_model(flux: Array, settings: BrightnessSettings, spread: float = 
     """
     known = np.isfinite(flux) & (flux > 0.0)
     x = np.log(flux, where=known, out=np.zeros(len(flux)))
-    middle = float(np.median(x[known])) if known.any() else 0.0
-    x = np.clip(np.where(known, x, middle), middle - settings.mean_range, middle + settings.mean_range)
+    middle = _median(x[known]) if known.any() else 0.0
+    x = np.where(known, x, middle)
+    x = np.minimum(np.maximum(x, middle - settings.mean_range), middle + settings.mean_range)
     sigma = float(np.hypot(settings.sigma, spread))
     step, margin = _STEP_SIGMAS * sigma, _MARGIN_SIGMAS * sigma
     mu = np.arange(x.min() - margin, x.max() + margin + step, step)
@@ -84,6 +85,12 @@ def brightness_model(flux: Array, settings: BrightnessSettings, spread: float = 
         led=_normal(x[:, None] - mu, sigma), kernel=_normal(x[:, None] - x, settings.kernel) * known, known=known,
         step=step, settings=settings,
     )  # fmt: skip
+
+
+def _median(x: Array) -> float:
+    """Of a few numbers; NumPy's own costs ten times as much."""
+    x = np.sort(x)
+    return 0.5 * float(x[(len(x) - 1) // 2] + x[len(x) // 2])
 
 
 def _normal(deviation: Array, sigma: float) -> Array:

@@ -21,7 +21,7 @@ members within 1.6 radii: reflections crowd about the drogue. Eq. (2) counts no 
 more near by, so that a member may be the only blob there is. Both look at places only; see `brightness`.
 """
 
-from math import comb
+import math
 
 import numpy as np
 from numba import njit
@@ -32,7 +32,7 @@ from dockair.rotations import Array
 
 Count = NDArray[np.int64] | int
 
-_WAYS = np.array([comb(SLOTS - 3, k) for k in range(SLOTS - 2)])
+_WAYS = np.array([math.comb(SLOTS - 3, k) for k in range(SLOTS - 2)])
 _NEIGHBOURHOOD_RADII = 1.6
 _UNSEEN = 0.2  # blobs
 _LARGEST_EXPONENT = 50.0
@@ -55,6 +55,11 @@ def log10_false_rings(tested: Count, count: Count, p: Array | float) -> Array:
     more = np.asarray(count) - 3
     p = np.minimum(np.maximum(p, 1e-12), 1.0)
     return np.asarray(np.log10(np.maximum(tested, 1) * _WAYS[more]) + more * np.log10(p))
+
+
+def log10_false_rings_of_one(tested: int, count: int, p: float) -> float:
+    """The same of a single ring, for less than what arrays of one number cost."""
+    return math.log10(max(tested, 1) * int(_WAYS[count - 3])) + (count - 3) * math.log10(min(max(p, 1e-12), 1.0))
 
 
 def densities_px2(points: Array, fit: RingFit) -> tuple[float, float]:

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from dockair.calibration import Camera
 from dockair.nav.identify.brightness import brightness_model
-from dockair.nav.identify.chance import log10_false_rings
+from dockair.nav.identify.chance import log10_false_rings_of_one
 from dockair.nav.identify.hypotheses import IdentifySettings
 from dockair.nav.identify.perspective import SLOTS, RingFit, distorted, fit_ring, undistorted
 from dockair.nav.identify.result import Identification, IdentificationStatus
@@ -95,6 +95,13 @@ def _named(points, predicted, radius, reach, rival):  # type: ignore[no-untyped-
 
 
 @njit(cache=True)
+def _compared(points, member, predicted, slots, centre):  # type: ignore[no-untyped-def]
+    """Roll of a ring fitted to the members, how far its centre is from the prediction's, and `_shape_error`."""
+    u, v = predicted[:, 0].mean(), predicted[:, 1].mean()
+    return _roll_and_radius(slots)[0], np.hypot(centre[0] - u, centre[1] - v), _shape_error(points, member, predicted)
+
+
+@njit(cache=True)
 def _shape_error(points, member, predicted):  # type: ignore[no-untyped-def]
     """Largest distance of members from the prediction moved, turned and scaled to them."""
     n = (member >= 0).sum()
@@ -110,8 +117,8 @@ def _shape_error(points, member, predicted):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _chances(points, inside, member, image, radius, tolerance, sigma2):  # type: ignore[no-untyped-def]
-    """Clutter's p of Eq. (1) of `chance`, and Eq. (2) of each slot (8,), of a ring (9, 2) with its centre last."""
+def _chances(points, inside, member, slots, centre, radius, tolerance, sigma2):  # type: ignore[no-untyped-def]
+    """Points within reach, members, clutter's p of Eq. (1) of `chance`, and Eq. (2) of each slot (8,)."""
     m, n, near = (member >= 0).sum(), 0, 0
     left, top, right, bottom = np.inf, np.inf, -np.inf, -np.inf
     for k in range(len(points)):
@@ -120,7 +127,7 @@ def _chances(points, inside, member, image, radius, tolerance, sigma2):  # type:
         n += 1
         left, right = min(left, points[k, 0]), max(right, points[k, 0])
         top, bottom = min(top, points[k, 1]), max(bottom, points[k, 1])
-        distance2 = (points[k, 0] - image[SLOTS, 0]) ** 2 + (points[k, 1] - image[SLOTS, 1]) ** 2
+        distance2 = (points[k, 0] - centre[0]) ** 2 + (points[k, 1] - centre[1]) ** 2
         near += distance2 < (_NEIGHBOURHOOD_RADII * radius) ** 2 and not (member == k).any()
     area = max((right - left) * (bottom - top), np.pi * radius**2)
     neighbourhood = np.pi * (_NEIGHBOURHOOD_RADII * radius) ** 2
@@ -129,10 +136,10 @@ def _chances(points, inside, member, image, radius, tolerance, sigma2):  # type:
     g, odds = m / (m - 3), np.zeros(SLOTS)
     for s in range(SLOTS):
         if member[s] >= 0:
-            square = (points[member[s], 0] - image[s, 0]) ** 2 + (points[member[s], 1] - image[s, 1]) ** 2
+            square = (points[member[s], 0] - slots[s, 0]) ** 2 + (points[member[s], 1] - slots[s, 1]) ** 2
             exponent = min(0.5 * g * square / sigma2, _LARGEST_EXPONENT)
             odds[s] = (SLOTS + 1 - m) / m * impostor * 2.0 * np.pi * sigma2 * g * np.exp(exponent)
-    return n, accident * np.pi * tolerance**2, odds
+    return n, m, accident * np.pi * tolerance**2, odds
 
 
 def followed_ring(
@@ -174,16 +181,16 @@ def followed_ring(
         tolerance_per_radius=settings.tolerance_sigmas * settings.ring_sigma,
         max_tilt_rad=settings.max_tilt_rad,
     )  # fmt: skip
-    roll = _roll_and_radius(fit.slots_px)[0]
+    roll, off_px, shape_error_px = _compared(points, member, predicted_px, fit.slots_px, fit.centre_px)
     wanted_rad = believed_rad if roll_rad is None or not math.isfinite(roll_rad) else roll_rad
     shape_px = settings.predicted_shape_tolerance * radius_px + settings.predicted_shape_sigmas * sigma_px
     if not (
         (fit.candidate == member).all()
         and fit.tilt_rad <= settings.max_tilt_rad
         and abs(fit.radius_px - radius_px) <= settings.predicted_radius_tolerance * radius_px
-        and math.dist(fit.centre_px, predicted_px.mean(axis=0)) <= reach_px
+        and off_px <= reach_px
         and abs(math.remainder(roll - wanted_rad, 2.0 * math.pi)) <= settings.predicted_roll_tolerance_rad
-        and _shape_error(points, member, predicted_px) <= shape_px
+        and shape_error_px <= shape_px
         and _is_no_accident(points, flux, inside, fit, settings)
     ):
         return None
@@ -207,14 +214,15 @@ def _is_no_accident(
 ) -> bool:
     """Whether Eqs. (1) and (2) let the ring pass."""
     spread2 = (fit.tolerance_px / settings.tolerance_sigmas) ** 2
-    ring = np.vstack([fit.slots_px, fit.centre_px])
-    n, p, odds = _chances(points, inside, fit.candidate, ring, fit.radius_px, fit.tolerance_px, spread2)
-    rings = log10_false_rings(_PATTERNS * math.comb(n, 3), fit.count, p)
+    n, m, p, odds = _chances(
+        points, inside, fit.candidate, fit.slots_px, fit.centre_px, fit.radius_px, fit.tolerance_px, spread2
+    )
+    rings = log10_false_rings_of_one(_PATTERNS * math.comb(n, 3), m, p)
     if rings > math.log10(settings.max_false_rings_predicted):
         return False
-    most = settings.max_impostors_with_prior
-    if flux is None or odds.sum() <= settings.brightness.outliers * most:
-        return bool(odds.sum() <= most)
+    most, expected = settings.max_impostors_with_prior, float(odds.sum())
+    if flux is None or expected <= settings.brightness.outliers * most:
+        return expected <= most
     among = np.where(fit.candidate >= 0, np.cumsum(inside)[fit.candidate] - 1, -1)  # places among those within reach
     likelier = brightness_model(flux[inside], settings.brightness).likelihood_ratios(among[None])[1]
     return bool((odds / likelier[0]).sum() <= most)

@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from dockair.calibration import Camera, LedRing
 from dockair.errors import DockairError
 from dockair.nav.identify.brightness import brightness_model
-from dockair.nav.identify.code import code_of
+from dockair.nav.identify.code import Code, code_of
 from dockair.nav.identify.followed import followed_ring
 from dockair.nav.identify.hypotheses import (
     METHODS,
@@ -58,6 +58,7 @@ def identify(
     *,
     camera: Camera | None = None,
     ring: LedRing | None = None,
+    code: Code | None = None,
     sigma_px: float | None = None,
     brightness: Array | None = None,
     expected_centre_px: Array | None = None,
@@ -75,6 +76,7 @@ def identify(
         settings: None for the defaults.
         camera: for its focal length, principal point and distortion; None for the default one.
         ring: for its code, if it has one; None for the default one, which has none.
+        code: the ring's, where it is at hand; None reads it off the ring.
         sigma_px: of a candidate's coordinate, in place of the settings'.
         brightness: (n,) fluxes, any unit, NaN where unknown; tells LEDs from clutter, decides who stays when there are
             too many candidates and no prior, and reads the code of a ring that has one.
@@ -89,7 +91,8 @@ def identify(
     """
     settings, camera, ring = settings or _SETTINGS, camera or _CAMERA, ring or _RING
     points, flux = _checked(centroids_px, brightness, method, ring)
-    sigma_px, code = settings.sigma_px if sigma_px is None else sigma_px, code_of(ring, settings.code)
+    sigma_px = settings.sigma_px if sigma_px is None else sigma_px
+    code = code_of(ring, settings.code) if code is None else code
     nowhere_else = expected_centre_px is None and expected_radius_px is None and not code.says_something
     if nowhere_else and expected_sigma_px is not None and _is_prediction(expected_led_px):
         known_flux = None if brightness is None else flux

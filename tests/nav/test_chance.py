@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 
 from dockair.calibration import Camera
-from dockair.nav.identify.chance import box_area_px2, densities_px2, log10_false_rings, member_odds
+from dockair.nav.identify.chance import (
+    box_area_px2,
+    densities_px2,
+    log10_false_rings,
+    log10_false_rings_of_one,
+    member_odds,
+)
 from dockair.nav.identify.perspective import fit_ring
 
 CAMERA = Camera()
@@ -24,6 +30,7 @@ def fitted(scene):
 @pytest.mark.parametrize(("count", "ways"), [(3, 1), (4, 5), (5, 10), (6, 10), (7, 5), (8, 1)])
 def test_false_rings_are_hypotheses_times_ways_times_chance(count, ways):
     assert log10_false_rings(1000, count, 1e-3) == pytest.approx(np.log10(1000 * ways * 1e-3 ** (count - 3)))
+    assert log10_false_rings_of_one(1000, count, 1e-3) == pytest.approx(float(log10_false_rings(1000, count, 1e-3)))
 
 
 def test_a_box_has_its_area_and_no_box_one_pixel():
