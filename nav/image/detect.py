@@ -14,7 +14,7 @@ their flux is that of ten and more pixels as bright as their peak (the *equivale
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Literal
 
@@ -26,7 +26,7 @@ from dockair.messages import Window
 from dockair.nav.image.binarise import Image, Mask, adaptive_threshold, check_image, frame_statistics
 from dockair.nav.image.centroid import BlobMeasurements, NoiseModel, measure_blobs
 from dockair.nav.image.labelling import Runs, foreground_runs
-from dockair.nav.image.morphology import open_and_trace, structuring_element
+from dockair.nav.image.morphology import Element, open_and_trace, structuring_element
 from dockair.nav.image.spots import SpotLimits, find_spots
 from dockair.rotations import Array
 
@@ -131,7 +131,7 @@ def detect(
         found = _spots(image, settings, gain_dn_per_electron)
     else:
         found = _above_one_threshold(image, settings)
-    found = _opened(found, settings)
+    found, area_px = _opened(found, settings)
     noise = NoiseModel(
         gain_dn_per_electron=gain_dn_per_electron,
         noise_dn=found.noise_dn,
@@ -149,7 +149,7 @@ def detect(
         local_background=settings.local_background,
         windowed=settings.centroid == "windowed",
     )
-    return _blobs(found, measured, _right_shape(found, measured, settings), window)
+    return _blobs(found, area_px, measured, _right_shape(found, measured, settings), window)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -157,20 +157,10 @@ class _Components:
     """Components, each with its threshold and background (n,) and all with the noise [DN]."""
 
     runs: Runs
-    area_px: NDArray[np.int64]
     thresholds_dn: NDArray[np.int64]
     backgrounds_dn: Array
     noise_dn: float
     threshold_dn: int | None  # that all were made with
-
-    def select(self, keep: Mask) -> "_Components":
-        return replace(
-            self,
-            runs=self.runs.select(keep),
-            area_px=self.area_px[keep],
-            thresholds_dn=self.thresholds_dn[keep],
-            backgrounds_dn=self.backgrounds_dn[keep],
-        )
 
 
 def _spots(image: Image, settings: DetectSettings, gain: float) -> _Components:
@@ -178,7 +168,6 @@ def _spots(image: Image, settings: DetectSettings, gain: float) -> _Components:
     spots = find_spots(image, limits)
     return _Components(
         runs=spots.runs,
-        area_px=spots.runs.area_px,
         thresholds_dn=spots.threshold_dn,
         backgrounds_dn=spots.background_dn,
         noise_dn=limits.noise_dn,
@@ -208,7 +197,6 @@ def _above_one_threshold(image: Image, settings: DetectSettings) -> _Components:
     runs = foreground_runs(image, threshold, settings.connectivity)
     return _Components(
         runs=runs,
-        area_px=runs.area_px,
         thresholds_dn=np.full(runs.count, threshold),
         backgrounds_dn=np.full(runs.count, background),
         noise_dn=noise_dn,
@@ -233,28 +221,28 @@ def _levels(image: Image, settings: DetectSettings) -> tuple[int, float, float]:
     return threshold, statistics.background_dn, sensor_noise
 
 
-def _opened(found: _Components, settings: DetectSettings) -> _Components:
-    """Components of the right area, and those that opening leaves of them."""
-    found = _of_right_area(found, settings)
-    if settings.element_size_px == 1 or found.area_px.max(initial=0) < settings.spare_below_px:
-        return found
-    element = structuring_element(settings.element_shape, settings.element_size_px)
+def _opened(found: _Components, settings: DetectSettings) -> tuple[_Components, NDArray[np.int64]]:
+    """What opening leaves of the components, of the right area before and after, and their areas (n,)."""
+    element, spare_below_px = _element(settings)
     # spots are made with 8 neighbours, whatever the setting
-    runs, origin = open_and_trace(found.runs, element, settings.spare_below_px, settings.connectivity)
+    runs, origin, area_px = open_and_trace(
+        found.runs, element, spare_below_px, settings.connectivity, (settings.min_area_px, settings.max_area_px)
+    )
     opened = _Components(
         runs=runs,
-        area_px=runs.area_px,
         thresholds_dn=found.thresholds_dn[origin],
         backgrounds_dn=found.backgrounds_dn[origin],
         noise_dn=found.noise_dn,
         threshold_dn=found.threshold_dn,
     )
-    return _of_right_area(opened, settings)
+    return opened, area_px
 
 
-def _of_right_area(found: _Components, settings: DetectSettings) -> _Components:
-    keep = (found.area_px >= settings.min_area_px) & (found.area_px <= settings.max_area_px)
-    return found if keep.all() else found.select(keep)
+@lru_cache(maxsize=16)
+def _element(settings: DetectSettings) -> tuple[Element, int]:
+    """Structuring element, and the area below which components are spared: all of them without opening."""
+    element = structuring_element(settings.element_shape, settings.element_size_px)
+    return element, settings.max_area_px + 1 if settings.element_size_px == 1 else settings.spare_below_px
 
 
 def _right_shape(found: _Components, measured: BlobMeasurements, settings: DetectSettings) -> Mask:
@@ -266,13 +254,15 @@ def _right_shape(found: _Components, measured: BlobMeasurements, settings: Detec
     return np.asarray(keep)
 
 
-def _blobs(found: _Components, measured: BlobMeasurements, keep: Mask, window: Window | None) -> Blobs:
+def _blobs(
+    found: _Components, area_px: NDArray[np.int64], measured: BlobMeasurements, keep: Mask, window: Window | None
+) -> Blobs:
     origin = np.zeros(2) if window is None else np.array([window.column_start, window.row_start], dtype=float)
     thresholds = found.thresholds_dn[keep]
     lowest = int(thresholds.min()) if len(thresholds) else -1
     return Blobs(
         centroids_px=measured.centroids_px[keep] + origin,
-        area_px=found.area_px[keep],
+        area_px=area_px[keep],
         peak=measured.peak[keep],
         sigma_px=measured.sigma_px[keep],
         clipped=measured.clipped[keep],

@@ -26,6 +26,7 @@ from dockair.nav.image.binarise import Mask
 from dockair.nav.image.labelling import Runs
 
 Element = NDArray[np.uint8]
+_ANY_AREA_PX = 1 << 40  # more than any frame has
 _SHAPES = {"cross": cv2.MORPH_CROSS, "square": cv2.MORPH_RECT, "disc": cv2.MORPH_ELLIPSE}
 
 
@@ -92,13 +93,28 @@ def open_components(runs: Runs, element: Element, spare_below_px: int, connectiv
 
 
 def open_and_trace(
-    runs: Runs, element: Element, spare_below_px: int, connectivity: int = 8
-) -> tuple[Runs, NDArray[np.int32]]:
-    """Components after opening, and for each the component (n,) that it is of; arguments as `open_components`."""
-    row, start, stop, offset, origin = _open_components(
-        runs.row, runs.start, runs.stop, runs.offset, element, spare_below_px, connectivity == 8
+    runs: Runs,
+    element: Element,
+    spare_below_px: int,
+    connectivity: int = 8,
+    area_range_px: tuple[int, int] = (0, _ANY_AREA_PX),
+) -> tuple[Runs, NDArray[np.int32], NDArray[np.int64]]:
+    """Components of the right area, before opening and after it.
+
+    Args:
+        runs: components.
+        element: as for `open_components`, like the next two.
+        spare_below_px: area under which a component is left as it is.
+        connectivity: 8 or 4.
+        area_range_px: least and largest area.
+
+    Returns:
+        what is left of them, for each the component (n,) that it is of, and its area (n,).
+    """
+    row, start, stop, offset, origin, area = _open_components(
+        runs.row, runs.start, runs.stop, runs.offset, element, spare_below_px, connectivity == 8, *area_range_px
     )
-    return Runs(row=row, start=start, stop=stop, offset=offset), origin
+    return Runs(row=row, start=start, stop=stop, offset=offset), origin, area
 
 
 @njit(cache=True)
@@ -158,19 +174,35 @@ def _append_piece(out, n, patch, top, left, piece, row, start, stop):  # type: i
 
 
 @njit(cache=True)
-def _open_components(row, start, stop, offset, element, spare_below, corners):  # type: ignore[no-untyped-def]
+def _areas(start, stop, offset):  # type: ignore[no-untyped-def]
+    """Pixels of each component."""
+    areas = np.zeros(len(offset) - 1, np.int64)
+    for c in range(len(areas)):
+        for k in range(offset[c], offset[c + 1]):
+            areas[c] += stop[k] - start[k]
+    return areas
+
+
+@njit(cache=True)
+def _open_components(  # type: ignore[no-untyped-def]
+    row, start, stop, offset, element, spare_below, corners, least, largest
+):
     half = max(element.shape[0] // 2, 1)
+    areas = _areas(start, stop, offset)
     # opening can cut a run into pieces, but never into more than it has pixels
-    capacity = int((stop - start).sum())
-    out = np.empty((3, capacity), np.int32)
-    out_offset, origin = np.zeros(capacity + 1, np.int32), np.empty(capacity, np.int32)
+    capacity = areas[(areas >= least) & (areas <= largest)].sum()
+    out, out_offset = np.empty((3, capacity), np.int32), np.zeros(capacity + 1, np.int32)
+    origin, out_area = np.empty(capacity, np.int32), np.empty(capacity, np.int64)
     n, count = 0, 0
-    for c in range(len(offset) - 1):
+    for c in range(len(areas)):
+        area = areas[c]
+        if not least <= area <= largest:
+            continue
         r, a, b = row[offset[c] : offset[c + 1]], start[offset[c] : offset[c + 1]], stop[offset[c] : offset[c + 1]]
-        area = (b - a).sum()
         if area < spare_below:
-            out[0, n : n + len(r)], out[1, n : n + len(r)], out[2, n : n + len(r)] = r, a, b
-            origin[count] = c
+            for k in range(len(r)):
+                out[0, n + k], out[1, n + k], out[2, n + k] = r[k], a[k], b[k]
+            origin[count], out_area[count] = c, area
             n, count = n + len(r), count + 1
             out_offset[count] = n
             continue
@@ -187,14 +219,17 @@ def _open_components(row, start, stop, offset, element, spare_below, corners):  
                     pieces += 1
                     _mark_piece(patch, r[k] - top, j, pieces + 1, corners, stack)
         for piece in range(pieces):
-            n = _append_piece(out, n, patch, top, left, piece + 2, r, a, b)
-            origin[count] = c
-            count += 1
-            out_offset[count] = n
+            end = _append_piece(out, n, patch, top, left, piece + 2, r, a, b)
+            remaining = (out[2, n:end] - out[1, n:end]).sum()
+            if least <= remaining <= largest:
+                origin[count], out_area[count] = c, remaining
+                n, count = end, count + 1
+                out_offset[count] = n
     return (
         out[0, :n].copy(),
         out[1, :n].copy(),
         out[2, :n].copy(),
         out_offset[: count + 1].copy(),
         origin[:count].copy(),
+        out_area[:count].copy(),
     )

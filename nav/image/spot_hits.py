@@ -2,7 +2,7 @@
 
 A pixel x is a hit when 13/16 x - n >= c, n the second brightest of the four pixels at distance r along its row and
 column; of a small spot only a pixel that none of its neighbours outshines. Vector instructions test 64 at a time, in
-whole numbers: 3/16 x is 0 up to 5, 1 from 6 and 2 from 14 on.
+whole numbers: 3/16 x is 0 up to 5, 1 from 6 and 2 from 14 on. Rows with no pixel as bright as c are passed over.
 """
 
 import numpy as np
@@ -30,13 +30,27 @@ def _may_hold(centre, above, below, left, right, contrast):  # type: ignore[no-u
 
 
 @njit(cache=True)
-def _segments(image, reach, row_step, contrast, found):  # type: ignore[no-untyped-def]
+def _brightest(image):  # type: ignore[no-untyped-def]
+    """(rows,) largest level of each row; on the way the image comes near, in the order of its addresses."""
+    brightest = np.zeros(len(image), image.dtype)
+    for i in range(len(image)):
+        line, best = image[i], brightest[i]
+        for k in range(len(line)):
+            best = max(best, line[k])
+        brightest[i] = best
+    return brightest
+
+
+@njit(cache=True)
+def _segments(image, brightest, reach, row_step, contrast, found):  # type: ignore[no-untyped-def]
     """Rows and first columns of the segments that may hold a pixel of a spot, into `found`; their number.
 
     A loop of its own, which nothing else keeps from the registers.
     """
     n, end = 0, image.shape[1] - reach
     for i in range(reach, image.shape[0] - reach, row_step):
+        if brightest[i] < contrast:  # no pixel has a contrast above its own level
+            continue
         for first in range(reach, end, _SEGMENT):
             s = min(first, end - _SEGMENT)  # the last segment begins earlier than its own pixels
             e = s + _SEGMENT
@@ -62,13 +76,13 @@ def find_hits(image, reaches, row_steps, contrasts, wide):  # type: ignore[no-un
         wide: reach from which on a spot may have many pixels of one level.
     """
     rows, columns = image.shape
-    found = np.empty((rows * (columns // _SEGMENT + 1), 2), np.int64)  # touched only as far as it is used
-    hits, n = np.empty((512, 4), np.int32), 0
+    found = np.empty((rows * (columns // _SEGMENT + 1), 2), np.int32)  # touched only as far as it is used
+    hits, n, brightest = np.empty((512, 4), np.int32), 0, _brightest(image)
     for k in range(len(reaches)):
         reach, contrast = reaches[k], contrasts[k]
         # the brightest of the neighbours that are looked at too speaks for its spot; 0 compares a pixel with itself
         beside, above = int(reach < wide), int(reach < wide and row_steps[k] == 1)
-        for f in range(_segments(image, reach, row_steps[k], image.dtype.type(contrast), found)):
+        for f in range(_segments(image, brightest, reach, row_steps[k], image.dtype.type(contrast), found)):
             i, first = found[f, 0], found[f, 1]
             while n + _SEGMENT > len(hits):
                 hits = _grown(hits)

@@ -8,7 +8,15 @@ from scipy.special import erf
 
 from dockair.errors import DockairError
 from dockair.nav.image.labelling import foreground_runs
-from dockair.nav.image.morphology import close, dilate, erode, open_, open_components, structuring_element
+from dockair.nav.image.morphology import (
+    close,
+    dilate,
+    erode,
+    open_,
+    open_and_trace,
+    open_components,
+    structuring_element,
+)
 
 MASKS = arrays(np.bool_, array_shapes(min_dims=2, max_dims=2, min_side=1, max_side=18), elements=st.booleans())
 ELEMENTS = [("square", 3), ("cross", 3), ("square", 5), ("disc", 5), ("square", 1)]
@@ -93,3 +101,18 @@ def test_wrong_elements_are_refused():
         structuring_element("cross", 4)
     with pytest.raises(DockairError, match="mask"):
         erode(np.zeros((3, 3)), structuring_element())
+
+
+def test_opening_keeps_what_has_the_right_area_before_and_after_and_says_whence():
+    mask = np.zeros((12, 40), bool)
+    mask[1:3, 1:3] = True  # 4 pixels, spared
+    mask[1:7, 6:12] = True  # 36 pixels, too large
+    mask[1:4, 16:28] = True  # two squares on a bridge, 36 pixels less 10
+    mask[[1, 3], 19:24] = False
+    mask[9, 1] = True  # one pixel, too small
+    mask[8:11, 31:34] = mask[9, 34:37] = True  # a square with a streak, 12 pixels
+    runs = foreground_runs(mask.astype(np.uint8), 0)
+    opened, origin, area = open_and_trace(runs, structuring_element("square", 3), 9, 8, (3, 30))
+    assert area.tolist() == opened.area_px.tolist() == [4, 9, 12, 9]
+    assert runs.area_px[origin].tolist() == [4, 26, 26, 12]
+    assert len(open_and_trace(runs, structuring_element("square", 3), 9, 8, (10, 12))[0].offset) == 1
