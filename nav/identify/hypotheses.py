@@ -217,11 +217,17 @@ def _tested(octagons: Octagons, count: NDArray[np.int64] | int) -> NDArray[np.in
     return np.where(np.asarray(count) > MIN_LEDS, octagons.tested_right_angles, octagons.tested)
 
 
-def _keys(candidate: NDArray[np.int64]) -> NDArray[np.uint64]:
+@njit(cache=True)
+def _keys(candidate):  # type: ignore[no-untyped-def]
     """(m,) hash of who is next to whom in hypotheses (m, 8): the same for those alike up to the ring's symmetry."""
-    mixed = (candidate + 2).astype(np.uint64) * np.uint64(0x9E3779B97F4A7C15)
-    mixed = (mixed ^ (mixed >> np.uint64(29))) * np.uint64(0xBF58476D1CE4E5B9)
-    return np.asarray((mixed * (np.roll(mixed, 1, axis=1) >> np.uint64(17))).sum(axis=1, dtype=np.uint64))
+    keys, mixed = np.zeros(len(candidate), np.uint64), np.empty(SLOTS, np.uint64)
+    for row in range(len(candidate)):
+        for s in range(SLOTS):
+            x = np.uint64(candidate[row, s] + 2) * np.uint64(0x9E3779B97F4A7C15)
+            mixed[s] = (x ^ (x >> np.uint64(29))) * np.uint64(0xBF58476D1CE4E5B9)
+        for s in range(SLOTS):
+            keys[row] += mixed[s] * (mixed[s - 1] >> np.uint64(17))
+    return keys
 
 
 def _ranked(

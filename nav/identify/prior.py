@@ -5,6 +5,7 @@ Roll phi is the angle of LED 0 in the image seen from the centre, from left (-u)
     (u, v)_k = centre - r (cos(phi + 45 k), sin(phi + 45 k))                              (1)
 """
 
+import math
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
@@ -87,14 +88,15 @@ def ring_from_leds(led_px: Array, angle_rad: Array | None = None) -> tuple[Array
     [A_0 A_1]. Angles theta (8,) are 45 k when not given.
     """
     if angle_rad is None:
-        centre, A = led_px.mean(axis=0), -0.25 * led_px.T @ _EVEN  # the columns are orthogonal, squares 4
+        centre, A = led_px.sum(axis=0) / 8.0, -0.25 * led_px.T @ _EVEN  # the columns are orthogonal, squares 4
     else:
         columns = np.column_stack([np.ones(8), -np.cos(angle_rad), -np.sin(angle_rad)])
         solution = np.linalg.lstsq(columns, led_px, rcond=None)[0]
         centre, A = solution[0], solution[1:].T
-    square = 0.5 * (A**2).sum()
-    radius = np.sqrt(square + np.sqrt(max(square**2 - float(A[0, 0] * A[1, 1] - A[0, 1] * A[1, 0]) ** 2, 0.0)))
-    return centre, float(radius), float(np.arctan2(A[1, 0] - A[0, 1], A[0, 0] + A[1, 1]))
+    (a, b), (c, d) = A.tolist()
+    square = 0.5 * float((A**2).sum())
+    radius = math.sqrt(square + math.sqrt(max(square**2 - (a * d - b * c) ** 2, 0.0)))
+    return centre, radius, float(np.arctan2(c - b, a + d))
 
 
 def _finite(expectation: Expectation | None) -> Expectation | None:
