@@ -144,7 +144,8 @@ class OpenAttempt:
         """Take note of one physics tick before the attempt is over."""
         if self.is_over:
             return
-        away_m2 = float(p_DP @ p_DP)
+        x, y, z = p_DP.tolist()
+        away_m2 = x * x + y * y + z * z
         if away_m2 < self._closest_m2:
             self._closest, self._closest_m2 = truth, away_m2
 

@@ -20,7 +20,8 @@ from dockair.rotations import Array
 from dockair.sim.air.motion import AirState
 from dockair.sim.aircraft import tanker_motion
 
-#: Layout of `observe`'s vector: attitudes and vectors of the receiver, the probe's tip and the drogue, then scalars.
+#: Layout of `observe`'s vector: attitudes and vectors of the receiver, the probe's tip and the drogue, scalars, and
+#: the tip seen from the drogue.
 R_WB, P_WB, V_WB, W_WB_B, A_WB, ALPHA_WB_B, SPECIFIC_FORCE_B = (
     slice(0, 9), slice(9, 12), slice(12, 15), slice(15, 18), slice(18, 21), slice(21, 24), slice(24, 27)
 )  # fmt: skip
@@ -28,7 +29,8 @@ P_WP, V_WP, R_WD, P_WD, V_WD, W_WD_D = (
     slice(27, 30), slice(30, 33), slice(33, 42), slice(42, 45), slice(45, 48), slice(48, 51)
 )  # fmt: skip
 REEL_POSITION, REEL_RATE, TIP_DISTANCE = 51, 52, 53
-OBSERVED = 54
+P_DP = slice(54, 57)
+OBSERVED = 57
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -138,6 +140,7 @@ _CUT: dict[str, Callable[[Any], Any]] = {
     "alpha_WB_B": _vector(ALPHA_WB_B), "a_WB": _vector(A_WB), "specific_force_B": _vector(SPECIFIC_FORCE_B),
     "p_WP": _vector(P_WP), "v_WP": _vector(V_WP),
     "R_WD": _matrix(R_WD), "p_WD": _vector(P_WD), "v_WD": _vector(V_WD), "w_WD_D": _vector(W_WD_D),
+    "p_DP": _vector(P_DP),
     "p_WH": lambda truth: truth._seen.hose[0],
     "R_WT": lambda truth: truth._seen.tanker[tanker_motion.R].reshape(3, 3),
     "p_WT": lambda truth: truth._seen.tanker[tanker_motion.P],
@@ -172,7 +175,7 @@ def observe(
     """Read receiver, probe's tip, drogue, reel and hose out of MuJoCo's arrays.
 
     Args:
-        out: (54,) written, laid out as above.
+        out: (57,) written, laid out as above.
         hose: (2, links + 1, 3) written: joints from the reel to the drogue; where the air acts on links and drogue.
         xpos: of MuJoCo, as all down to qacc.
         xmat: rotation matrices.
@@ -197,7 +200,7 @@ def observe(
 def _observe_bodies(xpos, xmat, w, centre, qvel, qacc, where, constants, out):  # type: ignore[no-untyped-def]
     receiver, drogue, dof = where[0], where[1], where[3]
     B, D = xmat[receiver], xmat[drogue]
-    turn, arm, r = np.empty(3), np.empty(3), np.empty(3)
+    turn, arm, r, tip = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     for i in range(9):
         out[i], out[33 + i] = B[i], D[i]
     for i in range(3):
@@ -216,8 +219,11 @@ def _observe_bodies(xpos, xmat, w, centre, qvel, qacc, where, constants, out):  
         out[30 + i] = out[12 + i] + (turn[j] * arm[k] - turn[k] * arm[j])
         out[45 + i] = w[3 + i] + (w[j] * r[k] - w[k] * r[j])  # Eq. (1)
         out[48 + i] = D[i] * w[0] + D[3 + i] * w[1] + D[6 + i] * w[2]
-        tip2 += (out[27 + i] - out[42 + i] - constants[3] * D[3 * i]) ** 2
+        tip[i] = out[27 + i] - out[42 + i]  # from the ring's centre
+        tip2 += (tip[i] - constants[3] * D[3 * i]) ** 2
     out[TIP_DISTANCE] = np.sqrt(tip2)
+    for i in range(3):
+        out[54 + i] = D[i] * tip[0] + D[3 + i] * tip[1] + D[6 + i] * tip[2]
 
 
 @njit(cache=True)

@@ -38,6 +38,12 @@ def test_copies_of_a_truth_that_nobody_has_read_are_whole(make_world, copied):
     same(one.step(FORWARD), copied(other.step(FORWARD)))
 
 
+def test_the_tip_seen_from_the_drogue_is_the_one_of_the_other_fields(make_world):
+    truth = make_world().step(FORWARD)
+    np.testing.assert_allclose(truth.p_DP, truth.R_WD.T @ (truth.p_WP - truth.p_WD), rtol=0.0, atol=1e-14)
+    np.testing.assert_allclose(replace(truth).p_DP, truth.p_DP, rtol=0.0, atol=1e-14)
+
+
 def test_truth_cannot_be_changed_and_has_no_other_fields(make_world):
     truth = make_world().step(FORWARD)
     with pytest.raises(FrozenInstanceError):
