@@ -46,8 +46,8 @@ class FrozenGusts(Protocol):
 class GustField(FrozenGusts, Protocol):
     """What is needed of turbulence: `dockair.sim.air.turbulence.DrydenField`."""
 
-    def rolling(self, x: float) -> float:
-        """Rolling gust at x [rad/s]."""
+    def write_gusts(self, x: Array, rolling_x: float, gusts: Array) -> float:
+        """Write `velocity` into an array that is there already (n, 3); return the rolling gust at a place [rad/s]."""
         ...
 
 
@@ -116,12 +116,10 @@ class AirMotion:
             return AirState(tow_W=np.zeros((n, 3)), receiver_W=np.zeros(3), receiver_rotation_B=np.zeros(3))
         if len(self._room[0]) != n:
             self._make_room(n)
-        tow_B, bow_B, places_T, wake_T, nothing, x_F = self._room
+        tow_B, bow_B, places_T, wake_T, gust_F, x_F = self._room
         scene = (R_WB, p_WB, R_WT, p_WT)
         x = _places(tow_places_W, self._points_B, *scene, self._exit_T, x_F, places_T, tow_B)
-        gust_F, rolling = nothing, 0.0
-        if self._gusts is not None:
-            gust_F, rolling = self._gusts.velocity(x_F), self._gusts.rolling(x)
+        rolling = 0.0 if self._gusts is None else self._gusts.write_gusts(x_F, x, gust_F)
         if self._discrete is not None:
             gust_F = gust_F + self._discrete.velocity(x_F)
         if self._wake is not None:
@@ -137,7 +135,7 @@ class AirMotion:
         return AirMotion(wake=self._wake, exit_T=self._exit_T, receiver_points_B=self._points_B)
 
     def _make_room(self, n: int) -> None:
-        """Room for the tow's places in B and the bow wave there; all places in T, wake and nothing there, x along F."""
+        """Room for the tow's places in B and the bow wave there; all places in T, wake and gusts there, x along F."""
         m = n + len(self._points_B)
         self._room = (*np.zeros((2, n, 3)), *np.zeros((3, m, 3)), np.zeros(m))
 

@@ -132,12 +132,19 @@ class DrydenField:
     def velocity(self, x: Array) -> Array:
         """(n, 3) gust velocity [m/s] at the places x (n,) [m]."""
         gusts: Array = np.empty((len(x), 3))
-        _gusts_at(self._knots, self._passed_m, self._back_m, self._front_m, self._spacing_m, x, gusts)
+        self.write_gusts(x, 0.0, gusts)
         return gusts
 
     def rolling(self, x: float) -> float:
         """Rolling gust [rad/s] at the place x [m]; 0 without a span."""
-        return float(_rolling_at(self._knots, self._passed_m, self._back_m, self._front_m, self._spacing_m, x))
+        return self.write_gusts(np.empty(0), x, np.empty((0, 3)))
+
+    def write_gusts(self, x: Array, rolling_x: float, gusts: Array) -> float:
+        """Write `velocity` into an array that is there already (n, 3); return `rolling`: both at the price of one."""
+        rolling: float = _gusts_at(
+            self._knots, self._passed_m, self._back_m, self._front_m, self._spacing_m, x, rolling_x, gusts
+        )
+        return rolling
 
     def _draw_to_front(self) -> None:
         """Draw knots until the front lies between two."""
@@ -199,15 +206,12 @@ def _between(x, passed_m, back_m, front_m, spacing_m):  # type: ignore[no-untype
 
 
 @njit(cache=True)
-def _gusts_at(knots, passed_m, back_m, front_m, spacing_m, x, out):  # type: ignore[no-untyped-def]
+def _gusts_at(knots, passed_m, back_m, front_m, spacing_m, x, rolling_x, out):  # type: ignore[no-untyped-def]
+    """Write the gusts at the places x; return the rolling one."""
     for i in range(x.shape[0]):
         knot, part = _between(x[i], passed_m, back_m, front_m, spacing_m)
         a, b = knot % knots.shape[0], (knot + 1) % knots.shape[0]
         for axis in range(3):
             out[i, axis] = (1.0 - part) * knots[a, axis] + part * knots[b, axis]
-
-
-@njit(cache=True)
-def _rolling_at(knots, passed_m, back_m, front_m, spacing_m, x):  # type: ignore[no-untyped-def]
-    knot, part = _between(x, passed_m, back_m, front_m, spacing_m)
+    knot, part = _between(rolling_x, passed_m, back_m, front_m, spacing_m)
     return (1.0 - part) * knots[knot % knots.shape[0], 3] + part * knots[(knot + 1) % knots.shape[0], 3]

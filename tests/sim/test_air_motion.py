@@ -42,8 +42,9 @@ class Ramp:
     def velocity(self, x):
         return np.outer(x, self.per_metre)
 
-    def rolling(self, x):
-        return self.rolling_rad_s * x
+    def write_gusts(self, x, rolling_x, gusts):
+        gusts[:] = self.velocity(x)
+        return self.rolling_rad_s * rolling_x
 
 
 def dryden(seed=4):

@@ -155,7 +155,8 @@ def test_links_inside_the_pod_feel_no_air(make_world):
         def velocity(self, x):
             return np.where(x > 0.5, 1.0, 0.0)[:, None] * [30.0, -40.0, 50.0]
 
-        def rolling(self, x):
+        def write_gusts(self, x, rolling_x, gusts):
+            gusts[:] = self.velocity(x)
             return 0.0
 
     places = []

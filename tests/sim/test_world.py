@@ -31,7 +31,8 @@ class UniformGust:
     def velocity(self, x):
         return np.tile(self.gust_W, (len(x), 1))
 
-    def rolling(self, x):
+    def write_gusts(self, x, rolling_x, gusts):
+        gusts[:] = self.velocity(x)
         return 0.0
 
 
@@ -143,7 +144,8 @@ def test_each_body_is_told_the_gust_of_its_own_place(make_world, receiver_on_rai
         def velocity(self, x):
             return np.column_stack([0.01 * x, np.zeros((len(x), 2))])
 
-        def rolling(self, x):
+        def write_gusts(self, x, rolling_x, gusts):
+            gusts[:] = self.velocity(x)
             return 0.0
 
     receiver = receiver_on_rails()
