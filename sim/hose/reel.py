@@ -100,7 +100,7 @@ class Reel:
         _check_limits(parameters)
         self._parameters = parameters
         self.set_point_n = parameters.set_point_fraction * static_root_tension_n
-        self._blend = 1.0 - np.exp(-step_s / parameters.response_time_s)
+        self._blend = float(1.0 - np.exp(-step_s / parameters.response_time_s))
         self.motor_force_n = self._wanted(static_root_tension_n)
         self._buffer_preload_n = static_root_tension_n - self.motor_force_n
         self._held: tuple[float, float] | None = None  # position and tension at which the drum locked
@@ -118,9 +118,9 @@ class Reel:
             force = self._locked(tension_n, position_m, rate_m_s)
             self.motor_force_n = max(force - self._buffer(position_m, rate_m_s), 0.0)
             return force
-        self._held = None
-        self.motor_force_n += self._blend * (self._wanted(tension_n) - self.motor_force_n)  # Eq. (1)
-        p, motor = self._parameters, self.motor_force_n
+        p, self._held = self._parameters, None
+        motor = self.motor_force_n + self._blend * (self._wanted(tension_n) - self.motor_force_n)  # Eq. (1)
+        self.motor_force_n = motor
         drive, braking = p.take_up_speed_m_s - rate_m_s, -rate_m_s - p.pay_out_speed_m_s
         if drive < p.speed_band_m_s:
             motor *= max(drive / p.speed_band_m_s, 0.0)
@@ -131,9 +131,8 @@ class Reel:
     def _buffer(self, position_m: float, rate_m_s: float) -> float:
         """Last term of Eq. (2)."""
         p = self._parameters
-        return max(
-            self._buffer_preload_n - p.buffer_stiffness_n_m * position_m - p.buffer_damping_n_s_m * rate_m_s, 0.0
-        )
+        push = self._buffer_preload_n - p.buffer_stiffness_n_m * position_m - p.buffer_damping_n_s_m * rate_m_s
+        return 0.0 if push < 0.0 else push
 
     def _locked(self, tension_n: float, position_m: float, rate_m_s: float) -> float:
         p = self._parameters
@@ -144,7 +143,8 @@ class Reel:
 
     def _wanted(self, tension_n: float) -> float:
         """Motor's pull asked for; it cannot push the hose out."""
-        return max(self.set_point_n + self._parameters.tension_gain * (self.set_point_n - tension_n), 0.0)
+        pull = self.set_point_n + self._parameters.tension_gain * (self.set_point_n - tension_n)
+        return 0.0 if pull < 0.0 else pull
 
 
 def _check_limits(parameters: ReelParameters) -> None:
