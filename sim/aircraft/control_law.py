@@ -1,4 +1,6 @@
-"""The arithmetic of a tick of the flight control, whose equations these are (`flight_control`).
+"""The arithmetic of a tick of the flight control and its parts, in one file because a tick is then two calls.
+
+The equations are those of `flight_control`, `rate_relief`, `reference` and `model_flight`.
 
 Loops where slices would do: numba makes twenty times as much code of a slice, which then has to be fetched every tick.
 
@@ -12,8 +14,10 @@ from numba import njit
 
 from dockair.sim.air.atmosphere import STANDARD_GRAVITY_M_S2
 from dockair.sim.aircraft.gain_schedule import THRUST_0
+from dockair.sim.aircraft.linear_model import ATTITUDE
 
 SLOPE, TRIM = 10, 11
+_BANK = ATTITUDE.start
 AIRSPEED, MASS, GUST_SHARE, LAG_SHARE, LAG, PROBE = 1, 2, 3, 4, 5, 6
 
 
@@ -104,12 +108,21 @@ def _estimate(v_B, force, felt, airspeed, gust_from_residual, gust, force_m, eng
 
 @njit(cache=True)
 def write_commands(  # type: ignore[no-untyped-def]
-    felt, airspeed, engaged, C, K, K_m, K_c, gust_from_residual, x, motions, wrenches, trim, chain,
-    x_m, w_m, z, gust, force_m, limits, k, surfaces, commands_m,
+    felt, airspeed, surfaces_now, u_B, a_B, engaged, C, K, K_busy, K_m, K_c, gust_from_residual,
+    x, motions, wrenches, trim, R_FB, x_m, w_m, z, gust, force_m, limits, k, surfaces, commands_m,
+    chain, smooth, k_reference, limits_relief, k_relief, state_relief,
+    R_WM, velocity_m, w_now_m, actuators_m, J, J_inverse, lags_m, k_m,
 ):  # fmt: skip
-    """Eqs. (1) and (2): write commands to surfaces and model, return thrust [N]; advance gust and integrals."""
+    """Eqs. (1) and (2): write commands to surfaces and model, return thrust [N]; advance gust and integrals.
+
+    All that these need goes a tick further with them: relief and reference before, the model's flight after.
+    """
+    n, step, haste, shares = len(x), k[0], 0.0, (1.0, 1.0, 1.0)
+    if engaged:
+        shares = relieve(surfaces, surfaces_now, actuators_m, limits_relief, k_relief, state_relief)
+        haste = state_relief[2]
+    advance_reference(chain, smooth, R_FB, u_B, a_B, x_m[_BANK], shares, k_reference, step)
     _estimate(motions[0], wrenches[0], felt, airspeed, gust_from_residual, gust, force_m, engaged, k)
-    n, step = len(x), k[0]
     error, u, off = np.empty(n + 6), np.zeros(4), np.zeros(3)
     for i in range(n):
         error[i] = x[i] - x_m[i]
@@ -124,7 +137,7 @@ def write_commands(  # type: ignore[no-untyped-def]
         wanted = trim[6 + i] + u[i]
         commands_m[i] = min(max(wanted, limits[0, i]), limits[1, i])
         free_m = free_m and commands_m[i] == wanted
-    _add(-1.0, K, error, u)
+    _add(-1.0, K if haste == 0.0 else (1.0 - haste) * K + haste * K_busy, error, u)
     for i in range(4):
         wanted = trim[6 + i] + u[i]
         u[i] = min(max(wanted, limits[0, i]), limits[1, i])
@@ -137,6 +150,7 @@ def write_commands(  # type: ignore[no-untyped-def]
         _add(1.0, C, x_m, off)
         for i in range(3):
             x_m[n + i] += step * (off[i] - chain[0, i])
+    advance_model(wrenches[1], commands_m, R_WM, velocity_m, w_now_m, actuators_m, J, J_inverse, lags_m, k_m)
     return u[3] * k[MASS]
 
 
@@ -176,3 +190,92 @@ def _rotation_between(R, S, phi):  # type: ignore[no-untyped-def]
         longer = np.arctan2(sine, cosine) / sine
         for i in range(3):
             phi[i] *= longer
+
+
+@njit(cache=True)
+def relieve(commands, surfaces, modelled, limits, k, state):  # type: ignore[no-untyped-def]
+    """Eqs. (1) to (3) of `rate_relief` over one tick: both b and the larger h in place; return the shares."""
+    keep, busy_share, least = k
+    up, left = keep * state[0], keep * state[1]
+    if _is_busy(commands, surfaces, modelled, limits, 0):
+        up += 1.0 - keep
+    if _is_busy(commands, surfaces, modelled, limits, 1) or _is_busy(commands, surfaces, modelled, limits, 2):
+        left += 1.0 - keep
+    haste_up = min(up / busy_share, 1.0)
+    haste = max(min(left / busy_share, 1.0), haste_up)
+    state[0], state[1], state[2] = up, left, haste
+    share_up = 1.0 - (1.0 - least) * haste_up
+    return share_up, 1.0 - (1.0 - least) * haste, share_up
+
+
+@njit(cache=True)
+def _is_busy(commands, surfaces, modelled, limits, i):  # type: ignore[no-untyped-def]
+    """Eq. (1)'s condition."""
+    near_stop = max(abs(commands[i]), abs(modelled[i])) > limits[1, i]
+    return near_stop or abs(commands[i] - surfaces[i]) > limits[0, i]
+
+
+@njit(cache=True)
+def shortening(u, longest):  # type: ignore[no-untyped-def]
+    """What a command is multiplied by, so that it is no longer than allowed."""
+    size = np.sqrt(u[0] * u[0] + u[1] * u[1] + u[2] * u[2])
+    return 1.0 if size <= longest else longest / size
+
+
+@njit(cache=True)
+def advance_reference(chain, smooth, R, u_B, a_B, bank, left, constants, step):  # type: ignore[no-untyped-def]
+    """Eqs. (1) and (2) of `reference` over one tick, in place."""
+    w, zeta, share = constants[3, 0], constants[3, 1], shortening(u_B, constants[3, 2])
+    for i in range(3):
+        k, a_max, jerk_max = constants[0, i], left[i] * constants[1, i], constants[2, i]
+        if i == 1:
+            a_max *= min(max((constants[4, 1] - abs(bank)) / (constants[4, 1] - constants[4, 0]), 0.0), 1.0)
+        u = share * (R[i, 0] * u_B[0] + R[i, 1] * u_B[1] + R[i, 2] * u_B[2])
+        a = R[i, 0] * a_B[0] + R[i, 1] * a_B[1] + R[i, 2] * a_B[2]
+        smooth[1, i] += step * (w * w * (u - smooth[0, i]) - 2.0 * zeta * w * smooth[1, i])
+        smooth[0, i] += step * smooth[1, i]
+        d = min(max(a + k * (smooth[0, i] - chain[0, i]), -a_max), a_max)
+        snap = w * w * (d - chain[1, i]) - 2.0 * zeta * w * chain[2, i]
+        jerk = min(max(chain[2, i] + step * snap, -jerk_max), jerk_max)
+        chain[3, i] = (jerk - chain[2, i]) / step
+        chain[2, i] = jerk
+        chain[1, i] += step * jerk
+        chain[0, i] += step * chain[1, i]
+
+
+@njit(cache=True)
+def advance_model(wrench, commands, R, v, w, actuators, J, J_inverse, lags, k):  # type: ignore[no-untyped-def]
+    """Eqs. (1) and (2) of `model_flight` over one tick, in place."""
+    step, mass, h, force, moment = k[0], k[1], k[2], wrench[:3], wrench[3:]
+    L = (
+        J[0, 0] * w[0] + J[0, 1] * w[1] + J[0, 2] * w[2],
+        J[1, 0] * w[0] + J[1, 1] * w[1] + J[1, 2] * w[2],
+        J[2, 0] * w[0] + J[2, 1] * w[1] + J[2, 2] * w[2],
+    )
+    torque = (
+        moment[0] - w[1] * L[2] + w[2] * L[1],
+        moment[1] - w[2] * L[0] + w[0] * L[2] - h * w[2],
+        moment[2] - w[0] * L[1] + w[1] * L[0] + h * w[1],
+    )
+    push = (force[0] / mass + actuators[3], force[1] / mass, force[2] / mass)
+    for i in range(3):
+        v[i] += step * (R[i, 0] * push[0] + R[i, 1] * push[1] + R[i, 2] * push[2])
+        w[i] += step * (J_inverse[i, 0] * torque[0] + J_inverse[i, 1] * torque[1] + J_inverse[i, 2] * torque[2])
+    v[2] -= step * STANDARD_GRAVITY_M_S2
+    _turn(R, step * w[0], step * w[1], step * w[2])
+    for i in range(4):
+        actuators[i] += step * lags[i] * (commands[i] - actuators[i])
+
+
+@njit(cache=True)
+def _turn(R, x, y, z):  # type: ignore[no-untyped-def]
+    """R <- R exp(rotation vector), in place (Rodrigues)."""
+    t2 = x * x + y * y + z * z
+    t = np.sqrt(t2)
+    a, b = (1.0, 0.5) if t < 1e-8 else (np.sin(t) / t, (1.0 - np.cos(t)) / t2)
+    c = 1.0 - b * t2
+    for i in range(3):
+        p, q, r = R[i, 0], R[i, 1], R[i, 2]
+        R[i, 0] = p * (c + b * x * x) + q * (b * x * y + a * z) + r * (b * x * z - a * y)
+        R[i, 1] = p * (b * x * y - a * z) + q * (c + b * y * y) + r * (b * y * z + a * x)
+        R[i, 2] = p * (b * x * z + a * y) + q * (b * y * z - a * x) + r * (c + b * z * z)

@@ -36,7 +36,7 @@ from dockair.sim.aircraft.control_law import AIRSPEED, TRIM, rotation_rows, writ
 from dockair.sim.aircraft.flight_control_parameters import FlightControlParameters
 from dockair.sim.aircraft.flight_path import FlightPath
 from dockair.sim.aircraft.gain_schedule import RATE_0, SURFACES_0, THRUST_0, Design, GainSchedule
-from dockair.sim.aircraft.linear_model import ATTITUDE, STATES, SURFACES, THRUST
+from dockair.sim.aircraft.linear_model import STATES, SURFACES, THRUST
 from dockair.sim.aircraft.model_flight import ModelFlight
 from dockair.sim.aircraft.rate_relief import RateRelief
 from dockair.sim.aircraft.reference import Reference
@@ -151,33 +151,31 @@ class FlightControl:
             thrust_n: thrust.
             command: increment on the path, and what the path does.
         """
-        path, model, relief = self.path, self.model, self._relief
+        path = self.path
         path.step(command.turn_rate_rad_s, command.climb_rad)
-        row, (surfaces_command, commands_m) = self.schedule.at(path.turn_rate_rad_s), self._commands
+        row = self.schedule.at(path.turn_rate_rad_s)
         flown = (R_WB, velocity_W, w_WB_B, surfaces_rad, thrust_n, path.climb_rad, row.trim, *self._sight)
         if not self._engaged:
             write_states(*flown)
             self._start(command)
         write_states(*flown)
         self._aerodynamics.write_wrenches(self._motions, self._wrenches)
-        shares = relief.step(surfaces_command, surfaces_rad, model.actuators) if self._engaged else np.ones(3)
-        self.reference.step(self._seen[1], command, float(self._x_m[ATTITUDE.start]), shares)
-        haste, felt = relief.haste, (specific_force_B, airspeed_m_s)
-        K = row.K if haste == 0.0 else (1.0 - haste) * row.K + haste * row.K_busy
-        gains = (row.C, K, row.K_followed, row.K_command, row.gust_from_residual)
-        thrust_command_n = write_commands(*felt, self._engaged, *gains, *self._law)
-        model.step(self._wrenches[1], commands_m)
+        thrust_command_n = write_commands(
+            specific_force_B, airspeed_m_s, surfaces_rad, command.velocity_m_s, command.acceleration_m_s2,
+            self._engaged, row.C, row.K, row.K_busy, row.K_followed, row.K_command, row.gust_from_residual, *self._law
+        )  # fmt: skip
         self._engaged = True
-        return surfaces_command, thrust_command_n
+        return self._commands[0], thrust_command_n
 
     def _arguments(self) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
         """What `write_states` and `write_commands` take at every tick: arrays that are written in place."""
         model, (R_now, R_FB, trim, x) = self.model, self._seen
         modelled = (model.R_WB, model.velocity_W, model.w_WB_B, model.actuators)
         sight = (self.path.axes(), *modelled, self._constants, R_now, R_FB, trim, x, self._x_m, self._motions)
-        known = (x, self._motions, self._wrenches, trim, self.reference.chain)
+        known = (x, self._motions, self._wrenches, trim, R_FB)
         memory = (self._x_m, self._w_m, self._z, self._gust, self._force_B)
-        return sight, (*known, *memory, self._limits, self._constants, *self._commands)
+        about = (self._limits, self._constants, *self._commands)
+        return sight, (*known, *memory, *about, *self.reference.memory, *self._relief.memory, *model.memory)
 
     def _start(self, command: ReceiverCommand) -> None:
         """Let model and reference begin in the trim of now, with the aircraft's velocity beyond it."""

@@ -52,9 +52,14 @@ class FlightPath:
         self.heading_rad = 0.0
         self.turn_rate_rad_s = 0.0  #: positive to the left
         self.climb_rad = 0.0  #: slope against the air
+        self._straight = True  # as long as nothing else has been commanded
+        _advance(self._state, self._axes, self._constants, 0.0, 0.0, 0.0)
 
     def step(self, turn_rate_rad_s: float, climb_rad: float) -> None:
         """Advance by one tick toward the commanded turn rate and slope."""
+        if self._straight and turn_rate_rad_s == 0.0 and climb_rad == 0.0:
+            return
+        self._straight = False
         self.heading_rad, self.turn_rate_rad_s, self.climb_rad = _advance(
             self._state, self._axes, self._constants, self.heading_rad, float(turn_rate_rad_s), float(climb_rad)
         )

@@ -11,11 +11,10 @@ Not modelled: limits of actuators (whoever commands keeps inside them), the slow
 """
 
 import numpy as np
-from numba import njit
 
 from dockair.rotations import Array
-from dockair.sim.air.atmosphere import STANDARD_GRAVITY_M_S2
 from dockair.sim.aircraft.airframe import AirframeData
+from dockair.sim.aircraft.control_law import advance_model
 
 
 class ModelFlight:
@@ -35,7 +34,8 @@ class ModelFlight:
         self.w_WB_B: Array = np.zeros(3)
         self.actuators: Array = np.zeros(4)  #: elevator, aileron, rudder [rad], thrust per mass [m/s^2]
         state = (self.R_WB, self.velocity_W, self.w_WB_B, self.actuators)
-        self._arguments = (*state, inertia, np.asarray(np.linalg.inv(inertia)), lags, constants)
+        #: all that `control_law` moves it with, in its order
+        self.memory = (*state, inertia, np.asarray(np.linalg.inv(inertia)), lags, constants)
 
     def start(self, R_WB: Array, velocity_W: Array, w_WB_B: Array, actuators: Array) -> None:
         """Begin in this state."""
@@ -48,41 +48,4 @@ class ModelFlight:
             wrench_B: (6,) force and moment of the air on it as it flies, body axes [N, N m].
             commands: (4,) to the actuators.
         """
-        _advance(wrench_B, commands, *self._arguments)
-
-
-@njit(cache=True)
-def _advance(wrench, commands, R, v, w, actuators, J, J_inverse, lags, k):  # type: ignore[no-untyped-def]
-    step, mass, h, force, moment = k[0], k[1], k[2], wrench[:3], wrench[3:]
-    L = (
-        J[0, 0] * w[0] + J[0, 1] * w[1] + J[0, 2] * w[2],
-        J[1, 0] * w[0] + J[1, 1] * w[1] + J[1, 2] * w[2],
-        J[2, 0] * w[0] + J[2, 1] * w[1] + J[2, 2] * w[2],
-    )
-    torque = (
-        moment[0] - w[1] * L[2] + w[2] * L[1],
-        moment[1] - w[2] * L[0] + w[0] * L[2] - h * w[2],
-        moment[2] - w[0] * L[1] + w[1] * L[0] + h * w[1],
-    )
-    push = (force[0] / mass + actuators[3], force[1] / mass, force[2] / mass)
-    for i in range(3):
-        v[i] += step * (R[i, 0] * push[0] + R[i, 1] * push[1] + R[i, 2] * push[2])
-        w[i] += step * (J_inverse[i, 0] * torque[0] + J_inverse[i, 1] * torque[1] + J_inverse[i, 2] * torque[2])
-    v[2] -= step * STANDARD_GRAVITY_M_S2
-    _turn(R, step * w[0], step * w[1], step * w[2])
-    for i in range(4):
-        actuators[i] += step * lags[i] * (commands[i] - actuators[i])
-
-
-@njit(cache=True)
-def _turn(R, x, y, z):  # type: ignore[no-untyped-def]
-    """R <- R exp(rotation vector), in place (Rodrigues)."""
-    t2 = x * x + y * y + z * z
-    t = np.sqrt(t2)
-    a, b = (1.0, 0.5) if t < 1e-8 else (np.sin(t) / t, (1.0 - np.cos(t)) / t2)
-    c = 1.0 - b * t2
-    for i in range(3):
-        p, q, r = R[i, 0], R[i, 1], R[i, 2]
-        R[i, 0] = p * (c + b * x * x) + q * (b * x * y + a * z) + r * (b * x * z - a * y)
-        R[i, 1] = p * (b * x * y - a * z) + q * (c + b * y * y) + r * (b * y * z + a * x)
-        R[i, 2] = p * (b * x * z + a * y) + q * (b * y * z - a * x) + r * (c + b * z * z)
+        advance_model(wrench_B, commands, *self.memory)

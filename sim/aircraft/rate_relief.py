@@ -22,9 +22,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from dockair.rotations import Array
+from dockair.sim.aircraft.control_law import relieve
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,45 +56,23 @@ class RateRelief:
         stops_rad: Array,
         step_s: float,
     ) -> None:
-        self._parameters = parameters
         largest = [float(rate) / bandwidth_rad_s for rate in rate_limits_rad_s]
-        self._limits = np.array([largest, [parameters.stop_share * float(stop) for stop in stops_rad]])
-        self._keep = math.exp(-step_s / parameters.time_s)
-        self._busy = 0.0, 0.0  # elevator, ailerons and rudder
-        self.haste = 0.0  #: the larger of Eq. (3)
-        self._shares = np.ones(3)
+        limits = np.array([largest, [parameters.stop_share * float(stop) for stop in stops_rad]])
+        constants = np.array([math.exp(-step_s / parameters.time_s), parameters.busy_share, parameters.least])
+        self._state = np.zeros(3)  # b of the elevator, of ailerons and rudder; the larger of Eq. (3)
+        self.memory = limits, constants, self._state  #: all that `control_law` advances it with, in its order
+
+    @property
+    def haste(self) -> float:
+        """The larger of Eq. (3)."""
+        return float(self._state[2])
 
     def step(self, commands_rad: Array, surfaces_rad: Array, modelled_rad: Array) -> Array:
-        """Return the shares (3,) forward, left, up after a tick, overwritten by the next.
+        """Return the shares (3,) forward, left, up after a tick.
 
         Args:
             commands_rad: (3,) to the surfaces.
             surfaces_rad: (3,) where they were.
             modelled_rad: (3,) where the model's were.
         """
-        p, shares = self._parameters, self._shares
-        at = commands_rad, surfaces_rad, modelled_rad
-        self._busy, self.haste = _relieve(*at, self._limits, self._keep, self._busy, p.busy_share, p.least, shares)
-        return shares
-
-
-@njit(cache=True)
-def _relieve(commands, surfaces, modelled, limits, keep, busy, busy_share, least, shares):  # type: ignore[no-untyped-def]
-    """Eqs. (1) to (3) over one tick: the shares in place; return b of both, and the larger h."""
-    up, left = keep * busy[0], keep * busy[1]
-    if _is_busy(commands, surfaces, modelled, limits, 0):
-        up += 1.0 - keep
-    if _is_busy(commands, surfaces, modelled, limits, 1) or _is_busy(commands, surfaces, modelled, limits, 2):
-        left += 1.0 - keep
-    haste_up = min(up / busy_share, 1.0)
-    haste = max(min(left / busy_share, 1.0), haste_up)
-    shares[:] = 1.0 - (1.0 - least) * haste_up
-    shares[1] = 1.0 - (1.0 - least) * haste
-    return (up, left), haste
-
-
-@njit(cache=True)
-def _is_busy(commands, surfaces, modelled, limits, i):  # type: ignore[no-untyped-def]
-    """Eq. (1)'s condition."""
-    near_stop = max(abs(commands[i]), abs(modelled[i])) > limits[1, i]
-    return near_stop or abs(commands[i] - surfaces[i]) > limits[0, i]
+        return np.array(relieve(commands_rad, surfaces_rad, modelled_rad, *self.memory))

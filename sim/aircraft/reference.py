@@ -16,10 +16,10 @@ of bandwidth k. W stands for any level axes that the caller gives attitudes agai
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from dockair.messages import ReceiverCommand
 from dockair.rotations import Array
+from dockair.sim.aircraft.control_law import advance_reference, shortening
 
 _WHOLE = np.ones(3)
 
@@ -47,12 +47,13 @@ class Reference:
         self._step_s = step_s
         self._smooth = np.zeros((2, 3))  # F(u) and its rate
         self.chain: Array = np.zeros((4, 3))  #: r and its first three derivatives (rows), W axes [m/s, m/s^2, ...]
+        self.memory = self.chain, self._smooth, self._constants  #: all that `control_law` advances it with
 
     def start(self, velocity_W: Array, R_WB: Array, command: ReceiverCommand) -> None:
         """Start from a velocity (3,) beyond trim, at rest with a command."""
         self._smooth[:], self.chain[:] = 0.0, 0.0
         u = command.velocity_m_s
-        self._smooth[0] = R_WB @ (u * _shortening(u, self._constants[3, 2]))
+        self._smooth[0] = R_WB @ (u * shortening(u, self._constants[3, 2]))
         self.chain[0] = velocity_W
 
     def step(self, R_WB: Array, command: ReceiverCommand, bank_rad: float = 0.0, shares: Array = _WHOLE) -> Array:
@@ -65,32 +66,5 @@ class Reference:
             shares: (3,) what is left of the limits of acceleration, axes of W.
         """
         u, a = command.velocity_m_s, command.acceleration_m_s2
-        _advance(self.chain, self._smooth, R_WB, u, a, bank_rad, shares, self._constants, self._step_s)
+        advance_reference(self.chain, self._smooth, R_WB, u, a, bank_rad, shares, self._constants, self._step_s)
         return self.chain
-
-
-@njit(cache=True)
-def _shortening(u, longest):  # type: ignore[no-untyped-def]
-    size = np.sqrt(u[0] * u[0] + u[1] * u[1] + u[2] * u[2])
-    return 1.0 if size <= longest else longest / size
-
-
-@njit(cache=True)
-def _advance(chain, smooth, R, u_B, a_B, bank, left, constants, step):  # type: ignore[no-untyped-def]
-    """Eqs. (1) and (2) over one tick, in place."""
-    w, zeta, share = constants[3, 0], constants[3, 1], _shortening(u_B, constants[3, 2])
-    for i in range(3):
-        k, a_max, jerk_max = constants[0, i], left[i] * constants[1, i], constants[2, i]
-        if i == 1:
-            a_max *= min(max((constants[4, 1] - abs(bank)) / (constants[4, 1] - constants[4, 0]), 0.0), 1.0)
-        u = share * (R[i, 0] * u_B[0] + R[i, 1] * u_B[1] + R[i, 2] * u_B[2])
-        a = R[i, 0] * a_B[0] + R[i, 1] * a_B[1] + R[i, 2] * a_B[2]
-        smooth[1, i] += step * (w * w * (u - smooth[0, i]) - 2.0 * zeta * w * smooth[1, i])
-        smooth[0, i] += step * smooth[1, i]
-        d = min(max(a + k * (smooth[0, i] - chain[0, i]), -a_max), a_max)
-        snap = w * w * (d - chain[1, i]) - 2.0 * zeta * w * chain[2, i]
-        jerk = min(max(chain[2, i] + step * snap, -jerk_max), jerk_max)
-        chain[3, i] = (jerk - chain[2, i]) / step
-        chain[2, i] = jerk
-        chain[1, i] += step * jerk
-        chain[0, i] += step * chain[1, i]
