@@ -1,9 +1,10 @@
 """A camera in a process of its own: it works on a frame while the world goes on until the frame could arrive.
 
 The world's state at the exposure and the frame's pixels go through shared memory, a slot for each frame under way;
-orders and answers through a pipe. The process is a fork of the flight, so it has the camera as it was built, and it
-ends with the flight: an order of None, or the pipe's end, ends it. What the camera refuses is raised in the flight,
-when the frame is asked for.
+orders and answers through a pipe. While there is no order the camera works ahead on its tables, so that no frame has to
+wait for them. The process is a fork of the flight, so it has the camera as it was built, and it ends with the flight:
+an order of None, or the pipe's end, ends it. What the camera refuses is raised in the flight, when the frame is asked
+for.
 
 Not for a camera that draws with OpenGL (a context does not survive a fork), nor for systems without fork, nor inside a
 process that may have no children: see `can_overlap`.
@@ -160,7 +161,7 @@ def can_overlap(camera: object) -> TypeGuard[NearInfraredCamera]:
 
 
 def _serve(camera: NearInfraredCamera, slots: list[_Slot], pipe: Connection, flights_end: Connection) -> None:
-    """Expose as ordered until there are no more orders."""
+    """Expose as ordered until there are no more orders, and work ahead in between."""
     flights_end.close()  # or the pipe would never end with the flight
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # a keyboard's interrupt goes to both; the flight says when to end
     with suppress(EOFError, OSError):
@@ -171,6 +172,8 @@ def _serve(camera: NearInfraredCamera, slots: list[_Slot], pipe: Connection, fli
             except Exception as error:  # the flight's to handle, whatever it is
                 answer = _Failed(type(error), error.args, error.__dict__)
             pipe.send(answer)
+            while not pipe.poll() and camera.work_ahead():
+                pass  # until there is an order, or nothing to do
 
 
 def _exposed(

@@ -41,6 +41,10 @@ class Heaven(Shines, Protocol):
         """Fill (rows, columns) relative radiance in the directions (1, -x, -y) of the camera's axes from a place."""
         ...
 
+    def work_ahead(self, x: Array, y: Array) -> bool:
+        """Make a little of what pictures in these directions will take; say whether anything lacked."""
+        ...
+
     def airlight(self, direction_W: Array) -> float:
         """Relative radiance of endless haze toward a direction (3,)."""
         ...
@@ -122,6 +126,10 @@ class Background:
         self._solids.draw(picture, data, pose, x, y, haze)
         picture = blocks.to_sensor(picture, drawn, extent)
         return blocks.to_pixels(picture, extent, window, white_e, stray, dirt, out)
+
+    def work_ahead(self) -> bool:
+        """Make a little of what whole pictures will take, in time that none waits for; say whether anything lacked."""
+        return self._sky.work_ahead(*self._blocks.tangents(self._blocks.drawn))
 
     def close(self) -> None:
         """Free the OpenGL context; twice is once."""

@@ -12,7 +12,8 @@ A table is of one place, its key, and serves all places around; from the key, D 
 with h' the key's height, o' the level way from there; the horizon is near enough for two terms. Keys stand on a grid, a
 third of the layer's depth apart, so that the picture is a function of the place alone. A feature stays where it is as
 the camera moves and turns; what it fades into changes with the key by less than the eye sees. On the way to a change of
-key the next one's tiles are made bit by bit, so that no frame has to wait for them. Rays that skim past the layer are
+key the next one's tiles are made bit by bit, so that no frame has to wait for them; or all at once, before they are
+looked at, where there is time between frames. Rays that skim past the layer are
 taken to the farthest it reaches.
 
 Source: Praun & Hoppe 2003 (octahedral maps), as `sky_table`.
@@ -74,6 +75,7 @@ class LayerTable:
         self._is_missing = np.zeros_like(self._own.is_known)  # false between looks
         self._count = 0
         self._last_m: Place = (0.0, 0.0, 0.0)
+        self._moved_m: Place = (0.0, 0.0, 0.0)
 
     def nodes(self, place_m: Array, R_WC: Array, x: Array, y: Array, below: Interval) -> Nodes:
         """Return the table for a place, known wherever a picture looks.
@@ -85,32 +87,71 @@ class LayerTable:
             y: (rows,) tangents below the axis.
             below: (rows, 2) first column and one past the last that see the layer.
         """
-        step_m, place = self._height_m / _KEYS_PER_DEPTH, (float(place_m[0]), float(place_m[1]), float(place_m[2]))
+        place = self._come_to(place_m)
+        view = np.ascontiguousarray(R_WC, dtype=float), x, y, below
+        self._own.complete(self._missing(self._own, place, view))
+        self._prepare(place, view)
+        return Nodes(self._own.neighbours, self._tiles * _TILE, self._geometry(place, self._own.key))
+
+    def work_ahead(self, place_m: Array, R_WC: Array, x: Array, y: Array, below: Interval) -> bool:
+        """Make a strip of what a picture lacks here, or under the key that comes next; say whether anything lacked.
+
+        Arguments as of `nodes`. For time that no frame waits for: `nodes` then finds done what it would do itself.
+        """
+        place = self._come_to(place_m)
+        view, (coming, _) = (np.ascontiguousarray(R_WC, dtype=float), x, y, below), self._coming(place)
+        for tiles, key in ((self._own, self._own.key), (self._next, coming)):
+            if key is None:
+                continue
+            if key != tiles.key:
+                tiles.restart(key)
+            lacking = self._missing(tiles, place, view)
+            if lacking:
+                tiles.make_strip(*lacking[0])
+                return True
+        return False
+
+    @property
+    def _step_m(self) -> float:
+        """From one key to the next."""
+        return self._height_m / _KEYS_PER_DEPTH
+
+    def _come_to(self, place_m: Array) -> Place:
+        """Take up the tiles of a place's key; return the place as numbers."""
+        place, step_m = (float(place_m[0]), float(place_m[1]), float(place_m[2])), self._step_m
         key = _on_grid(place[0], step_m), _on_grid(place[1], step_m), _on_grid(place[2], step_m)
         if key != self._own.key:
             self._own, self._next = self._next, self._own
             if key != self._own.key:
                 self._own.restart(key)
-        view = np.ascontiguousarray(R_WC, dtype=float), x, y, below
-        self._own.complete(self._missing(self._own, place, view))
-        self._prepare(place, key, step_m, view)
-        return Nodes(self._own.neighbours, self._tiles * _TILE, self._geometry(place, key))
+        if place != self._last_m:
+            last, self._last_m = self._last_m, place
+            self._moved_m = place[0] - last[0], place[1] - last[1], place[2] - last[2]
+        return place
 
-    def _prepare(self, place_m: Place, key: Place, step_m: float, view: View) -> None:
-        """Make a share of the tiles of the key that comes next if the way goes on: along the axis left first."""
-        moved, self._last_m = [here - last for here, last in zip(place_m, self._last_m, strict=True)], place_m
+    def _coming(self, place_m: Place) -> tuple[Place | None, float]:
+        """Return the key that comes next if the way goes on, along the axis left first, and the part of the way to it.
+
+        Both are None and 0 where nothing moves.
+        """
+        step_m, key, moved = self._step_m, self._own.key, self._moved_m
         axis, frames = 0, math.inf
         for k in range(3):
             ahead = 0.5 * step_m - math.copysign(1.0, moved[k]) * (place_m[k] - key[k])
             if moved[k] != 0.0 and ahead / abs(moved[k]) < frames:
                 axis, frames = k, ahead / abs(moved[k])
-        sign = math.copysign(1.0, moved[axis])
-        share = (sign * (place_m[axis] - key[axis]) / step_m - _FROM) / (_UNTIL - _FROM)
-        if share <= 0.0 or math.isinf(frames):
+        if math.isinf(frames):
+            return None, 0.0
+        sign, coming = math.copysign(1.0, moved[axis]), list(key)
+        coming[axis] = (round(place_m[axis] / step_m) + sign) * step_m
+        return (coming[0], coming[1], coming[2]), sign * (place_m[axis] - key[axis]) / step_m
+
+    def _prepare(self, place_m: Place, view: View) -> None:
+        """Make a share of the tiles of the key that comes next."""
+        coming, way = self._coming(place_m)
+        share = (way - _FROM) / (_UNTIL - _FROM)
+        if coming is None or share <= 0.0:
             return
-        coming_m = list(key)
-        coming_m[axis] = (round(place_m[axis] / step_m) + sign) * step_m
-        coming = coming_m[0], coming_m[1], coming_m[2]
         self._count += 1
         if coming != self._next.key:
             self._next.restart(coming)

@@ -53,7 +53,7 @@ class LayerTiles:
         """Make what lacks of tiles (row, column)."""
         for row, column in tiles:
             while not self.is_known[row, column]:
-                self._make_strip(row, column)
+                self.make_strip(row, column)
 
     @property
     def lacks_work(self) -> bool:
@@ -74,11 +74,11 @@ class LayerTiles:
             left = sum(_STRIPS - int(self._strips[tile]) for tile in self._ahead)
             if self._made >= share * (self._made + left):
                 return
-            self._make_strip(row, column)
+            self.make_strip(row, column)
             self._made += 1
 
-    def _make_strip(self, row: int, column: int) -> None:
-        """Tabulate the next strip of a tile."""
+    def make_strip(self, row: int, column: int) -> None:
+        """Tabulate the next strip of a tile that is not known."""
         strip, first = int(self._strips[row, column]), (row * self._tiles + column) * SIDE * SIDE
         down, along = np.arange(strip * _ROWS, (strip + 1) * _ROWS), np.arange(SIDE)
         i, j = np.meshgrid(down + row * TILE, along + column * TILE, indexing="ij")

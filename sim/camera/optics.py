@@ -79,6 +79,10 @@ class PointSpread:
         cores.make_for(points)
         splat(image, start, points, cores.tables, self.wing)
 
+    def work_ahead(self) -> bool:
+        """Make a core beside those that the last points took, in time that nobody waits for; say whether any lacked."""
+        return any(cores.work_ahead() for cores in self._cores.values())
+
     @property
     def widest_px(self) -> int:
         """Half-width of the widest core that any source can have."""
@@ -154,6 +158,7 @@ class _Cores:
         self._half_widths = np.array([spread.half_width for spread in spreads])
         self._phases = np.array([spread.phases for spread in spreads])
         self._pool = np.zeros(0, dtype=np.float32)
+        self._points: Array = np.empty((0, POINT))  # that it was last made for
         self.widest_px = int(self._half_widths.max())
 
     @property
@@ -163,8 +168,16 @@ class _Cores:
 
     def make_for(self, points: Array) -> None:
         """Make the cores around the depths of points (n, POINT) that lack."""
-        for k in missing_levels(points, self._made):
+        self._points = points
+        for k in missing_levels(points, self._made, 0):
             self._make(int(k))
+
+    def work_ahead(self) -> bool:
+        """Make one of the cores beside those that the last points took: those that come next along the axis."""
+        missing = missing_levels(self._points, self._made, 1)
+        if len(missing) > 0:
+            self._make(int(missing[0]))
+        return len(missing) > 0
 
     def _make(self, k: int) -> None:
         if self._made[k]:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dockair.rotations import Array
-from dockair.sim.camera.earth import columns_below, dip_sine
+from dockair.sim.camera.earth import Interval, columns_below, dip_sine
 from dockair.sim.camera.layer_table import NO_DECK, LayerTable, lay_under
 from dockair.sim.camera.sky_radiance import LAYER_NODE_RAD, NODE_RAD, SkyRadiance
 from dockair.sim.camera.sky_table import DirectionTable
@@ -32,6 +32,7 @@ class Sky:
         self._top_m, self._height_m = earth_m + law.top_m, law.altitude_m - law.top_m  # of what is met first from above
         self._ground_table = LayerTable(law.below, _LAYER_TILES, 1, law.altitude_m, earth_m)
         self._deck_table = LayerTable(law.over, _LAYER_TILES, 2, self._height_m, self._top_m)
+        self._last: tuple[Array, Array] | None = None  # attitude and place of the last picture
 
     def fill(self, out: NDArray[np.float32], R_WC: Array, x: Array, y: Array, place_m: Array | None = None) -> None:
         """Write what is seen in directions of the camera's axes.
@@ -48,15 +49,40 @@ class Sky:
             return
         place = np.zeros(3) if place_m is None else np.asarray(place_m, dtype=float)
         R, x, y = np.ascontiguousarray(R_WC, dtype=float), np.asarray(x, dtype=float), np.asarray(y, dtype=float)
-        below = np.empty((len(y), 2), dtype=np.int64)
-        sine = dip_sine(self._top_m, self._height_m + float(place[2]))
-        first, stop, any_below = columns_below(R, x, y, sine, below)
+        self._last = R.copy(), place.copy()
+        (first, stop, any_below), below = self._columns_below(R, x, y, place)
         if first < stop:
             self._table.fill(out[first:stop], R, x, y[first:stop])
         if any_below:
             ground = self._ground_table.nodes(place, R, x, y, below)
             deck = self._deck_table.nodes(place, R, x, y, below) if self._law.has_deck else NO_DECK
             lay_under(out, R, x, y, below, ground, deck)
+
+    def work_ahead(self, x: Array, y: Array) -> bool:
+        """Make a little of what pictures in these directions will be read from; say whether anything lacked.
+
+        For time that no picture waits for. Of the sky's parts those below, which come and go with the way: from where
+        the last picture was made, and under the keys that come next.
+
+        Args:
+            x: (columns,) as of `fill`.
+            y: (rows,) as of `fill`.
+        """
+        if self._last is None:
+            return False
+        R, place = self._last
+        (_, _, any_below), below = self._columns_below(R, x, y, place)
+        if not any_below:
+            return False
+        return self._ground_table.work_ahead(place, R, x, y, below) or (
+            self._law.has_deck and self._deck_table.work_ahead(place, R, x, y, below)
+        )
+
+    def _columns_below(self, R: Array, x: Array, y: Array, place: Array) -> tuple[tuple[int, int, bool], Interval]:
+        """What `earth.columns_below` returns and fills, of what is met first from above."""
+        below = np.empty((len(y), 2), dtype=np.int64)
+        sine = dip_sine(self._top_m, self._height_m + float(place[2]))
+        return columns_below(R, x, y, sine, below), below
 
     @property
     def ambient(self) -> float:

@@ -36,12 +36,12 @@ Tables: TypeAlias = tuple[NDArray[np.float32], NDArray[np.int64], NDArray[np.int
 
 
 @njit(cache=True)
-def missing_levels(points: Array, made: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Return which of the tables that `splat` reads for these points are not made yet, each once."""
+def missing_levels(points: Array, made: NDArray[np.bool_], more: int) -> NDArray[np.int64]:
+    """Return which of the tables that `splat` reads for these points, and so many more, are not made yet, each once."""
     wanted = np.zeros(made.shape[0], np.bool_)
     for i in range(points.shape[0]):
         middle = _middle(points[i, 3], made.shape[0])
-        wanted[middle - 1 : middle + 2] = True
+        wanted[max(middle - 1 - more, 0) : middle + 2 + more] = True
     return np.flatnonzero(wanted & ~made)
 
 

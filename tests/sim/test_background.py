@@ -34,6 +34,9 @@ class PlainSky:
     def fill(self, out: np.ndarray, R_WC: np.ndarray, x: np.ndarray, y: np.ndarray, place_m: object = None) -> None:
         out[:] = self.level + self.slopes[0] * x + self.slopes[1] * y[:, None]
 
+    def work_ahead(self, x: np.ndarray, y: np.ndarray) -> bool:
+        return False
+
     def beam(self, directions_W: np.ndarray) -> np.ndarray:
         return np.full(len(directions_W), self.direct)
 

@@ -146,6 +146,24 @@ def test_a_window_reads_what_the_full_frame_reads(make_camera: Callable[..., Mad
     assert (difference > 0).mean() <= 0.02
 
 
+def test_a_camera_that_works_ahead_between_frames_gives_the_same_frames(make_camera: Callable[..., Made]) -> None:
+    """It comes nearer, and windows that look below follow one on a piece of sky."""
+    hashes = []
+    for most in (0, 1000):
+        world, camera = make_camera(BEHIND, automatic_exposure=True)
+        frames = []
+        for k, window in enumerate((Window(0, 40, 0, 60), Window(400, 900, 300, 1200), FULL)):
+            world.put_drogue(camera, np.array([6.0 - k, 0.3, -0.2]))
+            frame = camera.expose(world.data, 0.0, k, window)
+            assert frame is not None
+            frames.append(hashlib.sha256(frame.pixels.tobytes()).hexdigest())
+            done = sum(1 for _ in range(most) if camera.work_ahead())
+            assert done < 1000 and (most == 0 or k > 0 or done > 0)
+            assert most == 0 or not camera.work_ahead()
+        hashes.append(frames)
+    assert hashes[0] == hashes[1]
+
+
 def test_a_box_in_front_of_an_led_hides_it_and_moved_away_shows_it_again(make_camera: Callable[..., Made]) -> None:
     world, camera = make_camera()
     R_WC, p_WC = camera.pose(world.data)

@@ -207,6 +207,33 @@ def test_the_next_key_is_made_bit_by_bit_and_right(heading_m: tuple[float, float
     assert sum(of_frame[1:]) > 0.9 * of_frame[0]
 
 
+def test_what_was_made_ahead_is_not_made_again_and_is_the_same() -> None:
+    """With time between frames none makes a node: neither of a wider view than before, nor under the next key."""
+    made: list[int] = []
+
+    def counted(d: np.ndarray, key_m: np.ndarray) -> np.ndarray:
+        made.append(len(d))
+        return _waves(d, key_m)
+
+    R, below = matrix_from_yaw_pitch_roll(0.0, 0.2, 0.0), np.empty((len(Y), 2), dtype=np.int64)
+    columns_below(R, X, Y, dip_sine(RADIUS_M, ALTITUDE_M), below)
+    narrow = np.where(np.arange(len(Y))[:, None] // 20 == 20, np.minimum(below, 100), 0)
+    flown, at = LayerTable(counted, 32, 2, ALTITUDE_M, RADIUS_M), np.zeros(3)
+    for step in range(80):
+        at = step * np.array([20.0, 0.0, 0.0])
+        made.clear()
+        nodes = flown.nodes(at, R, X, Y, below if step in (20, 79) else narrow)
+        assert step == 0 or not made
+        while flown.work_ahead(at, R, X, Y, below):
+            pass
+    pictures = []
+    for table in (nodes, _table(2).nodes(at, R, X, Y, below)):
+        out = np.zeros((len(Y), len(X)), dtype=np.float32)
+        lay_under(out, R, X, Y, below, _table(1).nodes(at, R, X, Y, below), table)
+        pictures.append(out)
+    assert np.array_equal(*pictures)
+
+
 def test_a_new_key_changes_no_more_than_what_is_between_nodes() -> None:
     """Two places a metre apart, on either side of a change: as unlike as two of one key a metre apart, to a few."""
     sky, R = _sky(), matrix_from_yaw_pitch_roll(0.0, 0.1, 0.0)

@@ -262,6 +262,19 @@ def test_a_blob_does_not_depend_on_which_others_were_drawn_before() -> None:
     )
 
 
+def test_cores_made_ahead_are_those_of_the_depths_around_and_change_no_blob(monkeypatch: pytest.MonkeyPatch) -> None:
+    """From a point whose three depths are made to one a step nearer, for which there is nothing left to do."""
+    ahead, fresh = _spread(), _spread()
+    _blob(ahead, (0.2, 0.1), depth_m=3.0)
+    levels = [ahead.work_ahead() for _ in range(3)]
+    assert levels == [True, True, False]
+    monkeypatch.setattr("dockair.sim.camera.optics.core", None)
+    depth_m = 1.0 / (1.0 / 3.0 + 1.0 / ahead._cores[0.0].levels_m)
+    nearer = _blob(ahead, (0.2, 0.1), depth_m=depth_m)
+    monkeypatch.undo()
+    assert np.array_equal(nearer, _blob(fresh, (0.2, 0.1), depth_m=depth_m))
+
+
 def test_sizes_beyond_those_kept_are_made_again() -> None:
     spread = _spread()
     first = _blob(spread, (0.1, 0.2), size_m=1e-3, depth_m=3.0)
