@@ -30,6 +30,7 @@ from dockair.sim.camera.camera import NearInfraredCamera
 from dockair.sim.camera.scene_state import SceneState, size_of
 
 _SLOTS = 4  # frames under way: two at 50 Hz and 10 ms; more when the transfer takes long
+_PIECES_AHEAD = 2  # of tables, after a frame: half a millisecond, so that the camera is idle when the next order comes
 _GOODBYE_S = 5.0  # for a process to end by itself; it has at most _SLOTS frames to finish
 
 
@@ -172,8 +173,9 @@ def _serve(camera: NearInfraredCamera, slots: list[_Slot], pipe: Connection, fli
             except Exception as error:  # the flight's to handle, whatever it is
                 answer = _Failed(type(error), error.args, error.__dict__)
             pipe.send(answer)
-            while not pipe.poll() and camera.work_ahead():
-                pass  # until there is an order, or nothing to do
+            for _ in range(_PIECES_AHEAD):
+                if pipe.poll() or not camera.work_ahead():
+                    break
 
 
 def _exposed(

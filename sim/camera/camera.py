@@ -203,7 +203,7 @@ class NearInfraredCamera:
 
         It says whether anything lacked, and takes a millisecond or two at most. No bit of any frame depends on it.
         """
-        return self._background.work_ahead() or self._spread.work_ahead()
+        return self._spread.work_ahead() or self._background.work_ahead()
 
     def close(self) -> None:
         """Free the OpenGL context."""
