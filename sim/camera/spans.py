@@ -81,7 +81,7 @@ def place(
             continue
         _turn_into_camera(camera[0], xmat[geoms[g]], M)
         behind = _corners_of_box(corners, c, M, h, length, near)
-        row, stop = _outline(sides, points, corners, behind, y, rows, near)
+        row, stop = _outline(sides, points, corners, behind, _fronts(c, M, h, length), y, rows, near)
         if row == stop:
             continue
         out.solid[count], out.rows[count, 0], out.rows[count, 1], out.rows[count, 2] = g, row, stop, used
@@ -135,12 +135,23 @@ def _corners_of_box(corners: Array, c: Array, M: Array, h: Array, length: float,
 
 
 @njit(cache=True)
+def _fronts(c: Array, M: Array, h: Array, length: float) -> int:
+    """Which of a box's faces show their front: bit 2 k for the negative side across axis k, 2 k + 1 for the other."""
+    fronts = 0
+    for k in range(3):
+        lens, half = -(c[0] * M[0, k] + c[1] * M[1, k] + c[2] * M[2, k]), length if k == 2 else h[k]
+        fronts |= (lens < -half) << (2 * k) | (lens > half) << (2 * k + 1)
+    return fronts
+
+
+@njit(cache=True)
 def _outline(
-    sides: Array, points: Array, corners: Array, behind: int, y: Array, rows: Even, near: float
+    sides: Array, points: Array, corners: Array, behind: int, fronts: int, y: Array, rows: Even, near: float
 ) -> tuple[int, int]:
     """Fill the leftmost and rightmost tangent of a box's picture in each row (2, rows); return the range of rows.
 
-    Of a box that reaches behind the near plane all points of the part before it are joined, pair by pair.
+    An edge is on the outline where one of its two faces shows its front and the other does not. Of a box that reaches
+    behind the near plane all points of the part before it are joined, pair by pair.
     """
     count = _points(points, corners, behind, near)
     low, high = math.inf, -math.inf
@@ -154,9 +165,11 @@ def _outline(
                 _mark(sides, _pair(points, a), _pair(points, b), y, rows)
         return row, stop
     for a in range(8):
-        for bit in (1, 2, 4):
-            if (a & bit) == 0:
-                _mark(sides, _pair(points, a), _pair(points, a | bit), y, rows)
+        for axis in range(3):
+            one, other = (axis + 1) % 3, (axis + 2) % 3
+            faces = (fronts >> (2 * one + (a >> one & 1))) ^ (fronts >> (2 * other + (a >> other & 1)))
+            if (a >> axis & 1) == 0 and (faces & 1) == 1:
+                _mark(sides, _pair(points, a), _pair(points, a | 1 << axis), y, rows)
     return row, stop
 
 
