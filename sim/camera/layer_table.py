@@ -19,7 +19,6 @@ taken to the farthest it reaches.
 Source: Praun & Hoppe 2003 (octahedral maps), as `sky_table`.
 """
 
-import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -29,7 +28,8 @@ from numpy.typing import NDArray
 
 from dockair.rotations import Array
 from dockair.sim.camera.earth import Interval
-from dockair.sim.camera.layer_tiles import SIDE, TILE, LayerTiles, Place
+from dockair.sim.camera.layer_keys import Keys, Place
+from dockair.sim.camera.layer_tiles import SIDE, TILE, LayerTiles
 
 _TILE, _SIDE, _SHIFT = TILE, SIDE, 6  # as of `layer_tiles`; the power of 2
 _STEEPEST = 2.74  # as of `sky_table`
@@ -71,11 +71,10 @@ class LayerTable:
         self, function: Callable[[Array, Array], Array], tiles: int, channels: int, height_m: float, radius_m: float
     ) -> None:
         self._height_m, self._radius_m, self._tiles = height_m, radius_m, tiles
+        self._keys = Keys(height_m / _KEYS_PER_DEPTH)
         self._own, self._next = (LayerTiles(function, tiles, channels) for _ in range(2))
         self._is_missing = np.zeros_like(self._own.is_known)  # false between looks
         self._count = 0
-        self._last_m: Place = (0.0, 0.0, 0.0)
-        self._moved_m: Place = (0.0, 0.0, 0.0)
 
     def nodes(self, place_m: Array, R_WC: Array, x: Array, y: Array, below: Interval) -> Nodes:
         """Return the table for a place, known wherever a picture looks.
@@ -99,7 +98,8 @@ class LayerTable:
         Arguments as of `nodes`. For time that no frame waits for: `nodes` then finds done what it would do itself.
         """
         place = self._come_to(place_m)
-        view, (coming, _) = (np.ascontiguousarray(R_WC, dtype=float), x, y, below), self._coming(place)
+        view = np.ascontiguousarray(R_WC, dtype=float), x, y, below
+        coming, _ = self._keys.coming(place, self._own.key)
         for tiles, key in ((self._own, self._own.key), (self._next, coming)):
             if key is None:
                 continue
@@ -111,44 +111,18 @@ class LayerTable:
                 return True
         return False
 
-    @property
-    def _step_m(self) -> float:
-        """From one key to the next."""
-        return self._height_m / _KEYS_PER_DEPTH
-
     def _come_to(self, place_m: Array) -> Place:
         """Take up the tiles of a place's key; return the place as numbers."""
-        place, step_m = (float(place_m[0]), float(place_m[1]), float(place_m[2])), self._step_m
-        key = _on_grid(place[0], step_m), _on_grid(place[1], step_m), _on_grid(place[2], step_m)
+        place, key = self._keys.come_to(place_m)
         if key != self._own.key:
             self._own, self._next = self._next, self._own
             if key != self._own.key:
                 self._own.restart(key)
-        if place != self._last_m:
-            last, self._last_m = self._last_m, place
-            self._moved_m = place[0] - last[0], place[1] - last[1], place[2] - last[2]
         return place
-
-    def _coming(self, place_m: Place) -> tuple[Place | None, float]:
-        """Return the key that comes next if the way goes on, along the axis left first, and the part of the way to it.
-
-        Both are None and 0 where nothing moves.
-        """
-        step_m, key, moved = self._step_m, self._own.key, self._moved_m
-        axis, frames = 0, math.inf
-        for k in range(3):
-            ahead = 0.5 * step_m - math.copysign(1.0, moved[k]) * (place_m[k] - key[k])
-            if moved[k] != 0.0 and ahead / abs(moved[k]) < frames:
-                axis, frames = k, ahead / abs(moved[k])
-        if math.isinf(frames):
-            return None, 0.0
-        sign, coming = math.copysign(1.0, moved[axis]), list(key)
-        coming[axis] = (round(place_m[axis] / step_m) + sign) * step_m
-        return (coming[0], coming[1], coming[2]), sign * (place_m[axis] - key[axis]) / step_m
 
     def _prepare(self, place_m: Place, view: View) -> None:
         """Make a share of the tiles of the key that comes next."""
-        coming, way = self._coming(place_m)
+        coming, way = self._keys.coming(place_m, self._own.key)
         share = (way - _FROM) / (_UNTIL - _FROM)
         if coming is None or share <= 0.0:
             return
@@ -178,10 +152,6 @@ class LayerTable:
         twice = 2.0 * height - height * height / (a + height)
         aside_x, aside_y = place_m[0] - key[0], place_m[1] - key[1]
         return twice / (a + height), twice, self._height_m + key[2], 0.5 / a, aside_x, aside_y
-
-
-def _on_grid(way_m: float, step_m: float) -> float:
-    return round(way_m / step_m) * step_m
 
 
 def _step(x: Array) -> float:

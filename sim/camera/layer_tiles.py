@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dockair.rotations import Array
+from dockair.sim.camera.layer_keys import Place
 from dockair.sim.camera.sky_table import directions_from_nodes
 
-Place = tuple[float, float, float]  #: [m]; numbers, as comparing arrays takes its time
 TILE = 64  #: nodes a side
 SIDE = TILE + 1  #: of what is kept of a tile: with the next ones' first nodes, so that it is read alone
 _STRIPS, _ROWS = 5, 13  # that a tile is made in, SIDE rows in sum
