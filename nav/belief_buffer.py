@@ -59,7 +59,7 @@ class BeliefBuffer:
         span_s: float,
         interval_s: float,
     ) -> None:
-        self._record, self._motion, self._start, self._taken_again = record, motion, start, taken_again
+        self._record, self._motion, self._start, self._taken_again = record, motion.flat(), start, taken_again
         self._span_s, self._interval_s = span_s, interval_s
         self._nodes: list[Node] = []
         self._head: Node | None = None  #: at the newest sample, when no frame is newer

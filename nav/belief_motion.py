@@ -50,7 +50,7 @@ _MOVING = 27  # errors that move; those of calibration and ring do not
 
 
 class Motion(NamedTuple):
-    """Belief about motion, in the order in which the kernel takes it; densities are squared."""
+    """Belief about motion, in the order of its `flat` numbers; densities are squared."""
 
     stiffness: Array  #: (3,) W^2 [1/s^2]
     friction: Array  #: (3,) 2 z W [1/s]
@@ -72,27 +72,38 @@ class Motion(NamedTuple):
     longest_gap_s: float  #: between two samples of acceleration that are used
     longest_step_s: float
 
-
-@njit(cache=True, error_model="numpy")
-def _turned(E: Array, u: Array) -> Array:
-    out = np.empty(3)
-    for i in range(3):
-        out[i] = E[i, 0] * u[0] + E[i, 1] * u[1] + E[i, 2] * u[2]
-    return out
+    def flat(self) -> Array:
+        """(25,) the same, as the kernel takes it: one array is handed over sooner than these many numbers."""
+        return np.hstack(self)
 
 
 @njit(cache=True, error_model="numpy")
-def _turn(w: Array, dt: float) -> Array:
-    """(3, 3) E = exp(-[w x] dt)."""
-    angle = np.sqrt(w[0] ** 2 + w[1] ** 2 + w[2] ** 2) * dt
+def _unpacked(flat: Array) -> Motion:
+    return Motion(
+        flat[0:3], flat[3:6], flat[6], flat[7:10], flat[10], flat[11], flat[12], flat[13], flat[14], flat[15],
+        flat[16], flat[17], flat[18], flat[19], flat[20], flat[21], flat[22], flat[23], flat[24],
+    )  # fmt: skip
+
+
+@njit(cache=True, error_model="numpy")
+def _turn(E: Array, w0: float, w1: float, w2: float, dt: float) -> None:
+    """E (3, 3) = exp(-[w x] dt)."""
+    angle = np.sqrt(w0**2 + w1**2 + w2**2) * dt
     p = 1.0 - angle**2 / 6.0 if angle < 1e-4 else np.sin(angle) / angle
     q = 0.5 - angle**2 / 24.0 if angle < 1e-4 else (1.0 - np.cos(angle)) / angle**2
-    x, y, z = -w[0] * dt, -w[1] * dt, -w[2] * dt
-    E = np.empty((3, 3))
+    x, y, z = -w0 * dt, -w1 * dt, -w2 * dt
     E[0, 0], E[0, 1], E[0, 2] = 1.0 - q * (y * y + z * z), -p * z + q * x * y, p * y + q * x * z
     E[1, 0], E[1, 1], E[1, 2] = p * z + q * x * y, 1.0 - q * (x * x + z * z), -p * x + q * y * z
     E[2, 0], E[2, 1], E[2, 2] = -p * y + q * x * z, p * x + q * y * z, 1.0 - q * (x * x + y * y)
-    return E
+
+
+@njit(cache=True, error_model="numpy")
+def _state_turned(x: Array, E: Array) -> None:
+    """The state (8, 3) in place, but for the gyro's bias, which stays in the body."""
+    for row in (0, 1, 2, 3, 5, 6, 7):
+        u0, u1, u2 = x[row, 0], x[row, 1], x[row, 2]
+        for i in range(3):
+            x[row, i] = E[i, 0] * u0 + E[i, 1] * u1 + E[i, 2] * u2
 
 
 @njit(cache=True, error_model="numpy")
@@ -115,14 +126,17 @@ def _state_driven(x: Array, f: Array, w: Array, dt: float, felt: bool, motion: M
 
 
 @njit(cache=True, error_model="numpy")
-def _driven(P: Array, dt: float, felt: bool, motion: Motion) -> None:
-    """Eqs (1) to (3) for the rows of P, row after row (50 * 50,): a width known to the compiler lets it go in fours."""
+def _driven(P: Array, columns: int, dt: float, felt: bool, motion: Motion) -> None:
+    """Eqs (1) to (3) for the rows that move, row after row (27 * 50,), in the first columns.
+
+    That rows are 50 long is known to the compiler, which then goes in fours.
+    """
     fading_1_s = motion.gust_1_s * (1.0 - 0.5 * dt * motion.gust_1_s)
     for i in range(3):
         W2, zW2 = motion.stiffness[i], motion.friction[i]
         s, v, n, m, c = (3 + i) * ERRORS, (6 + i) * ERRORS, (9 + i) * ERRORS, (12 + i) * ERRORS, (18 + i) * ERRORS
         g = (24 + i) * ERRORS
-        for j in range(ERRORS):
+        for j in range(columns):
             fades = fading_1_s * P[g + j]
             a = -W2 * P[n + j] - zW2 * P[m + j] + P[g + j]
             a = a - 0.5 * dt * (W2 * P[m + j] + zW2 * a + fades)  # half-way
@@ -134,16 +148,16 @@ def _driven(P: Array, dt: float, felt: bool, motion: Motion) -> None:
                 P[n + j] += dt * P[m + j] + 0.5 * dt * dt * a
                 P[m + j] += dt * a
         phi, u = i * ERRORS, (21 + i) * ERRORS
-        for j in range(ERRORS):
+        for j in range(columns):
             back = dt * motion.return_1_s * P[u + j]
             P[phi + j] += back
             P[u + j] -= back
 
 
 @njit(cache=True, error_model="numpy")
-def _errors_moved(P: Array, E: Array, x: Array, dt: float, felt: bool, motion: Motion) -> None:
-    """P <- F P in place, P row after row (50 * 50,); x (8, 3) is the state after the step."""
-    _driven(P, dt, felt, motion)
+def _errors_moved(P: Array, columns: int, E: Array, x: Array, dt: float, felt: bool, motion: Motion) -> None:
+    """P <- F P in place in the first columns, P row after row (27 * 50,); x (8, 3) is the state after the step."""
+    _driven(P, columns, dt, felt, motion)
     e00, e01, e02, e10, e11, e12 = E[0, 0], E[0, 1], E[0, 2], E[1, 0], E[1, 1], E[1, 2]
     e20, e21, e22 = E[2, 0], E[2, 1], E[2, 2]
     bias = P[15 * ERRORS : 18 * ERRORS]  # the gyro's stays in the body
@@ -151,7 +165,7 @@ def _errors_moved(P: Array, E: Array, x: Array, dt: float, felt: bool, motion: M
         rows = P[3 * block * ERRORS : 3 * (block + 1) * ERRORS]
         state = max(block - 1, 0)
         u0, u1, u2 = x[state, 0], x[state, 1], x[state, 2]
-        for j in range(ERRORS):
+        for j in range(columns):
             p0, p1, p2 = rows[j], rows[ERRORS + j], rows[2 * ERRORS + j]
             b0, b1, b2 = dt * bias[j], dt * bias[ERRORS + j], dt * bias[2 * ERRORS + j]
             q0 = e00 * p0 + e01 * p1 + e02 * p2
@@ -166,37 +180,37 @@ def _errors_moved(P: Array, E: Array, x: Array, dt: float, felt: bool, motion: M
 
 
 @njit(cache=True, error_model="numpy")
-def _noise_added(P: Array, x: Array, dt: float, gyro2: float, drive2: float, other2: float, rest: Array) -> None:
-    """P <- P + Q in place; `other2` drives the velocity alone, `rest` is of all others."""
+def _noise_added(P: Array, G: Array, x: Array, dt: float, gyro2: float, other2: float, motion: Motion) -> None:
+    """P <- P + Q in place, of what moves; `other2` drives the velocity alone.
+
+    G (3, 27), how the errors take up the gyro's noise, is written anew where it depends on the state; the rest of it is
+    a unit matrix and zeros.
+    """
     for i in range(3):
-        P[i, i] += rest[0] * dt
-        P[15 + i, 15 + i] += rest[1] * dt
-        P[18 + i, 18 + i] += rest[2] * dt
-        P[21 + i, 21 + i] += (rest[0] + rest[3]) * dt
-        P[i, 21 + i] -= rest[0] * dt
-        P[21 + i, i] -= rest[0] * dt
+        P[i, i] += motion.attitude2 * dt
+        P[15 + i, 15 + i] += motion.bias2 * dt
+        P[18 + i, 18 + i] += motion.formation2 * dt
+        P[21 + i, 21 + i] += (motion.attitude2 + motion.rest2) * dt
+        P[i, 21 + i] -= motion.attitude2 * dt
+        P[21 + i, i] -= motion.attitude2 * dt
         swings = i > 0
         for row, powers in ((3, 1), (6, 0), (9, 1), (12, 0)):
             for column, more in ((3, 1), (6, 0), (9, 1), (12, 0)):
                 if (row > 6 or column > 6) and not swings:
                     continue
-                q = drive2 + other2 if row <= 6 and column <= 6 else drive2
+                q = motion.drive2 + other2 if row <= 6 and column <= 6 else motion.drive2
                 order = powers + more
                 share = 1.0 if order == 0 else (0.5 * dt if order == 1 else dt * dt / 3.0)
                 P[row + i, column + i] += q * dt * share
-    for i in range(RING.start, RING.stop):
-        P[i, i] += rest[4] * dt
-    G = np.zeros((_MOVING, 3))
-    for i in range(3):
-        G[i, i] = 1.0
     for block in range(1, 9):
         if block != 5:
-            u, r = x[block - 1], 3 * block
-            G[r, 1], G[r, 2], G[r + 1, 2] = u[2], -u[1], u[0]
-            G[r + 1, 0], G[r + 2, 0], G[r + 2, 1] = -u[2], u[1], -u[0]
+            u0, u1, u2, r = x[block - 1, 0], x[block - 1, 1], x[block - 1, 2], 3 * block
+            G[1, r], G[2, r], G[2, r + 1] = u2, -u1, u0
+            G[0, r + 1], G[0, r + 2], G[1, r + 2] = -u2, u1, -u0
     for i in range(_MOVING):
+        g0, g1, g2 = G[0, i], G[1, i], G[2, i]
         for j in range(_MOVING):
-            P[i, j] += gyro2 * dt * (G[i, 0] * G[j, 0] + G[i, 1] * G[j, 1] + G[i, 2] * G[j, 2])
+            P[i, j] += gyro2 * dt * (g0 * G[0, j] + g1 * G[1, j] + g2 * G[2, j])
 
 
 @njit(cache=True, error_model="numpy")
@@ -226,6 +240,31 @@ def _held_noise(after: float, before: float, turn2: float, most2: float) -> floa
 
 
 @njit(cache=True, error_model="numpy")
+def _sampled(
+    w: Array, f: Array, k: int, ta: float, tb: float, times: Array, rates: Array, forces: Array, motion: Motion
+) -> tuple[float, bool]:
+    """Write w, f (3,) of the piece of time from ta to tb after sample k; return Eq. (5), and whether f was felt."""
+    n, middle = len(times), 0.5 * (ta + tb)
+    if n == 0:
+        w[:], f[:] = 0.0, 0.0
+        return motion.held_most2, False
+    if 0 <= k < n - 1:
+        gap = times[k + 1] - times[k]
+        share = (middle - times[k]) / gap
+        for i in range(3):
+            w[i] = (1.0 - share) * rates[k, i] + share * rates[k + 1, i]
+            f[i] = (1.0 - share) * forces[k, i] + share * forces[k + 1, i]
+        held2, far = min(motion.held_turn2 * gap**3 / 64.0, motion.held_most2), gap
+    else:
+        near = 0 if k < 0 else n - 1
+        w[:], f[:] = rates[near], forces[near]
+        a, b = abs(ta - times[near]), abs(tb - times[near])
+        far = max(a, b)
+        held2 = _held_noise(far, min(a, b), motion.held_turn2, motion.held_most2)
+    return held2, far <= motion.longest_gap_s and np.isfinite(f[0]) and np.isfinite(f[1]) and np.isfinite(f[2])
+
+
+@njit(cache=True, error_model="numpy")
 def propagated(
     R: Array,
     x: Array,
@@ -235,71 +274,70 @@ def propagated(
     times: Array,
     rates: Array,
     forces: Array,
-    motion: Motion,
+    flat: Array,
     errors: bool = True,
 ) -> tuple[Array, Array, Array]:
     """Return R (3, 3), x (8, 3), P at t1 [s], from those at t0 <= t1 and the samples about.
 
+    Only the rows of P that move are carried along, and of them the block that moves on both sides by itself: what it
+    has in common with calibration and ring is in them once, as P is symmetric.
+
     Args:
         R: (3, 3) R_BD.
         x: (8, 3) s, v, n, m, b, c, u, g.
-        P: (50, 50) covariance of the errors.
+        P: (50, 50) covariance of the errors, symmetric to the last bit.
         t0: time of the belief.
         t1: time wanted.
         times: (k,) stamps of the samples, increasing.
         rates: (k, 3) of the gyro, body axes [rad/s].
         forces: (k, 3) of the accelerometers, body axes [m/s^2]; NaN where there is none.
-        motion: belief about motion.
+        flat: (25,) belief about motion, `Motion.flat`.
         errors: whether P is moved, too; it is nearly all of the work.
     """
+    motion = _unpacked(flat)
     R, x, P = R.copy(), x.copy(), P.copy()
+    E, E_rest, R_rest, w, f = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty(3), np.empty(3)
+    moving, turned, G = P[:_MOVING].copy(), np.empty((_MOVING, ERRORS)), np.zeros((3, _MOVING))
+    G[0, 0] = G[1, 1] = G[2, 2] = 1.0
     n, t = len(times), t0
     k = int(np.searchsorted(times, t0, side="right")) - 1
-    rest = np.array([motion.attitude2, motion.bias2, motion.formation2, motion.rest2, motion.ring2])
     while t < t1:
         knot = min(times[k + 1], t1) if k + 1 < n else t1
         pieces = max(int(np.ceil((knot - t) / motion.longest_step_s - 1e-9)), 1)
         dt, begin = (knot - t) / pieces, t
         for piece in range(pieces):
             ta, tb = begin + piece * dt, begin + (piece + 1) * dt
-            middle, w, f, held2, felt = 0.5 * (ta + tb), np.zeros(3), np.zeros(3), motion.held_most2, False
-            if 0 <= k < n - 1:
-                gap = times[k + 1] - times[k]
-                share = (middle - times[k]) / gap
-                w = (1.0 - share) * rates[k] + share * rates[k + 1]
-                f = (1.0 - share) * forces[k] + share * forces[k + 1]
-                held2 = min(motion.held_turn2 * gap**3 / 64.0, motion.held_most2)
-                felt = gap <= motion.longest_gap_s
-            elif n > 0:
-                near = 0 if k < 0 else n - 1
-                w, f = rates[near].copy(), forces[near].copy()
-                far, close = (
-                    max(abs(ta - times[near]), abs(tb - times[near])),
-                    min(abs(ta - times[near]), abs(tb - times[near])),
-                )
-                held2 = _held_noise(far, close, motion.held_turn2, motion.held_most2)
-                felt = far <= motion.longest_gap_s
-            felt = felt and np.isfinite(f[0]) and np.isfinite(f[1]) and np.isfinite(f[2])
-            size2 = w[0] ** 2 + w[1] ** 2 + w[2] ** 2
-            w = w - x[4]
+            held2, felt = _sampled(w, f, k, ta, tb, times, rates, forces, motion)
+            gyro2 = motion.gyro2 + held2 + motion.scale2 * (w[0] ** 2 + w[1] ** 2 + w[2] ** 2)
+            for i in range(3):
+                w[i] -= x[4, i]
             _state_driven(x, f, w, dt, felt, motion)
-            E = _turn(w, dt)
-            R = np.dot(E, np.dot(_turn(-motion.return_1_s * x[6], dt), R))
-            x[6] = x[6] * (1.0 - dt * motion.return_1_s)
-            for row in (0, 1, 2, 3, 5, 6, 7):
-                x[row] = _turned(E, x[row])
+            _turn(E, w[0], w[1], w[2], dt)
+            back = -motion.return_1_s
+            _turn(E_rest, back * x[6, 0], back * x[6, 1], back * x[6, 2], dt)
+            np.dot(E_rest, R, R_rest)
+            np.dot(E, R_rest, R)
+            for i in range(3):
+                x[6, i] *= 1.0 - dt * motion.return_1_s
+            _state_turned(x, E)
             if not errors:
                 continue
-            _errors_moved(P.ravel(), E, x, dt, felt, motion)
-            P = P.T.copy()
-            _errors_moved(P.ravel(), E, x, dt, felt, motion)
-            gyro2 = motion.gyro2 + held2 + motion.scale2 * size2
-            other2 = motion.accelerometer2 if felt else motion.receiver2
-            _noise_added(P, x, dt, gyro2, motion.drive2, other2, rest)
-            _gust_noise_added(P, dt, motion.gust2)
+            _errors_moved(moving.ravel(), ERRORS, E, x, dt, felt, motion)
+            for i in range(_MOVING):
+                for j in range(_MOVING):
+                    turned[j, i] = moving[i, j]
+            _errors_moved(turned.ravel(), _MOVING, E, x, dt, felt, motion)
+            _noise_added(turned, G, x, dt, gyro2, motion.accelerometer2 if felt else motion.receiver2, motion)
+            _gust_noise_added(turned, dt, motion.gust2)
+            moving[:, :_MOVING] = turned[:, :_MOVING]
+            for i in range(RING.start, RING.stop):
+                P[i, i] += motion.ring2 * dt
         # at every sample, so that the way there does not matter to the last bit
-        for i in range(ERRORS if errors else 0):
+        for i in range(_MOVING if errors else 0):
             for j in range(i):
-                P[i, j] = P[j, i] = 0.5 * (P[i, j] + P[j, i])
+                moving[i, j] = moving[j, i] = 0.5 * (turned[i, j] + turned[j, i])
         t, k = knot, k + (1 if k + 1 < n and knot == times[k + 1] else 0)
+    for i in range(_MOVING):
+        for j in range(ERRORS):
+            P[i, j] = P[j, i] = moving[i, j]
     return R, x, P

@@ -75,7 +75,7 @@ def test_state_follows_its_differential_equation(w):
         return moved.ravel()
 
     expected = solve_ivp(rate, (0.0, 0.8), X0.ravel(), rtol=1e-10, atol=1e-12).y[:, -1].reshape(8, 3)
-    R, x, _ = propagated(R0, X0, ZERO, 0.0, 0.8, *samples(w, f, 0.8), SILENT)
+    R, x, _ = propagated(R0, X0, ZERO, 0.0, 0.8, *samples(w, f, 0.8), SILENT.flat())
     np.testing.assert_allclose(x, expected, atol=2e-4)  # second order in 4 ms
     returned = exp(X0[6] * (1.0 - np.exp(-0.8 * SILENT.return_1_s)))  # towards the attitude of rest
     np.testing.assert_allclose(R, expm(-skew(w - X0[4]) * 0.8) @ returned @ R0, atol=3e-5)
@@ -87,7 +87,7 @@ def test_a_swing_without_damping_keeps_its_period():
     x[0, 0], x[2, 1] = 10.0, 0.2
     calm = SILENT._replace(friction=np.zeros(3))
     period_s = 1.0 / 0.33
-    _, after, _ = propagated(R0, x, ZERO, 0.0, period_s, *samples(np.zeros(3), np.zeros(3), period_s), calm)
+    _, after, _ = propagated(R0, x, ZERO, 0.0, period_s, *samples(np.zeros(3), np.zeros(3), period_s), calm.flat())
     assert after[2, 1] == pytest.approx(0.2, abs=2e-4)
     assert after[0, 1] == pytest.approx(0.0, abs=1e-3)
 
@@ -96,14 +96,14 @@ def test_a_swing_without_damping_keeps_its_period():
 def test_covariance_moves_by_the_jacobian_of_the_motion(fitted):
     w, f, step = np.array([0.3, -0.2, 0.5]), np.array([0.2, 0.4, 9.5]) if fitted else np.full(3, np.nan), 1e-6
     given = samples(w, f, 0.1)
-    after = propagated(R0, X0, ZERO, 0.0, 0.1, *given, SILENT)[:2]
+    after = propagated(R0, X0, ZERO, 0.0, 0.1, *given, SILENT.flat())[:2]
     F = np.eye(ERRORS)
     for k in range(CALIBRATION.start):
         e = step * np.eye(ERRORS)[k]
-        plus, minus = (propagated(*off(X0, R0, s * e), ZERO, 0.0, 0.1, *given, SILENT)[:2] for s in (1.0, -1.0))
+        plus, minus = (propagated(*off(X0, R0, s * e), ZERO, 0.0, 0.1, *given, SILENT.flat())[:2] for s in (1.0, -1.0))
         F[:, k] = (difference(plus, after) - difference(minus, after)) / (2.0 * step)
     root = np.random.default_rng(1).normal(size=(ERRORS, ERRORS))
-    P = propagated(R0, X0, root @ root.T, 0.0, 0.1, *given, SILENT)[2]
+    P = propagated(R0, X0, root @ root.T, 0.0, 0.1, *given, SILENT.flat())[2]
     np.testing.assert_allclose(P, F @ root @ root.T @ F.T, atol=4e-3 * ERRORS)  # but for a half step of db x f
     np.testing.assert_array_equal(P, P.T)
 
@@ -112,11 +112,11 @@ def test_gyro_noise_enters_as_turning_the_rate_would():
     step, still = 1e-4, SILENT._replace(stiffness=np.zeros(3), friction=np.zeros(3))
     G = np.zeros((ERRORS, 3))
     w, f = np.array([0.3, -0.2, 0.5]), np.full(3, np.nan)
-    after = propagated(R0, X0, ZERO, 0.0, 1e-3, *samples(w, f, 1e-3, 1000.0), still)[:2]
+    after = propagated(R0, X0, ZERO, 0.0, 1e-3, *samples(w, f, 1e-3, 1000.0), still.flat())[:2]
     for k, e in enumerate(np.eye(3) * step):
-        ends = [propagated(R0, X0, ZERO, 0.0, 1e-3, *samples(w + s * e, f, 1e-3, 1000.0), still)[:2] for s in (1, -1)]
+        ends = [propagated(R0, X0, ZERO, 0.0, 1e-3, *samples(w + s * e, f, 1e-3, 1000.0), still.flat())[:2] for s in (1, -1)]
         G[:, k] = -(difference(ends[0], after) - difference(ends[1], after)) / (2.0 * step * 1e-3)
-    P = propagated(R0, X0, ZERO, 0.0, 1e-3, *samples(w, f, 1e-3, 1000.0), still._replace(gyro2=1e-6))[2]
+    P = propagated(R0, X0, ZERO, 0.0, 1e-3, *samples(w, f, 1e-3, 1000.0), still._replace(gyro2=1e-6).flat())[2]
     np.testing.assert_allclose(P, 1e-9 * G @ G.T, atol=2e-3 * P.max())
 
 
@@ -130,7 +130,7 @@ def test_noise_of_the_swing_is_that_of_the_lyapunov_equation():
         0.0,
         t,
         *samples(np.zeros(3), np.zeros(3), t),
-        SILENT._replace(drive2=q2, accelerometer2=other2, gust2=gust2),
+        SILENT._replace(drive2=q2, accelerometer2=other2, gust2=gust2).flat(),
     )[2]
     for axis in (0, 2):
         A = np.zeros((5, 5))
@@ -150,7 +150,7 @@ def test_noise_of_the_swing_is_that_of_the_lyapunov_equation():
 def test_walks_grow_with_time():
     given = samples(np.zeros(3), np.zeros(3), 0.5)
     moving = SILENT._replace(attitude2=1e-3, return_1_s=0.0, bias2=1e-8, formation2=0.04, ring2=1e-8)
-    P = propagated(R0, np.zeros((8, 3)), ZERO, 0.0, 0.5, *given, moving)[2]
+    P = propagated(R0, np.zeros((8, 3)), ZERO, 0.0, 0.5, *given, moving.flat())[2]
     np.testing.assert_allclose(np.diag(P)[:3], 0.5e-3 + 1e-8 * 0.5**3 / 3.0, rtol=1e-3)
     np.testing.assert_allclose(np.diag(P)[BIAS], 0.5e-8, rtol=1e-9)
     np.testing.assert_allclose(np.diag(P)[18:21], 0.02, rtol=1e-9)
@@ -162,7 +162,7 @@ def test_a_drogue_that_turns_comes_back_to_an_attitude_of_rest_that_walks():
     """The way to rest has an Ornstein-Uhlenbeck process's variance, the attitude of rest that of its walk alone."""
     q2, walk2, k, t = 2e-4, 1e-5, SILENT.return_1_s, 2.0
     turning = SILENT._replace(attitude2=q2, rest2=walk2)
-    P = propagated(R0, np.zeros((8, 3)), ZERO, 0.0, t, *samples(np.zeros(3), np.zeros(3), t), turning)[2]
+    P = propagated(R0, np.zeros((8, 3)), ZERO, 0.0, t, *samples(np.zeros(3), np.zeros(3), t), turning.flat())[2]
     decay = 1.0 - np.exp(-2.0 * k * t)
     np.testing.assert_allclose(np.diag(P)[REST], (q2 + walk2) / (2.0 * k) * decay, rtol=0.01)
     M = np.zeros((3, ERRORS))
@@ -176,7 +176,7 @@ def test_a_rate_that_is_held_is_as_uncertain_as_a_rate_that_is_missing(wait_s, c
     turn2, most2 = 0.04, 1.25e-3
     held = SILENT._replace(held_turn2=turn2, held_most2=most2)
     given = samples(np.zeros(3), np.full(3, np.nan), 0.1)
-    P = propagated(R0, np.zeros((8, 3)), ZERO, 0.1, 0.1 + wait_s, *given, held)[2]
+    P = propagated(R0, np.zeros((8, 3)), ZERO, 0.1, 0.1 + wait_s, *given, held.flat())[2]
     knee = (most2 / turn2) ** (1.0 / 3.0)
     expected = turn2 * min(wait_s, knee) ** 4 / 4.0 + most2 * max(wait_s - knee, 0.0)
     assert (wait_s > knee) is corner
@@ -186,7 +186,7 @@ def test_a_rate_that_is_held_is_as_uncertain_as_a_rate_that_is_missing(wait_s, c
 def test_a_gap_between_samples_is_bridged_with_its_own_uncertainty():
     held = SILENT._replace(held_turn2=0.04, held_most2=1.25e-3)
     times = np.array([0.0, 0.2])
-    P = propagated(R0, np.zeros((8, 3)), ZERO, 0.0, 0.2, times, np.zeros((2, 3)), np.zeros((2, 3)), held)[2]
+    P = propagated(R0, np.zeros((8, 3)), ZERO, 0.0, 0.2, times, np.zeros((2, 3)), np.zeros((2, 3)), held.flat())[2]
     np.testing.assert_allclose(np.diag(P)[:3], 0.04 * 0.2**4 / 64.0, rtol=1e-9)
 
 
@@ -194,7 +194,7 @@ def test_in_a_gap_the_receiver_s_acceleration_is_not_taken_for_known():
     """Samples 0.2 s apart with 5 m/s^2 between them: not used, and the velocity's variance is that of a guess."""
     times, forces = np.array([0.0, 0.2]), np.tile([5.0, 0.0, 0.0], (2, 1))
     guess = SILENT._replace(receiver2=0.2, accelerometer2=1e-6)
-    _, x, P = propagated(R0, np.zeros((8, 3)), ZERO, 0.0, 0.2, times, np.zeros((2, 3)), forces, guess)
+    _, x, P = propagated(R0, np.zeros((8, 3)), ZERO, 0.0, 0.2, times, np.zeros((2, 3)), forces, guess.flat())
     np.testing.assert_array_equal(x[1], 0.0)
     np.testing.assert_allclose(np.diag(P)[6:9], 0.04, rtol=1e-9)
 
@@ -204,9 +204,9 @@ def test_many_samples_at_once_are_the_same_one_by_one_to_the_last_bit():
     times = np.arange(41) / 250.0
     w, f = 0.2 * rng.normal(size=(41, 3)), rng.normal(size=(41, 3))
     noisy = SILENT._replace(drive2=0.1, gyro2=1e-7, accelerometer2=1e-5, attitude2=1e-4)
-    at_once = propagated(R0, X0, np.eye(ERRORS), 0.0, times[-1], times, w, f, noisy)
+    at_once = propagated(R0, X0, np.eye(ERRORS), 0.0, times[-1], times, w, f, noisy.flat())
     step = R0, X0, np.eye(ERRORS)
     for k in range(40):
-        step = propagated(*step, times[k], times[k + 1], times, w, f, noisy)
+        step = propagated(*step, times[k], times[k + 1], times, w, f, noisy.flat())
     for a, b in zip(at_once, step, strict=True):
         np.testing.assert_array_equal(a, b)

@@ -222,7 +222,7 @@ def test_before_the_first_message_the_drogue_has_swung_in_gusts_for_ever():
     P[np.ix_(swinging, swinging)] = start.P[np.ix_(swinging, swinging)]
     times, still = np.arange(251) / 250.0, np.zeros((251, 3))
     alone = motion._replace(gyro2=0.0, scale2=0.0, held_turn2=0.0, bias2=0.0, formation2=0.0, accelerometer2=0.0)
-    after = propagated(np.eye(3), np.zeros((8, 3)), P, 0.0, 1.0, times, still, still, alone)[2]
+    after = propagated(np.eye(3), np.zeros((8, 3)), P, 0.0, 1.0, times, still, still, alone.flat())[2]
     across = np.r_[SWING, SWING_RATE, GUST].reshape(3, 3)[:, 1:].ravel()
     kept = np.ix_(across, across)
     size = np.sqrt(np.outer(P.diagonal(), P.diagonal()))[kept]
