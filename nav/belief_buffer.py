@@ -64,6 +64,7 @@ class BeliefBuffer:
         self._nodes: list[Node] = []
         self._head: Node | None = None  #: at the newest sample, when no frame is newer
         self._coasted: tuple[Node, Node] | None = None  #: the second: the first, coasted on for long
+        self._asked: tuple[list[Belief], Node] | None = None  #: the moment asked for last, from the beliefs before it
 
     @property
     def start(self) -> list[Belief]:
@@ -95,6 +96,7 @@ class BeliefBuffer:
     def after_sample(self, before_s: float) -> None:
         """Take note of a sample that is new in the record, the one before it being of `before_s`."""
         time_s = self._record.newest_s
+        self._asked = None  # between the last two samples the rate is another now
         self._require_node(time_s)
         if self._nodes[-1].time_s > before_s:
             self._run_from(bisect_right(self._nodes, before_s, key=_time))  # those after it had to guess the rate
@@ -175,13 +177,17 @@ class BeliefBuffer:
         return beliefs
 
     def _moved(self, node: Node, time_s: float) -> list[Belief]:
-        """Return a node's beliefs at a later time."""
+        """Return a node's beliefs at a later time; that of a frame is asked for several times, and found once."""
         if time_s <= node.time_s:
             return node.beliefs
+        asked = self._asked
+        if asked is not None and asked[0] is node.beliefs and asked[1].time_s == time_s:
+            return asked[1].beliefs
         moved = []
         for belief in node.beliefs:
             R, x, P = self._propagated(belief, node.time_s, time_s)
             moved.append(Belief(R, x, P, belief.log_weight, belief.ring))
+        self._asked = node.beliefs, Node(time_s, None, moved)
         return moved
 
     def _propagated(

@@ -265,6 +265,32 @@ def _sampled(
 
 
 @njit(cache=True, error_model="numpy")
+def _covariance_moved(
+    P: Array,
+    moving: Array,
+    turned: Array,
+    G: Array,
+    E: Array,
+    x: Array,
+    dt: float,
+    gyro2: float,
+    felt: bool,
+    motion: Motion,
+) -> None:
+    """P <- F P F' + Q over a piece of time: its rows that move, its ring; `turned` is what moves on both sides, too."""
+    _errors_moved(moving.ravel(), ERRORS, E, x, dt, felt, motion)
+    for i in range(_MOVING):
+        for j in range(_MOVING):
+            turned[j, i] = moving[i, j]
+    _errors_moved(turned.ravel(), _MOVING, E, x, dt, felt, motion)
+    _noise_added(turned, G, x, dt, gyro2, motion.accelerometer2 if felt else motion.receiver2, motion)
+    _gust_noise_added(turned, dt, motion.gust2)
+    moving[:, :_MOVING] = turned[:, :_MOVING]
+    for i in range(RING.start, RING.stop):
+        P[i, i] += motion.ring2 * dt
+
+
+@njit(cache=True, error_model="numpy")
 def propagated(
     R: Array,
     x: Array,
@@ -320,18 +346,8 @@ def propagated(
             for i in range(3):
                 x[6, i] *= 1.0 - dt * motion.return_1_s
             _state_turned(x, E)
-            if not errors:
-                continue
-            _errors_moved(moving.ravel(), ERRORS, E, x, dt, felt, motion)
-            for i in range(_MOVING):
-                for j in range(_MOVING):
-                    turned[j, i] = moving[i, j]
-            _errors_moved(turned.ravel(), _MOVING, E, x, dt, felt, motion)
-            _noise_added(turned, G, x, dt, gyro2, motion.accelerometer2 if felt else motion.receiver2, motion)
-            _gust_noise_added(turned, dt, motion.gust2)
-            moving[:, :_MOVING] = turned[:, :_MOVING]
-            for i in range(RING.start, RING.stop):
-                P[i, i] += motion.ring2 * dt
+            if errors:
+                _covariance_moved(P, moving, turned, G, E, x, dt, gyro2, felt, motion)
         # at every sample, so that the way there does not matter to the last bit
         for i in range(_MOVING if errors else 0):
             for j in range(i):

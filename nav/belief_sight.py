@@ -108,14 +108,18 @@ class Sight:
         points[:, 1:] += belief.ring.reshape(-1, 2)[numbers]
         return Seen(R_CD=seen.R_CD, p_CD=seen.p_CD, points_D=points, C=C), M
 
-    def led_pixels(self, belief: Belief, camera: Camera) -> tuple[Array, Array]:
+    def led_pixels(self, belief: Belief, seen: Apparent, camera: Camera) -> tuple[Array, Array]:
         """Where the LEDs should be seen.
+
+        Args:
+            belief: what is believed.
+            seen: the pose that a frame would show of it.
+            camera: how pixels follow from places.
 
         Returns:
             (8, 2) pixels, NaN behind the camera; (8,) standard deviation of each in its worst direction [px], without
             the centroid's noise, the lens's distortion neglected.
         """
-        seen = self.apparent(belief)
         points_D = self.points_D.copy()
         points_D[:, 1:] += belief.ring.reshape(-1, 2)
         a = points_D @ seen.R_CD.T

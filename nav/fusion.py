@@ -15,6 +15,7 @@ Not modelled: contact (the drogue moves with the probe then, and what stands for
 turns or speeds up but by the walk of c.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -27,7 +28,7 @@ from dockair.messages import ImuSample
 from dockair.nav import belief_motion as motion
 from dockair.nav.belief import Correction, begun_again, corrected, felt_first, mixture, rolled, widened
 from dockair.nav.belief_buffer import BeliefBuffer, Frame, Node
-from dockair.nav.belief_sight import Belief, Sight
+from dockair.nav.belief_sight import Apparent, Belief, Sight
 from dockair.nav.fusion_settings import FusionSettings as FusionSettings
 from dockair.nav.fusion_settings import motion_of, refusals_until_doubt, start_of, taking_of
 from dockair.nav.imu_record import ImuRecord, Stamps
@@ -82,6 +83,7 @@ class RelativeFilter:
         )
         self._refusals, self._felt = 0, False
         self._last: Correction | None = None
+        self._shown: tuple[Belief, Apparent] | None = None  # of the belief asked for last
 
     @property
     def imu_time_s(self) -> float:
@@ -95,15 +97,15 @@ class RelativeFilter:
 
     def propagate(self, imu: Sequence[ImuSample]) -> int:
         """Take samples of the IMU, oldest first; return how many could be used."""
-        taken = 0
+        taken, record, believed = 0, self._record, self._imu_stamps.believed
         for sample in imu:
-            before_s = self._record.newest_s
-            believed = self._imu_stamps.believed
+            before_s = record.newest_s
             if sample.time_stamp_s <= before_s or not believed(sample.time_stamp_s, self._buffer.newest_s):
                 continue
-            if self._record.take(sample):
+            if record.take(sample):
                 taken += 1
-                self._feel(self._record.forces_B[-1])
+                if not self._felt:
+                    self._feel(record.forces_B[-1])
                 self._buffer.after_sample(before_s)
         if taken:
             self._buffer.renew_head()
@@ -167,7 +169,7 @@ class RelativeFilter:
         """Return the belief at a time; at that of the newest message if none is given."""
         if time_s is None:
             time_s = self._buffer.newest_s if self._buffer.newest is not None else 0.0
-        belief, r, average_s = mixture(self._buffer.beliefs(time_s)), self._p_IP, self._settings.rate_average_s
+        belief, r, average_s = self._belief(time_s), self._p_IP, self._settings.rate_average_s
         w_cross = skew(self._record.mean_rate_B(time_s - average_s, time_s) - belief.bias)
         covariance = self._to_tip @ belief.P @ self._to_tip.T
         covariance[6:, 6:] += self._rate_variance(time_s) * self._lever2
@@ -185,7 +187,7 @@ class RelativeFilter:
         """(3,) gyro rate less its bias [rad/s], linear between samples, that of the nearest one outside."""
         newest = self._buffer.newest
         bias = newest.beliefs[0].bias if newest is not None else np.zeros(3)
-        return np.asarray(self._record.rate_B(time_s) - bias) if np.isfinite(self.imu_time_s) else np.zeros(3)
+        return self._record.rate_B(time_s) - bias if math.isfinite(self.imu_time_s) else np.zeros(3)
 
     def mean_force_B(self, start_s: float, end_s: float) -> Array:
         """(3,) mean specific force after `start_s` up to `end_s` [m/s^2]; NaN where none was felt."""
@@ -193,7 +195,7 @@ class RelativeFilter:
 
     def predicted_pose(self, time_s: float) -> tuple[Array, Array, Array]:
         """R_CD (3, 3), p_CD (3,) [m] that a frame would show, and their covariance (6, 6) of (phi, delta) in C."""
-        seen = self._sight.apparent(mixture(self._buffer.beliefs(time_s)))
+        seen = self._apparent(self._belief(time_s))
         return seen.R_CD, seen.p_CD, seen.covariance
 
     def foretold_p_PD_B(self, time_s: float, horizon_s: float) -> tuple[Array, float]:
@@ -213,7 +215,17 @@ class RelativeFilter:
             (count, 2) pixels, NaN behind the camera; (count,) standard deviation of each in its worst direction [px],
             from the belief alone: without the centroid's noise, the lens's distortion neglected.
         """
-        return self._sight.led_pixels(mixture(self._buffer.beliefs(time_s)), self._sheets.camera)
+        belief = self._belief(time_s)
+        return self._sight.led_pixels(belief, self._apparent(belief), self._sheets.camera)
+
+    def _belief(self, time_s: float) -> Belief:
+        return mixture(self._buffer.beliefs(time_s))
+
+    def _apparent(self, belief: Belief) -> Apparent:
+        """Return what a frame would show; of one belief it is asked for several times, and found once."""
+        if self._shown is None or self._shown[0] is not belief:
+            self._shown = belief, self._sight.apparent(belief)
+        return self._shown[1]
 
     def _rate_variance(self, time_s: float) -> float:
         """Of the averaged rate, each axis, by what may have changed since the samples' middle.
@@ -226,7 +238,7 @@ class RelativeFilter:
 
     def _feel(self, force_B: Array) -> None:
         """Take the first specific force for that of the formation."""
-        if not self._felt and np.isfinite(force_B).all():
+        if np.isfinite(force_B).all():
             self._felt = True
             self._buffer.change_all(lambda belief: felt_first(belief, force_B))
 

@@ -8,6 +8,7 @@ second one near it says the same.
 import math
 
 import numpy as np
+from numba import njit
 
 from dockair.calibration import GyroSheet, Mounting
 from dockair.messages import ImuSample
@@ -51,6 +52,7 @@ class ImuRecord:
         self._R_BI, self._limit_rad_s = mounting.R_BI, saturated * gyro.range_rad_s
         self._times, self._rates, self._forces = np.empty(_FIRST_ROOM), np.empty((_FIRST_ROOM, 3)), self._none()
         self._first = self._end = 0
+        self.newest_s = -np.inf  #: stamp of the newest sample; -inf before the first
 
     @staticmethod
     def _none() -> Array:
@@ -71,11 +73,6 @@ class ImuRecord:
         """(k, 3) of the accelerometers [m/s^2], NaN where there is none."""
         return self._forces[self._first : self._end]
 
-    @property
-    def newest_s(self) -> float:
-        """Stamp of the newest sample; -inf before the first."""
-        return float(self._times[self._end - 1]) if self._end > self._first else -np.inf
-
     def take(self, sample: ImuSample) -> bool:
         """Keep a sample; False if it is not taken."""
         rate_I, limit = sample.angular_rate_rad_s, self._limit_rad_s
@@ -86,7 +83,7 @@ class ImuRecord:
         if self._end == len(self._times):
             self._make_room()
         k = self._end
-        self._times[k] = sample.time_stamp_s
+        self._times[k] = self.newest_s = sample.time_stamp_s
         np.matmul(self._R_BI, rate_I, out=self._rates[k])
         np.matmul(self._R_BI, sample.specific_force_m_s2, out=self._forces[k])
         self._end += 1
@@ -99,24 +96,16 @@ class ImuRecord:
 
     def rate_B(self, time_s: float) -> Array:
         """(3,) rate [rad/s], linear between samples, that of the nearest one outside, 0 when there is none."""
-        times, rates = self.times_s, self.rates_B
-        if not len(times):
-            return np.zeros(3)
-        k = int(np.searchsorted(times, time_s, side="right"))
-        if k in (0, len(times)):
-            return np.asarray(rates[min(k, len(times) - 1)].copy())
-        share = (time_s - times[k - 1]) / (times[k] - times[k - 1])
-        return np.asarray((1.0 - share) * rates[k - 1] + share * rates[k])
+        return _rate_at(self.times_s, self.rates_B, time_s)
 
     def mean_rate_B(self, start_s: float, end_s: float) -> Array:
         """(3,) mean of the samples after `start_s` up to `end_s`; the rate there when there is none."""
-        first, stop = np.searchsorted(self.times_s, (start_s, end_s), side="right")
-        return np.asarray(self.rates_B[first:stop].mean(axis=0)) if stop > first else self.rate_B(end_s)
+        mean = _mean(self.times_s, self.rates_B, start_s, end_s)
+        return self.rate_B(end_s) if math.isnan(mean[0]) else mean  # no rate is taken that is not a number
 
     def mean_force_B(self, start_s: float, end_s: float) -> Array:
         """(3,) mean specific force of the samples after `start_s` up to `end_s`; NaN when any or all are none."""
-        first, stop = np.searchsorted(self.times_s, (start_s, end_s), side="right")
-        return np.asarray(self.forces_B[first:stop].mean(axis=0)) if stop > first else np.full(3, np.nan)
+        return _mean(self.times_s, self.forces_B, start_s, end_s)
 
     def _make_room(self) -> None:
         kept = self._end - self._first
@@ -127,3 +116,31 @@ class ImuRecord:
             new[:kept] = old[self._first : self._end]
             setattr(self, name, new)
         self._first, self._end = 0, kept
+
+
+@njit(cache=True, error_model="numpy")
+def _rate_at(times: Array, rates: Array, time_s: float) -> Array:
+    """(3,) of rates (k, 3), see `ImuRecord.rate_B`."""
+    out, n = np.zeros(3), len(times)
+    if n == 0:
+        return out
+    k = int(np.searchsorted(times, time_s, side="right"))
+    if k in (0, n):
+        out[:] = rates[min(k, n - 1)]
+        return out
+    share = (time_s - times[k - 1]) / (times[k] - times[k - 1])
+    for i in range(3):
+        out[i] = (1.0 - share) * rates[k - 1, i] + share * rates[k, i]
+    return out
+
+
+@njit(cache=True, error_model="numpy")
+def _mean(times: Array, values: Array, start_s: float, end_s: float) -> Array:
+    """(3,) mean of the values (k, 3) of samples after a time up to another; NaN of none."""
+    first, stop = int(np.searchsorted(times, start_s, side="right")), int(np.searchsorted(times, end_s, side="right"))
+    if stop <= first:
+        return np.full(3, np.nan)
+    out = values[first].copy()
+    for k in range(first + 1, stop):
+        out += values[k]
+    return out / (stop - first)

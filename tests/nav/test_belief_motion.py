@@ -114,7 +114,8 @@ def test_gyro_noise_enters_as_turning_the_rate_would():
     w, f = np.array([0.3, -0.2, 0.5]), np.full(3, np.nan)
     after = propagated(R0, X0, ZERO, 0.0, 1e-3, *samples(w, f, 1e-3, 1000.0), still.flat())[:2]
     for k, e in enumerate(np.eye(3) * step):
-        ends = [propagated(R0, X0, ZERO, 0.0, 1e-3, *samples(w + s * e, f, 1e-3, 1000.0), still.flat())[:2] for s in (1, -1)]
+        turned = [samples(w + s * e, f, 1e-3, 1000.0) for s in (1, -1)]
+        ends = [propagated(R0, X0, ZERO, 0.0, 1e-3, *given, still.flat())[:2] for given in turned]
         G[:, k] = -(difference(ends[0], after) - difference(ends[1], after)) / (2.0 * step * 1e-3)
     P = propagated(R0, X0, ZERO, 0.0, 1e-3, *samples(w, f, 1e-3, 1000.0), still._replace(gyro2=1e-6).flat())[2]
     np.testing.assert_allclose(P, 1e-9 * G @ G.T, atol=2e-3 * P.max())
