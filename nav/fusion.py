@@ -35,6 +35,7 @@ from dockair.nav.imu_record import ImuRecord, Stamps
 from dockair.nav.pose.estimate import PoseEstimate, PoseStatus
 from dockair.nav.pose.measurement import lines_of_sight_from_pixels
 from dockair.rotations import Array, log, skew
+from dockair.vectors import is_finite
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -198,6 +199,10 @@ class RelativeFilter:
         seen = self._apparent(self._belief(time_s))
         return seen.R_CD, seen.p_CD, seen.covariance
 
+    def p_PD_B(self, time_s: float) -> Array:
+        """(3,) ring centre from the probe's tip [m], that of `state`."""
+        return np.asarray(self._belief(time_s).p_ID - self._p_IP)
+
     def foretold_p_PD_B(self, time_s: float, horizon_s: float) -> tuple[Array, float]:
         """Where the drogue would be believed to be at a time, had no frame come for `horizon_s` before.
 
@@ -238,7 +243,7 @@ class RelativeFilter:
 
     def _feel(self, force_B: Array) -> None:
         """Take the first specific force for that of the formation."""
-        if np.isfinite(force_B).all():
+        if is_finite(force_B):
             self._felt = True
             self._buffer.change_all(lambda belief: felt_first(belief, force_B))
 

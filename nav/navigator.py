@@ -34,6 +34,7 @@ from dockair.nav.ring_finder import FewSettings, RingFinder
 from dockair.nav.tip_motion import TipMotion
 from dockair.nav.track import TrackSettings
 from dockair.rotations import Array
+from dockair.vectors import is_finite
 
 _EVEN_LEDS = 5  # four are seldom more than an accident
 _POSE_LEDS = 4  # fewer are no pose without a belief ...
@@ -210,7 +211,7 @@ class Navigator:
     def _ask_coasting(self, time_s: float) -> None:
         """Hold what had been foretold for a frame against what is believed with it."""
         foretold_B, age_s = self._filter.foretold_p_PD_B(time_s, self._settings.coasting.horizon_s)
-        error_B = self._filter.state(time_s).p_PD_B - foretold_B
+        error_B = self._filter.p_PD_B(time_s) - foretold_B
         self._coasting.take(self._sheets.mounting.R_BC.T @ error_B, age_s, time_s)
 
     def _attitude_known(self, leds: int, time_s: float, R_CD: Array, covariance: Array) -> AttitudePrior | None:
@@ -260,7 +261,7 @@ class Navigator:
         state = self._filter.state(self._time_s)
         sigma_lateral_m = float(np.sqrt(np.linalg.eigvalsh(state.covariance[4:6, 4:6])[-1]))
         aged_s = self._time_s - self._used_time_s
-        known = bool(np.isfinite(state.p_PD_B).all() and np.isfinite(state.covariance).all())
+        known = is_finite(state.p_PD_B) and is_finite(state.covariance)
         valid = known and sigma_lateral_m <= self._settings.usable_sigma_m and aged_s <= self._settings.usable_age_s
         claim = self.contact_claim()
         contact_usable = valid and claim is not None and claim.usable

@@ -19,7 +19,7 @@ A gyro's bias b that has changed and is not known yet turns c away by b g t, unt
 import numpy as np
 
 from dockair.rotations import Array, exp
-from dockair.vectors import cross
+from dockair.vectors import cross, is_finite
 
 _LEVEL_S = 10.0  # of gravity felt: the mean over a shorter time is as much the gust's
 _GAP_S = 0.1  # without samples the body turns unfelt; after longer ones c is found anew
@@ -48,7 +48,7 @@ class TipMotion:
             step_s: dt.
         """
         before, self._w = self._w, w_B
-        if not np.isfinite(force_B).all():
+        if not is_finite(force_B):
             self._unfelt_s += abs(step_s)
             return np.full(3, np.nan)
         unfelt_s, self._unfelt_s = self._unfelt_s, 0.0

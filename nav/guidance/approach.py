@@ -19,6 +19,8 @@ The push of the receiver's own bow wave is part of the prediction, and what it d
 the next one's aim (`bow_wave_push`).
 """
 
+import math
+
 import numpy as np
 
 from dockair.messages import PodSignal, ReceiverCommand, TankerAnnouncement
@@ -63,6 +65,7 @@ class Guidance:
         self._reckoning = DeadReckoning(settings, self._dt)
         self._passed: Array | None = None  # where the ring was when the tip last came to its plane, left and up
         self._entered_m = 0.0  # how far off when the tip last came past it
+        self._station = np.array([settings.stand_off_m, 0.0, 0.0])
         speeds = settings.closure_speed_m_s, settings.closure_acceleration_m_s2
         self._closure = Closure(settings.closing, *speeds, self._dt)
         self._attempts, self._has_seen, self._light_is_red = 0, False, False
@@ -195,7 +198,7 @@ class Guidance:
             track_lost_s=self._track_lost_s,
             blind_s=self._blind_s,
             doubtful_s=self._doubtful_s,
-            station_m=float(np.linalg.norm(ring - [self._settings.stand_off_m, 0.0, 0.0])),
+            station_m=_length(ring - self._station),
             ahead_m=float(coupling[0]),
             ring_ahead_m=float(ring[0]),
             lateral_m=float(np.hypot(ring[1], ring[2])),
@@ -322,6 +325,10 @@ def _controller(settings: GuidanceSettings, step_s: float) -> Controller:
     return Predictive(settings.predictive, np.array(settings.response_s), *limits, step_s, settings.patient_share)
 
 
+def _length(v: Array) -> float:
+    return math.sqrt(v @ v)
+
+
 def _limited(v: Array, limit: float) -> Array:
-    norm = float(np.linalg.norm(v))
+    norm = _length(v)
     return v if norm <= limit else v * (limit / norm)

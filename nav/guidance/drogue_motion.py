@@ -156,8 +156,8 @@ class DrogueMotion:
         if place_m is None or velocity_m_s is None:
             place_m = velocity_m_s = push_m_s2  # of the right shape, and not looked at
         rate = self._seen_rate, self._rate_lag_s
-        self._x[:, _FIRST + 1 : -1 : 2] += (self._felt_share * felt_m_s).T
-        _advance(self._x, self._F, self._pushed, push_m_s2, gains, *rate, seen, place_m, velocity_m_s)
+        felt = self._felt_share, felt_m_s
+        _advance(self._x, *felt, self._F, self._pushed, push_m_s2, gains, *rate, seen, place_m, velocity_m_s)
         self._ticks += seen
 
     @property
@@ -222,11 +222,13 @@ def _at(x, first):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _advance(x, F, pushed, push, K, seen_rate, lag_s, seen, place, velocity):  # type: ignore[no-untyped-def]
-    """A step of the filter in place: x (3, n), F (3, n, n), pushed (3, n), K (3, n, 2), seen_rate (3, n)."""
+def _advance(x, share, felt, F, pushed, push, K, seen_rate, lag_s, seen, place, velocity):  # type: ignore[no-untyped-def]
+    """A step of the filter in place: x (3, n), share (modes, 3), F (3, n, n), pushed (3, n), K (3, n, 2)."""
     n = x.shape[1]
     later = np.empty(n)
     for axis in range(3):
+        for mode in range(len(share)):
+            x[axis, _FIRST + 1 + 2 * mode] += share[mode, axis] * felt[axis]
         for i in range(n):
             later[i] = pushed[axis, i] * push[axis]
             for j in range(n):

@@ -22,6 +22,7 @@ drogue.
 """
 
 import numpy as np
+from numba import njit
 
 from dockair.rotations import Array
 
@@ -48,25 +49,14 @@ class OwnPath:
         self._length = int(self._ticks.max()) + 1
         self._axes, self._newest = np.arange(3), 0
         self._places, self._velocities = np.zeros((self._length, 3)), np.zeros((self._length, 3))  # rings
-        self._before: Array = np.zeros(3)  # v_k-1
-        self._felt: Array = np.zeros(3)  # f
-        self.felt_change_m_s: Array = np.zeros(3)  #: (3,) of f inside the limit; 0 where not felt
-        self._straying: Array = np.zeros(3)  # e
-        self._strayed: Array = np.zeros(3)  # its integral
+        self._own: Array = np.zeros((5, 3))  # v_k-1, f, and what follows
+        self.felt_change_m_s: Array = self._own[2]  #: (3,) of f inside the limit; 0 where not felt
+        self._straying: Array = self._own[3]  # e
+        self._strayed: Array = self._own[4]  # its integral
 
     def feel(self, change_m_s: Array) -> None:
         """Take note of dv (3,) since the last period, NaN where it was not felt."""
-        v, felt, change = self._commanded_m_s, self._felt, self._commanded_m_s - self._before
-        self._before = v
-        if np.isfinite(change_m_s).all():
-            self._felt = self._kept * (felt + change_m_s - change)
-            straying = self._kept * (self._straying + self._felt - felt)
-            self._straying, now, before = self._limited(straying), self._limited(self._felt), self._limited(felt)
-            self.felt_change_m_s = now - before
-        else:
-            self._felt, self._straying = np.zeros(3), self._dies * self._straying
-            self.felt_change_m_s = np.zeros(3)
-        self._strayed = self._strayed + self._straying * self._step_s
+        _feel(self._own, self._commanded_m_s, change_m_s, self._dies, self._kept, self._limit_m_s, self._step_s)
 
     def step(self, velocity_m_s: Array) -> None:
         """Take note of the velocity (3,) commanded for the next period."""
@@ -102,9 +92,22 @@ class OwnPath:
         """(..., 3) y_r in the times of `strays_s` (..., 3), by the commands given so far."""
         return np.asarray(self._places[self._newest] + self._strayed + strays_s * self._straying)
 
-    def _limited(self, v: Array) -> Array:
-        return np.minimum(np.maximum(v, -self._limit_m_s), self._limit_m_s)
-
     @property
     def _commanded_m_s(self) -> Array:
         return np.asarray(self._velocities[self._newest - self._ticks, self._axes])
+
+
+@njit(cache=True)
+def _feel(own, v, change, dies, kept, limit, step):  # type: ignore[no-untyped-def]
+    """Eqs. (1) and (2) over a step in place: own (5, 3) are the rows v_k-1, f, its change inside the limit, e, way."""
+    felt = np.isfinite(change[0]) and np.isfinite(change[1]) and np.isfinite(change[2])
+    for i in range(3):
+        f, e = own[1, i], own[3, i]
+        if felt:
+            own[1, i] = kept * (f + change[i] - (v[i] - own[0, i]))
+            own[2, i] = min(max(own[1, i], -limit), limit) - min(max(f, -limit), limit)
+            own[3, i] = min(max(kept * (e + own[1, i] - f), -limit), limit)
+        else:
+            own[1, i], own[2, i], own[3, i] = 0.0, 0.0, dies[i] * e
+        own[0, i] = v[i]
+        own[4, i] += own[3, i] * step

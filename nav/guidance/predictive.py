@@ -170,7 +170,7 @@ class Predictive:
         if wanted.distance_m is not None and not bearable:
             away_m = self._settings.keep_away_m * min(excess, self._settings.excess_max)
             wanted = replace(wanted, distance_m=wanted.distance_m + away_m)
-        return np.append(self._along(u, wanted, bearable), self._across(u, wanted, bearable))
+        return np.array([self._along(u, wanted, bearable), *self._across(u, wanted, bearable)])
 
     def _along(self, u: Array, wanted: Wanted, bearable: bool) -> float:
         """Eq. (1)."""
@@ -186,17 +186,17 @@ class Predictive:
             change = gain * (velocity - u[0])
         return float(acceleration + change + s.smoothing_1_s * (goal - u[0]))
 
-    def _across(self, u: Array, wanted: Wanted, bearable: bool) -> Array:
-        """(2,) next acceleration of the plans, left and up."""
+    def _across(self, u: Array, wanted: Wanted, bearable: bool) -> list[float]:
+        """Next acceleration of the plans, left and up."""
         s = self._settings
         path = self._path if bearable else self._motion.mean_path(s.plan.nodes)
         path = path - self._own.places_m(self._strays_s)
         to_contact_s = None if wanted.to_contact_s is None else wanted.to_contact_s - self._response_s
-        out = np.empty(2)
+        out, u_dot = [], self._u_dot.tolist()
         plans = self._patient_plans if wanted.patient else self._plans
         for row, (axis, plan) in enumerate(zip(_ACROSS, plans, strict=True)):
             places = path[:, axis] + wanted.aim_m[row]
             places -= places[0] - clipped(places[0], s.plan.error_max_m)
-            x = np.array([0.0, u[axis], self._u_dot[axis]])
-            out[row] = self._u_dot[axis] + plan.jerk_m_s3(x, places, to_contact_s, calm=not bearable) * self._step_s
+            x = np.array([0.0, u[axis], u_dot[axis]])
+            out.append(u_dot[axis] + plan.jerk_m_s3(x, places, to_contact_s, calm=not bearable) * self._step_s)
         return out

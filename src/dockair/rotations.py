@@ -9,6 +9,7 @@ The source's C is passive: R_CD = C(p) turns the other way from the active rotat
 All frames are forward-left-up; aircraft tables are forward-right-down: `FLU_FROM_FRD` is the one place that converts.
 """
 
+import math
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,8 @@ Array = NDArray[np.floating[Any]]
 #: Forward-right-down vector components to forward-left-up ones, and back (it is its own inverse).
 FLU_FROM_FRD: Array = np.diag([1.0, -1.0, -1.0])
 FLU_FROM_FRD.setflags(write=False)
+_UNIT: Array = np.eye(3)
+_UNIT.setflags(write=False)
 
 
 def skew(v: Array) -> Array:
@@ -30,13 +33,13 @@ def skew(v: Array) -> Array:
 
 def exp(phi: Array) -> Array:
     """(3, 3) rotation matrix of a rotation vector phi (3,) [rad], Eq. (2)."""
-    angle = float(np.sqrt(phi @ phi))
+    angle = math.sqrt(phi @ phi)
     K = skew(phi)
     if angle < 1e-4:  # next term of each series is angle^4 < 1e-16
         a, b = 1.0 - angle**2 / 6.0, 0.5 - angle**2 / 24.0
     else:
         a, b = np.sin(angle) / angle, (1.0 - np.cos(angle)) / angle**2
-    return np.eye(3) + a * K + b * (K @ K)
+    return np.asarray(_UNIT + a * K + b * (K @ K))
 
 
 def log(R: Array) -> Array:

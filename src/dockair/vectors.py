@@ -10,3 +10,12 @@ from dockair.rotations import Array
 def cross(a: Array, b: Array) -> Array:
     """(3,) a x b; numpy's own takes ten times as long for one pair of vectors."""
     return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+
+
+@njit(cache=True)
+def is_finite(a: Array) -> bool:
+    """Whether every number of an array is finite."""
+    for value in a.flat:
+        if not np.isfinite(value):
+            return False
+    return True
