@@ -27,6 +27,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numba import njit
 
 from dockair.nav.belief_frame import Explanation, explanations
 from dockair.nav.belief_motion import (
@@ -137,12 +138,19 @@ def _weight(belief: Belief, after: Explanation | PosePosterior, taking: Taking) 
 
 def _updated(belief: Belief, H: Array, after: Explanation, ring: Array, log_weight: float) -> Belief:
     """Return a belief after a frame, Eq. (1); H is per error of the belief, ring (16, 16) what is taken of its gain."""
-    HP = H @ belief.P
-    K = np.linalg.solve(HP @ H.T + np.eye(len(H)), HP).T
-    K[CALIBRATION] = 0.0
-    K[RING] = ring @ K[RING]
-    A = np.eye(ERRORS) - K @ H
-    return _moved(belief, K @ after.nu, A @ belief.P @ A.T + K @ K.T, log_weight)
+    e, P = _gained(belief.P, H, after.nu, ring, CALIBRATION.start, RING.start)
+    return _moved(belief, e, P, log_weight)
+
+
+@njit(cache=True, error_model="numpy")
+def _gained(P: Array, H: Array, nu: Array, ring: Array, calibration: int, places: int) -> tuple[Array, Array]:
+    """(50,) e and (50, 50) P+ of Eq. (1); where the errors of calibration and of the LEDs' places begin comes along."""
+    HP = np.dot(H, P)
+    K = np.ascontiguousarray(np.linalg.solve(np.dot(HP, H.T) + np.eye(len(H)), HP)).T
+    K[calibration:places] = 0.0
+    K[places:] = np.dot(ring, np.ascontiguousarray(K[places:]))
+    A = np.eye(len(P)) - np.dot(K, H)
+    return np.dot(K, nu), np.dot(np.dot(A, P), A.T) + np.dot(K, K.T)
 
 
 def _regressed(belief: Belief, seen: Apparent, after: PosePosterior, log_weight: float) -> Belief:

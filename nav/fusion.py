@@ -20,6 +20,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 from scipy.stats import chi2
 
 from dockair.calibration import NavigationSheets
@@ -171,17 +172,17 @@ class RelativeFilter:
         if time_s is None:
             time_s = self._buffer.newest_s if self._buffer.newest is not None else 0.0
         belief, r, average_s = self._belief(time_s), self._p_IP, self._settings.rate_average_s
-        w_cross = skew(self._record.mean_rate_B(time_s - average_s, time_s) - belief.bias)
-        covariance = self._to_tip @ belief.P @ self._to_tip.T
-        covariance[6:, 6:] += self._rate_variance(time_s) * self._lever2
+        w_B = self._record.mean_rate_B(time_s - average_s, time_s) - belief.bias
+        rate2 = self._rate_variance(time_s)
+        v, rate, covariance = _of_tip(w_B, belief.p_ID, belief.v_ID, belief.P, r, self._to_tip, self._lever2, rate2)
         return FilterState(
             time_s=time_s,
             R_BD=belief.R_BD,
             p_PD_B=belief.p_ID - r,
-            v_PD_B=belief.v_ID - w_cross @ r,
-            rate_PD_B=belief.v_ID - w_cross @ belief.p_ID,
+            v_PD_B=v,
+            rate_PD_B=rate,
             gyro_bias_B=belief.bias.copy(),
-            covariance=0.5 * (covariance + covariance.T),
+            covariance=covariance,
         )
 
     def rate_B(self, time_s: float) -> Array:
@@ -280,3 +281,17 @@ class RelativeFilter:
         s = self._settings
         sigmas = (s.doubt_attitude_sigma_rad, s.doubt_position_sigma_m, s.doubt_velocity_sigma_m_s)
         return [widened(belief, sigmas, s.led_place_sigma_m) for belief in beliefs]
+
+
+@njit(cache=True, error_model="numpy")
+def _of_tip(
+    w: Array, s: Array, v: Array, P: Array, r: Array, to_tip: Array, lever2: Array, rate2: float
+) -> tuple[Array, Array, Array]:
+    """(3,) v_PD and (3,) the rate of p_PD in body axes, Eq. (1), and (9, 9) the state's covariance, with w's `rate2`.
+
+    Products are the library's, as everywhere in the filter: a loop would round otherwise.
+    """
+    w_cross = np.array([[0.0, -w[2], w[1]], [w[2], 0.0, -w[0]], [-w[1], w[0], 0.0]])
+    covariance = np.dot(np.dot(to_tip, P), to_tip.T)
+    covariance[6:, 6:] += rate2 * lever2
+    return v - np.dot(w_cross, r), v - np.dot(w_cross, s), 0.5 * (covariance + covariance.T)

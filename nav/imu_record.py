@@ -49,7 +49,7 @@ class ImuRecord:
     """
 
     def __init__(self, mounting: Mounting, gyro: GyroSheet, saturated: float) -> None:
-        self._R_BI, self._limit_rad_s = mounting.R_BI, saturated * gyro.range_rad_s
+        self._R_BI, self._limit_rad_s = np.ascontiguousarray(mounting.R_BI), saturated * gyro.range_rad_s
         self._times, self._rates, self._forces = np.empty(_FIRST_ROOM), np.empty((_FIRST_ROOM, 3)), self._none()
         self._first = self._end = 0
         self.newest_s = -np.inf  #: stamp of the newest sample; -inf before the first
@@ -75,17 +75,14 @@ class ImuRecord:
 
     def take(self, sample: ImuSample) -> bool:
         """Keep a sample; False if it is not taken."""
-        rate_I, limit = sample.angular_rate_rad_s, self._limit_rad_s
-        x, y, z = rate_I.tolist()
-        inside = abs(x) < limit and abs(y) < limit and abs(z) < limit  # false for what is not a number
-        if not (inside and self.newest_s < sample.time_stamp_s < np.inf):
+        if not self.newest_s < sample.time_stamp_s < np.inf:
             return False
         if self._end == len(self._times):
             self._make_room()
-        k = self._end
-        self._times[k] = self.newest_s = sample.time_stamp_s
-        np.matmul(self._R_BI, rate_I, out=self._rates[k])
-        np.matmul(self._R_BI, sample.specific_force_m_s2, out=self._forces[k])
+        felt = sample.angular_rate_rad_s, sample.specific_force_m_s2
+        if not _put(self._rates, self._forces, self._end, *felt, self._R_BI, self._limit_rad_s):
+            return False
+        self._times[self._end] = self.newest_s = sample.time_stamp_s
         self._end += 1
         return True
 
@@ -116,6 +113,17 @@ class ImuRecord:
             new[:kept] = old[self._first : self._end]
             setattr(self, name, new)
         self._first, self._end = 0, kept
+
+
+@njit(cache=True, error_model="numpy")
+def _put(rates: Array, forces: Array, k: int, rate_I: Array, force_I: Array, R_BI: Array, limit: float) -> bool:
+    """Put rate and force (3,) in body axes into row k; False if a rate is beyond the limit or not a number."""
+    for i in range(3):
+        if not abs(rate_I[i]) < limit:
+            return False
+    np.dot(R_BI, rate_I, rates[k])
+    np.dot(R_BI, force_I, forces[k])
+    return True
 
 
 @njit(cache=True, error_model="numpy")

@@ -123,7 +123,8 @@ class Guidance:
             self._controller.observe(None, change)
             return
         times = self._controller.looks_ahead_s
-        later = np.tile(ring, (len(times), 1))
+        later = np.empty((len(times), 3))
+        later[:] = ring
         later[1:, 0] = np.maximum(ring[0] + min(rate[0], 0.0) * times[1:], 0.0)
         self._controller.observe(
             Sight(

@@ -75,7 +75,8 @@ def exclusions(
 
 def paired(minima: list[PoseEstimate]) -> PoseEstimate:
     """Return the first of some LEDs' minima with the second as its alternative."""
-    return replace(minima[0], alternative=minima[1] if len(minima) > 1 else None)
+    alternative = minima[1] if len(minima) > 1 else None
+    return minima[0] if minima[0].alternative is alternative else replace(minima[0], alternative=alternative)
 
 
 def _starts(prior: Prior | None, sight: LinesOfSight) -> list[tuple[Array, Array]]:

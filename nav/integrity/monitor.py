@@ -79,15 +79,16 @@ def check_integrity(
     first = minima[0]
     found = sensitivity(sight, first.R_CD, first.p_CD, first.covariance)
     nothing.local_chi2[np.isfinite(pose.led_chi2)] = found.local_chi2
-    tested = replace(nothing, chi2=first.cost, threshold=test.threshold)
     if first.cost > test.threshold:
-        return _without_one(tested, sight, prior, fewer)
+        return _without_one(replace(nothing, chi2=first.cost, threshold=test.threshold), sight, prior, fewer)
     levels, alone = slope_levels(minima, sight, found, test, fewer)
-    return replace(
-        tested,
+    return Integrity(
         status=IntegrityStatus.CONSISTENT,
         pose=paired(minima),
         levels=levels,
+        chi2=first.cost,
+        threshold=test.threshold,
+        local_chi2=nothing.local_chi2,
         mirror_ruled_out=alone,
     )
 

@@ -285,7 +285,7 @@ def test_leds_are_expected_where_they_are_believed_to_be_on_the_ring():
     ring = LEDS.copy()
     ring[:, 1:] += b.ring.reshape(-1, 2)
     seen = SIGHT.apparent(b)
-    pixels, sigma_px = SIGHT.led_pixels(b, CAMERA)
+    pixels, sigma_px = SIGHT.led_pixels(b, SIGHT.apparent(b), CAMERA)
     np.testing.assert_allclose(pixels, pixels_of(seen.R_CD, seen.p_CD, ring), atol=1e-9)
     np.testing.assert_allclose(sigma_px, 0.0, atol=1e-9)
 
