@@ -76,7 +76,7 @@ class Predictive:
         node_times = response_s + plan.node_s * np.arange(1, plan.nodes + 1)[:, np.newaxis]  # (nodes, 3)
         self._strays_s = self._own.strays_s(node_times)
         self._ahead: tuple[Array, Array, Array] = (np.zeros(3), np.zeros(3), np.zeros(3))
-        self._path: Array = np.zeros((plan.nodes, 3))
+        self._push: Array = np.zeros((len(self._times), 3))
         self._u_dot: Array = np.zeros(3)
         self._calm = np.array(settings.calm_share) * acceleration_limit_m_s2[1:]
         self._bearable = (np.array(settings.bearable_share) * acceleration_limit_m_s2[1:]) ** 2
@@ -108,7 +108,7 @@ class Predictive:
             self._seen_s += self._step_s
             self._motion.step(place, velocity, push[0], self._own.felt_change_m_s)
         self._ahead = self._motion.ahead(push[0], push[1])
-        self._path = self._motion.path(push)
+        self._push = push
         if sight is not None:
             share = self._step_s / self._settings.bearing_s
             squares = self._ahead[2][1:] ** 2
@@ -189,7 +189,7 @@ class Predictive:
     def _across(self, u: Array, wanted: Wanted, bearable: bool) -> list[float]:
         """Next acceleration of the plans, left and up."""
         s = self._settings
-        path = self._path if bearable else self._motion.mean_path(s.plan.nodes)
+        path = self._motion.path(self._push) if bearable else self._motion.mean_path(s.plan.nodes)
         path = path - self._own.places_m(self._strays_s)
         to_contact_s = None if wanted.to_contact_s is None else wanted.to_contact_s - self._response_s
         out, u_dot = [], self._u_dot.tolist()

@@ -719,6 +719,25 @@ def test_a_long_silence_is_gone_through_once_however_often_the_present_is_asked_
     assert np.array_equal(asked.state(begun_s + 0.6).covariance, quiet.state(begun_s + 0.6).covariance)
 
 
+def test_a_moment_that_was_asked_for_is_believed_anew_once_a_sample_has_come():
+    """Until then the rate was held; filters that are asked and not asked before agree to the last bit."""
+    asked, quiet = RelativeFilter(sheets(6.0)), RelativeFilter(sheets(6.0))
+    world = World(sheets(6.0), SETTINGS, np.random.default_rng(4))
+    first = world.step()
+    for filter_ in (asked, quiet):
+        filter_.propagate([first])
+    for _ in range(60):
+        time_s = asked.imu_time_s + 1e-4
+        held = asked.state(time_s), asked.predicted_pose(time_s)
+        sample = world.step()
+        for filter_ in (asked, quiet):
+            filter_.propagate([sample])
+        assert not np.array_equal(asked.state(time_s).R_BD, held[0].R_BD)
+        assert np.array_equal(asked.state(time_s).covariance, quiet.state(time_s).covariance)
+        for mine, other in zip(asked.predicted_pose(time_s), quiet.predicted_pose(time_s), strict=True):
+            assert np.array_equal(mine, other)
+
+
 def test_a_faster_camera_says_no_more_of_the_leds_places_in_a_second_and_a_blow_is_believed_as_late():
     """Its frames see the same LEDs off in the same way; a glint of 17 ms is no blow."""
     at = {hz: (taking_of(SETTINGS, hz).ring * max(hz, 50), refusals_until_doubt(SETTINGS, hz)) for hz in (25, 50, 180)}
