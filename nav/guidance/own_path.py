@@ -50,7 +50,7 @@ class OwnPath:
         self._axes, self._newest = np.arange(3), 0
         self._places, self._velocities = np.zeros((self._length, 3)), np.zeros((self._length, 3))  # rings
         self._own: Array = np.zeros((5, 3))  # v_k-1, f, and what follows
-        self.felt_change_m_s: Array = self._own[2]  #: (3,) of f inside the limit; 0 where not felt
+        self._felt_change: Array = self._own[2]  # of f inside the limit
         self._straying: Array = self._own[3]  # e
         self._strayed: Array = self._own[4]  # its integral
 
@@ -63,6 +63,11 @@ class OwnPath:
         before, self._newest = self._newest, (self._newest + 1) % self._length
         self._places[self._newest] = self._places[before] + velocity_m_s * self._step_s
         self._velocities[self._newest] = velocity_m_s
+
+    @property
+    def felt_change_m_s(self) -> Array:
+        """(3,) of f inside the limit, in the last period; 0 where not felt."""
+        return self._felt_change.copy()
 
     @property
     def place_m(self) -> Array:
