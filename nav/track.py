@@ -21,7 +21,7 @@ than half a place (22.5 degrees), which is for half a second.
 
 A measurement counts when its innovation passes a chi-square gate of three degrees of freedom (centre and radius);
 otherwise the frame is a miss, like one without a ring. The window is the predicted ring with three sigma and a margin,
-shifted by the turn to come, and wider with every miss; after `misses_until_lost` there is none (full frame), and the
+shifted by the turn to come, and wider with every miss; after `lost_s` of them there is none (full frame), and the
 next ring found starts the filter afresh.
 
 Not modelled: the ring's tilt (its window is a square around the circle), correlation between the four, what a turn does
@@ -70,8 +70,9 @@ class TrackSettings:
     window_sigmas: float = 3.0
     window_margin_px: float = 12.0  # the LEDs' own spots and the rim beyond the ring's circle
     window_margin_radii: float = 0.15  # perspective and tilt
-    growth_per_miss: float = 1.5
-    misses_until_lost: int = 5  # 0.1 s at 50 Hz
+    growth: float = 1.5  # of the window, for every so long that no measurement counts:
+    growth_s: float = 0.02  # a frame at 50 Hz
+    lost_s: float = 0.1  # without a measurement that counts: what the drogue does meanwhile is the same at every rate
 
 
 class RingTracker:
@@ -104,6 +105,7 @@ class RingTracker:
         self._optics = camera.focal_length_px, camera.principal_point_px, ring_radius_m, lever_C  # of the kernels
         s = self._settings
         self._noise = s.process_variance, s.acceleration_radii_s2, s.roll_acceleration_rad_s2
+        self._misses_until_lost = max(round(s.lost_s / frame_interval_s), 1)
         self._gate = float(chdtri(3, 1.0 - self._settings.gate_probability))
         self._kalman: KalmanFilter | None = None
         self._newest: Identification | None = None  # whose ring has the places q_k of Eq. (2)
@@ -112,14 +114,14 @@ class RingTracker:
 
     def lose(self) -> None:
         """Give the ring up; its roll is remembered."""
-        self._misses = self._settings.misses_until_lost
+        self._misses = self._misses_until_lost
         if self._kalman is not None:
             self._kalman.x[_AXES : _AXES + 3] = 0.0  # nothing is followed but the roll
 
     @property
     def tracking(self) -> bool:
         """Whether there is a ring to follow."""
-        return self._kalman is not None and self._misses < self._settings.misses_until_lost
+        return self._kalman is not None and self._misses < self._misses_until_lost
 
     @property
     def misses(self) -> int:
@@ -220,7 +222,7 @@ class RingTracker:
         )  # fmt: skip
         sigma_u, sigma_v, sigma_r, _ = sigma.tolist()
         radius = (r + s.window_sigmas * sigma_r) * (1.0 + s.window_margin_radii) + s.window_margin_px
-        growth = s.growth_per_miss**self._misses
+        growth = s.growth ** (self._misses * self._dt / s.growth_s)
         half_u, half_v = growth * (radius + s.window_sigmas * sigma_u), growth * (radius + s.window_sigmas * sigma_v)
         window = Window(
             max(math.floor(v - half_v), 0),

@@ -236,7 +236,7 @@ def test_the_window_holds_the_ring_grows_with_misses_and_opens_when_the_ring_is_
         tracker.predict()
         tracker.update(seen((900, 500)))
     sizes = []
-    for _ in range(TrackSettings().misses_until_lost):
+    for _ in range(round(TrackSettings().lost_s / DT)):
         window = tracker.window()
         assert window is not None
         assert window.column_start <= 800 and window.column_stop > 1000
@@ -262,12 +262,26 @@ def test_the_window_is_the_predicted_ring_three_sigma_and_the_margin_half_as_wid
     for misses in range(4):
         sigma = np.sqrt((F @ tracker.covariance @ F.T + Q)[0, 0])
         half = (60.0 + 3.0 * sigma) * (1.0 + settings.window_margin_radii) + settings.window_margin_px + 3.0 * sigma
-        half *= settings.growth_per_miss**misses
+        half *= settings.growth**misses
         window = tracker.window()
         assert 1000 - half == pytest.approx(window.column_start, abs=1.0)
         assert 550 + half == pytest.approx(window.row_stop - 1, abs=1.0)
         tracker.predict()
         tracker.update(MISSING)
+
+
+@pytest.mark.parametrize("rate_hz", [30.0, 50.0, 180.0])
+def test_a_ring_is_lost_after_the_same_time_at_every_frame_rate_and_its_window_grows_as_quickly(rate_hz):
+    tracker, settings = RingTracker(CAMERA, 1.0 / rate_hz, SOURCE), TrackSettings()
+    tracker.update(seen((1000, 550), 60.0))
+    first, misses, grown = tracker.window(interval_s=0.0), 0, 1.0
+    while tracker.tracking:
+        window = tracker.window(interval_s=0.0)
+        grown, misses = window.shape[1] / first.shape[1], misses + 1
+        assert grown == pytest.approx(settings.growth ** ((misses - 1) / rate_hz / settings.growth_s), rel=0.02)
+        tracker.update(MISSING)
+    assert misses / rate_hz == pytest.approx(settings.lost_s, abs=0.5 / rate_hz)
+    assert grown > 2.0
 
 
 def test_the_window_moves_with_the_rotation_to_come_and_stays_on_the_sensor():
