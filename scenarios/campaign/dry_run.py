@@ -37,15 +37,7 @@ def dry_run(source: PlanFile, folder: Path) -> DryRun:
     entries = journal.read(path)[0] if path.is_file() else {}
     done = {flight_of(entry["row"]) for entry in entries.values()}
     groups = [
-        {
-            "scenario": group.scenario,
-            "sensing": group.sensing,
-            "navigator": group.navigator,
-            "controller": group.controller,
-            "settings": group.settings,
-            "flights": len(group.rows),
-            "done": sum(flight_of(row) in done for row in group.rows),
-        }
+        {**group.kind, "flights": len(group.rows), "done": sum(flight_of(row) in done for row in group.rows)}
         for group in groups_of([unflown(job) for job in jobs])
     ]
     return DryRun(name=source.plan.name, folder=folder, groups=groups, commands=[job.command for job in jobs])

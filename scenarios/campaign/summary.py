@@ -32,11 +32,7 @@ def _claimed(rows: Sequence[Row], claims: Mapping[tuple[str, int], Accept]) -> A
 
 def _group(group: Group, claimed: Accept | None) -> dict[str, Any]:
     return {
-        "scenario": group.scenario,
-        "sensing": group.sensing,
-        "navigator": group.navigator,
-        "controller": group.controller,
-        "settings": group.settings,
+        **group.kind,
         "flights": len(group.rows),
         "seeds": group.seeds,
         "independent": group.independent,

@@ -41,11 +41,7 @@ def _group(group: Group, groups: Sequence[Group]) -> dict[str, Any]:
     pair = paired(group, groups)
     shortfalls = shortfalls_of(group)
     return {
-        "scenario": group.scenario,
-        "sensing": group.sensing,
-        "navigator": group.navigator,
-        "controller": group.controller,
-        "settings": group.settings,
+        **group.kind,
         "flights": len(group.rows),
         "seeds": group.seeds,
         "independent": group.independent,

@@ -78,6 +78,12 @@ class Group:
         return "-".join([self.scenario, self.sensing, self.controller, self.navigator, self.settings]).replace(" ", "")
 
     @property
+    def kind(self) -> dict[str, str]:
+        """What its flights have in common, as tables name it."""
+        names = ("scenario", "sensing", "navigator", "controller", "settings")
+        return {name: getattr(self, name) for name in names}
+
+    @property
     def own_navigator(self) -> str:
         """Name of a navigator that is neither Dockair's own nor the truth; "" of these two."""
         return "" if self.navigator in (OUR_NAVIGATOR, "truth") else self.navigator
