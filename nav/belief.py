@@ -144,9 +144,15 @@ def _updated(belief: Belief, H: Array, after: Explanation, ring: Array, log_weig
 
 @njit(cache=True, error_model="numpy")
 def _gained(P: Array, H: Array, nu: Array, ring: Array, calibration: int, places: int) -> tuple[Array, Array]:
-    """(50,) e and (50, 50) P+ of Eq. (1); where the errors of calibration and of the LEDs' places begin comes along."""
+    """(50,) e and (50, 50) P+ of Eq. (1), NaN where P or H are not finite.
+
+    Where the errors of calibration and of the LEDs' places begin comes along.
+    """
     HP = np.dot(H, P)
-    K = np.ascontiguousarray(np.linalg.solve(np.dot(HP, H.T) + np.eye(len(H)), HP)).T
+    S = np.dot(HP, H.T) + np.eye(len(H))
+    if not (np.isfinite(S).all() and np.isfinite(HP).all()):  # numba's solver would raise
+        return np.full(len(P), np.nan), np.full_like(P, np.nan)
+    K = np.ascontiguousarray(np.linalg.solve(S, HP)).T
     K[calibration:places] = 0.0
     K[places:] = np.dot(ring, np.ascontiguousarray(K[places:]))
     A = np.eye(len(P)) - np.dot(K, H)

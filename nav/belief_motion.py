@@ -311,7 +311,7 @@ def propagated(
     Args:
         R: (3, 3) R_BD.
         x: (8, 3) s, v, n, m, b, c, u, g.
-        P: (50, 50) covariance of the errors, symmetric to the last bit.
+        P: (50, 50) covariance of the errors, symmetric; with calibration and ring it is read where these are columns.
         t0: time of the belief.
         t1: time wanted.
         times: (k,) stamps of the samples, increasing.

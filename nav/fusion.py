@@ -64,7 +64,7 @@ class RelativeFilter:
         self._settings = settings or FusionSettings()
         self._sheets = sheets
         self._sight = Sight(mounting=sheets.mounting, points_D=sheets.ring.positions_D)
-        self._p_IP = sheets.mounting.p_BP - sheets.mounting.p_BI
+        self._p_IP = np.asarray(sheets.mounting.p_BP - sheets.mounting.p_BI, dtype=float)
         self._to_tip = np.eye(9, motion.ERRORS)  # from the errors to those of Eq. (1)
         self._to_tip[6:, motion.BIAS] = -skew(self._p_IP)
         self._lever2 = skew(self._p_IP) @ skew(self._p_IP).T

@@ -49,7 +49,7 @@ class ImuRecord:
     """
 
     def __init__(self, mounting: Mounting, gyro: GyroSheet, saturated: float) -> None:
-        self._R_BI, self._limit_rad_s = np.ascontiguousarray(mounting.R_BI), saturated * gyro.range_rad_s
+        self._R_BI, self._limit_rad_s = np.ascontiguousarray(mounting.R_BI, dtype=float), saturated * gyro.range_rad_s
         self._times, self._rates, self._forces = np.empty(_FIRST_ROOM), np.empty((_FIRST_ROOM, 3)), self._none()
         self._first = self._end = 0
         self.newest_s = -np.inf  #: stamp of the newest sample; -inf before the first
@@ -79,8 +79,8 @@ class ImuRecord:
             return False
         if self._end == len(self._times):
             self._make_room()
-        felt = sample.angular_rate_rad_s, sample.specific_force_m_s2
-        if not _put(self._rates, self._forces, self._end, *felt, self._R_BI, self._limit_rad_s):
+        rate_I, force_I = (np.asarray(x, dtype=float) for x in (sample.angular_rate_rad_s, sample.specific_force_m_s2))
+        if not _put(self._rates, self._forces, self._end, rate_I, force_I, self._R_BI, self._limit_rad_s):
             return False
         self._times[self._end] = self.newest_s = sample.time_stamp_s
         self._end += 1

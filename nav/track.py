@@ -21,8 +21,8 @@ than half a place (22.5 degrees), which is for half a second.
 
 A measurement counts when its innovation passes a chi-square gate of three degrees of freedom (centre and radius);
 otherwise the frame is a miss, like one without a ring. The window is the predicted ring with three sigma and a margin,
-shifted by the turn to come, and wider with every miss; after `lost_s` of them there is none (full frame), and the
-next ring found starts the filter afresh.
+shifted by the turn to come, and wider with every miss; after `lost_s` of them, at least one, there is none (full
+frame), and the next ring found starts the filter afresh. Frames that never arrive are no misses.
 
 Not modelled: the ring's tilt (its window is a square around the circle), correlation between the four, what a turn does
 to the ring's shape (2 px at the frame's corner at 2 m and 45 deg/s), distortion in a turn.

@@ -102,7 +102,7 @@ def ahead(
 
 @njit(cache=True)
 def innovation_squared(z: Array, x: Array, P: Array, variance: Array) -> float:
-    """Normalised square of the innovation of centre and radius, three degrees of freedom.
+    """Normalised square of the innovation of centre and radius, three degrees of freedom; NaN where any is no number.
 
     Args:
         z: (4,) measured.
@@ -115,6 +115,8 @@ def innovation_squared(z: Array, x: Array, P: Array, variance: Array) -> float:
         innovation[i] = z[i] - x[i]
         for j in range(3):
             S[i, j] = P[i, j] + (variance[i] if i == j else 0.0)
+    if not (np.isfinite(S).all() and np.isfinite(innovation).all()):  # numba's solver would raise
+        return np.nan
     weighed, total = np.linalg.solve(S, innovation), 0.0
     for i in range(3):
         total += innovation[i] * weighed[i]

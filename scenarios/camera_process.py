@@ -173,9 +173,10 @@ def _serve(camera: NearInfraredCamera, slots: list[_Slot], pipe: Connection, fli
             except Exception as error:  # the flight's to handle, whatever it is
                 answer = _Failed(type(error), error.args, error.__dict__)
             pipe.send(answer)
-            for _ in range(_PIECES_AHEAD):
-                if pipe.poll() or not camera.work_ahead():
-                    break
+            with suppress(Exception):  # what a frame really needs it makes itself, and says what it lacks
+                for _ in range(_PIECES_AHEAD):
+                    if pipe.poll() or not camera.work_ahead():
+                        break
 
 
 def _exposed(

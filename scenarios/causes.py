@@ -56,9 +56,8 @@ from dockair.sim.truth import Truth
 
 #: Causes that faults of LEDs, camera and IMU can bring about, and those of the reel.
 _OF_SENSORS = ("detection", "integrity", "ambiguity", "navigation_error", "called_off", "never_steady")
-_OF_REEL = (
-    "called_off", "gust", "bow_wave", "control_limit", "outside_limits", "not_held", "collision", "never_steady",
-)  # fmt: skip
+_OF_REEL = ("gust", "bow_wave", "control_limit", "outside_limits", "not_held", "collision", "never_steady")
+_RED_LIGHT = "red light"  # the navigation's reason, of the table of phases
 
 CAUSES = (
     "diverged", "departed", "out_of_time", "collision", "detection", "integrity", "outside_limits", "not_held",
@@ -132,6 +131,8 @@ def with_cause(attempt: Attempt, flown: Flown, rules: CauseRules | None = None) 
     rules = rules or CauseRules()
     if is_good_contact(attempt, rules.limits):
         return attempt
+    if attempt.reason == _RED_LIGHT:
+        return replace(attempt, cause="fault")
     cause = _cause(attempt, flown, rules)
     until_s = flown.truths[-1].time_s if cause == "collision" else attempt.decided_s  # what ends a hold comes later
     return replace(attempt, cause=_or_fault(cause, attempt.begun_s, until_s, flown))

@@ -156,7 +156,10 @@ class Guidance:
             and self._controller.bears_the_gusts
         )
         self._steady_s = self._steady_s + self._dt if steady else 0.0
-        self._patient_s = self._patient_s + self._dt if self.phase in (Phase.PRE_CONTACT, Phase.APPROACH) else 0.0
+        if self.phase not in (Phase.PRE_CONTACT, Phase.APPROACH):
+            self._patient_s = 0.0
+        elif not self._light_is_red:  # who waits for amber has not waited for a calm moment
+            self._patient_s += self._dt
         if self.phase is Phase.APPROACH:
             self._close(state, float(ring[0]), -float(rate[0]))
             self._inside_s = self._inside_s + self._dt if ring[0] <= 0.0 else 0.0

@@ -94,8 +94,8 @@ def ring_from_leds(led_px: Array, angle_rad: Array | None = None) -> tuple[Array
         solution = np.linalg.lstsq(columns, led_px, rcond=None)[0]
         centre, A = solution[0], solution[1:].T
     (a, b), (c, d) = A.tolist()
-    square = 0.5 * float((A**2).sum())
-    radius = math.sqrt(square + math.sqrt(max(square**2 - (a * d - b * c) ** 2, 0.0)))
+    square, area = 0.5 * float((A**2).sum()), a * d - b * c
+    radius = math.sqrt(square + math.sqrt(max(square * square - area * area, 0.0)))
     return centre, radius, float(np.arctan2(c - b, a + d))
 
 

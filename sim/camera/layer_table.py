@@ -12,9 +12,8 @@ A table is of one place, its key, and serves all places around; from the key, D 
 with h' the key's height, o' the level way from there; the horizon is near enough for two terms. Keys stand on a grid, a
 third of the layer's depth apart, so that the picture is a function of the place alone. A feature stays where it is as
 the camera moves and turns; what it fades into changes with the key by less than the eye sees. On the way to a change of
-key the next one's tiles are made bit by bit, so that no frame has to wait for them; or all at once, before they are
-looked at, where there is time between frames. Rays that skim past the layer are
-taken to the farthest it reaches.
+key the next one's tiles are made bit by bit, so that no frame has to wait for them; and, where there is time between
+frames, before anything looks at them. Rays that skim past the layer are taken to the farthest it reaches.
 
 Source: Praun & Hoppe 2003 (octahedral maps), as `sky_table`.
 """

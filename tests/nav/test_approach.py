@@ -6,7 +6,7 @@ from collections import deque
 import numpy as np
 import pytest
 
-from dockair.messages import ReceiverCommand
+from dockair.messages import PodSignal, ReceiverCommand
 from dockair.nav.guidance.approach import Guidance, GuidanceSettings, PhaseLimits, RelativeState
 from dockair.nav.guidance.path_plan import PlanSettings
 from dockair.nav.guidance.phases import Phase
@@ -140,6 +140,22 @@ def test_the_longer_a_calm_moment_is_waited_for_the_less_calm_it_has_to_be():
         phases, _ = fly(Plant(drogue=_swing), seconds, dataclasses.replace(PID, limits=limits))
         begun.append(Phase.APPROACH in phases)
     assert begun == [False, False, True]
+
+
+def test_who_waits_before_a_red_light_has_not_waited_for_a_calm_moment():
+    """The drogue of the test before, 40 s before a red light, and before an amber one."""
+    radius_m = 0.3 / 1.35 / PID.closing.hopeful
+    limits = PhaseLimits(capture_radius_m=radius_m, patience_s=40.0, late_radius=1.5)
+    patience = []
+    for red in (True, False):
+        guidance, plant = Guidance(dataclasses.replace(PID, limits=limits), RATE_HZ), Plant(drogue=_swing)
+        guidance.signal(PodSignal(time_stamp_s=0.0, red=red))
+        now = plant.step(ReceiverCommand())
+        for _ in range(40 * RATE_HZ):
+            now = plant.step(guidance.step(now))
+            assert not red or guidance.phase in (Phase.JOIN_UP, Phase.PRE_CONTACT)
+        patience.append(guidance._late)
+    assert patience == [1.0, pytest.approx(1.5, abs=0.05)]
 
 
 def test_prediction_meets_a_swing_that_the_pid_is_too_late_for():

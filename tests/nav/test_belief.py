@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import chi2 as chi2_law
 
 from dockair.calibration import Camera, LedRing, Mounting
-from dockair.nav.belief import Taking, begun_again, corrected, felt_first, mixture, rolled, widened
+from dockair.nav.belief import Taking, _gained, begun_again, corrected, felt_first, mixture, rolled, widened
 from dockair.nav.belief_motion import BIAS, CALIBRATION, ERRORS, FORMATION, GUST, HARDWARE, PHI, REST, RING
 from dockair.nav.belief_sight import Belief, Sight, ring_sensitivity
 from dockair.nav.pose.difference import pose_difference
@@ -307,6 +307,13 @@ def test_a_few_leds_correct_what_they_see(count):
     assert np.diag(P)[4] < 0.01 * 0.04  # across
     if count == 1:
         assert np.diag(P)[3] > 0.5 * 0.04  # along
+
+
+def test_a_frame_without_numbers_is_no_news_and_no_error():
+    H = np.zeros((16, ERRORS))
+    for P in (np.full((ERRORS, ERRORS), np.nan), np.full((ERRORS, ERRORS), np.inf)):
+        gained, after = _gained(P, H, np.zeros(16), np.eye(16), CALIBRATION.start, RING.start)
+        assert np.isnan(gained).all() and np.isnan(after).all()
 
 
 def test_gate_refuses_and_leaves_nothing():

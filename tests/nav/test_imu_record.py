@@ -48,6 +48,13 @@ def test_rates_and_forces_are_turned_into_body_axes():
     np.testing.assert_allclose(kept.forces_B, [[-5.0, 4.0, 6.0]])
 
 
+def test_samples_of_whole_numbers_or_single_precision_are_taken_as_they_are():
+    kept = ImuRecord(replace(MOUNTING, R_BI=np.eye(3, dtype=int)), GYRO, 0.999)
+    rate_I, force_I = np.array([0, 1, 2]), np.array([4.0, 5.0, 6.0], dtype=np.float32)
+    assert kept.take(ImuSample(time_stamp_s=1.0, angular_rate_rad_s=rate_I, specific_force_m_s2=force_I))
+    np.testing.assert_array_equal([*kept.rates_B, *kept.forces_B], [[0.0, 1.0, 2.0], [4.0, 5.0, 6.0]])
+
+
 def test_a_rate_just_inside_the_range_is_taken():
     assert record().take(sample(1.0, 3.99))
 

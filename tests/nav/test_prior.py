@@ -28,6 +28,13 @@ def test_radius_and_roll_of_a_tilted_ring_are_those_of_its_parallel_projection()
     assert roll == pytest.approx(0.3)
 
 
+def test_an_led_that_is_seen_beside_the_lens_makes_a_ring_without_end_and_no_error():
+    leds = ring()
+    leds[3] = 1e160
+    with np.errstate(over="ignore"):
+        assert not np.isfinite(ring_from_leds(leds)[1])
+
+
 def test_leds_off_their_places_shift_neither_centre_nor_roll_when_their_angles_are_known():
     angle = np.arange(8) * np.pi / 4 + np.array([0, 0, 0, 0, 0, 0, 0, 0.2])
     led_px = np.array([40.0, 30.0]) - 50.0 * np.column_stack([0.8 * np.cos(angle + 0.3), np.sin(angle + 0.3)])

@@ -78,3 +78,5 @@ def test_the_innovation_s_square_is_that_of_centre_and_radius_alone():
     P = shape @ shape.T
     S = P[:3, :3] + np.diag(variance[:3])
     assert innovation_squared(z, x, P, variance) == pytest.approx((z - x[:4])[:3] @ np.linalg.inv(S) @ (z - x[:4])[:3])
+    assert np.isnan(innovation_squared(np.full(4, np.nan), x, P, variance))
+    assert np.isnan(innovation_squared(z, x, np.full((8, 8), np.inf), variance))

@@ -212,7 +212,8 @@ def test_a_fault_is_named_where_it_can_have_brought_the_cause_about_and_acted_du
     assert cause(flight(**BEHIND, faults=[LedOff(leds=(0,))])) == "control_limit"  # a dark LED moves no receiver
     assert cause(flight(drogue=kick, faults=[DeadReel()])) == "fault"
     assert cause(flight(**MISLED, faults=[DeadReel()])) == "navigation_error"
-    assert cause(flight(faults=[DeadReel()]), outcome="given_up") == "fault"  # by the pod's red light
+    assert cause(flight(faults=[DeadReel()]), outcome="given_up") == "called_off"
+    assert cause(flight(faults=[DeadReel()]), outcome="given_up", reason="red light") == "fault"
 
 
 def test_a_flight_has_the_cause_of_its_last_failed_attempt(flight):
