@@ -53,7 +53,7 @@ def overview(groups: Sequence[Group]) -> str:
             _share(ax, k - 0.13, group.success, "tab:blue", "o", "any attempt" if k == 0 else None)
             _share(ax, k + 0.13, group.first_attempt, "tab:orange", "s", "first attempt" if k == 0 else None)
         ax.set_yticks(range(len(groups)), [g.label + g.mark for g in groups])
-        ax.invert_yaxis()
+        ax.set_ylim(len(groups) - 0.5, -0.5)
         ax.set_xlim(-2.0, 102.0)
         ax.set_xlabel("contact inside the limits [%], 95 % interval")
         ax.grid(axis="x", alpha=0.3)
