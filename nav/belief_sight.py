@@ -104,9 +104,13 @@ class Sight:
         """Return what the LEDs of a frame should show, and (6 + 2n, 50) its errors per error of the belief."""
         seen = self.apparent(belief)
         numbers, M, C = _with_leds(seen.M, seen.covariance, belief.P, self.points_D, sight.points_D, RING.start)
-        points = self.points_D[numbers]
-        points[:, 1:] += belief.ring.reshape(-1, 2)[numbers]
-        return Seen(R_CD=seen.R_CD, p_CD=seen.p_CD, points_D=points, C=C), M
+        return Seen(R_CD=seen.R_CD, p_CD=seen.p_CD, points_D=self.led_points_D(belief)[numbers], C=C), M
+
+    def led_points_D(self, belief: Belief) -> Array:
+        """(8, 3) places of the LEDs that are believed [m]."""
+        points_D = self.points_D.copy()
+        points_D[:, 1:] += belief.ring.reshape(-1, 2)
+        return points_D
 
     def led_pixels(self, belief: Belief, seen: Apparent, camera: Camera) -> tuple[Array, Array]:
         """Where the LEDs should be seen.
@@ -120,9 +124,7 @@ class Sight:
             (8, 2) pixels, NaN behind the camera; (8,) standard deviation of each in its worst direction [px], without
             the centroid's noise, the lens's distortion neglected.
         """
-        points_D = self.points_D.copy()
-        points_D[:, 1:] += belief.ring.reshape(-1, 2)
-        a = points_D @ seen.R_CD.T
+        a = self.led_points_D(belief) @ seen.R_CD.T
         pixels = camera.pixels_from_points(a + seen.p_CD)
         variances = _led_variances(a, seen.R_CD, seen.p_CD, seen.M, belief.P, CALIBRATION.start, RING.start)
         return pixels, camera.focal_length_px * np.sqrt(variances)

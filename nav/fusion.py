@@ -214,6 +214,10 @@ class RelativeFilter:
         x, unseen_s = self._buffer.foretold(time_s, horizon_s)
         return x[motion.S] - self._p_IP, unseen_s
 
+    def led_points_D(self, time_s: float) -> Array:
+        """(count, 3) places of the LEDs in drogue axes [m], as far as frames have shown them."""
+        return self._sight.led_points_D(self._belief(time_s))
+
     def predicted_led_pixels(self, time_s: float) -> tuple[Array, Array]:
         """Where the LEDs should be seen.
 

@@ -57,6 +57,7 @@ class NavigatorSettings:
     tip_levelling_s: float = 60.0  # of the tip's motion: gusts of 1 m/s are then taken for 0.02 m/s^2 of gravity
     heading: OwnHeadingSettings | None = None  # none: docking needs no heading, and each of its frames shows no LEDs
     led_position_sigma_m: float = 3e-4  # as-built tolerance of an LED's place on the ring; 0.3 px at 3 m
+    learnt_place_sigmas: float = 4.0  # of that tolerance: so far a learnt place is believed when a frame is tested
     #: LEDs from which on a frame is tested by itself. Of four any three fit: the range could be off by 0.3 m unseen,
     #: of five by as much near the frontal attitude. Fewer are tested with the attitude that the frames before showed.
     alone_leds: int = 6
@@ -181,7 +182,7 @@ class Navigator:
         misplaced_px = self._sheets.camera.focal_length_px * self._settings.led_position_sigma_m / p_CD[0]
         pose = solve_pose(
             seen.centroids_px,
-            self._points_D[named],
+            self._believed_points_D(time_s)[named],
             self._sheets.camera,
             sigma_px=np.hypot(seen.sigma_px, misplaced_px),
             initial=(R_CD, p_CD),
@@ -207,6 +208,16 @@ class Navigator:
                 self._ask_coasting(time_s)
         self._used_time_s = max(time_s, self._used_time_s)  # NaN before the first: the first of the two then
         return "pose used"
+
+    def _believed_points_D(self, time_s: float) -> Array:
+        """(count, 3) places of the LEDs as far as the belief has learnt them, for a frame that tests itself [m].
+
+        Each axis departs from the sheet by at most a set number of tolerances: a fault that grows too slowly for any
+        one frame to see is learnt like a place, and is then seen at last.
+        """
+        most_m = self._settings.learnt_place_sigmas * self._settings.led_position_sigma_m
+        learnt_D = self._filter.led_points_D(time_s) - self._points_D
+        return np.asarray(self._points_D + np.clip(learnt_D, -most_m, most_m))
 
     def _ask_coasting(self, time_s: float) -> None:
         """Hold what had been foretold for a frame against what is believed with it."""

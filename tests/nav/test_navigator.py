@@ -57,10 +57,11 @@ class Sky:
         self.R_BD = matrix_from_yaw_pitch_roll(0.03, -0.08, np.radians(roll_deg))
         self.window, self.tick, self.waiting = self.sheets.camera.full_window, 0, []
         self.bent_px = np.zeros((self.sheets.ring.count, 2))  # what reflections add to each LED's place
+        self.misplaced_D = np.zeros((self.sheets.ring.count, 3))  # how far each LED is off the sheet
 
     def led_pixels(self, time_s):
         m = self.sheets.mounting
-        p_BL = self.path(time_s) + m.p_BP + self.sheets.ring.positions_D @ self.R_BD.T
+        p_BL = self.path(time_s) + m.p_BP + (self.sheets.ring.positions_D + self.misplaced_D) @ self.R_BD.T
         return self.sheets.camera.pixels_from_points((p_BL - m.p_BC) @ m.R_BC)
 
     def frame(self, time_s, window):
@@ -127,6 +128,35 @@ def test_leds_that_contradict_one_another_correct_nothing(render):
     solution = sky.run(0.2)
     assert solution.status == "pose inconsistent"
     assert np.isnan(solution.frame_time_stamp_s) and sky.navigator.contact_claim() is None
+
+
+def frames_without_all_leds(seed, learnt_place_sigmas):
+    """Of 50, after 3 s on a ring whose LEDs are off the sheet by twice the tolerance that the navigator knows."""
+    sky = Sky(None, still)
+    sky.navigator = Navigator(sky.sheets, NavigatorSettings(learnt_place_sigmas=learnt_place_sigmas))
+    sky.misplaced_D[:, 1:] = 6e-4 * np.random.default_rng(seed).standard_normal((8, 2))
+    for _ in range(300):
+        step_on_leds(sky, range(8))
+    solutions = [step_on_leds(sky, range(8)) for _ in range(50)]
+    return sum(s.status != "pose used" or not np.isfinite(s.led_pixels_px).all() for s in solutions)
+
+
+@pytest.mark.parametrize("seed", [2, 3, 4, 5, 6])
+def test_frames_agree_with_themselves_on_the_places_of_leds_that_the_belief_has_learnt(seed):
+    assert frames_without_all_leds(seed, 0.0) >= 10  # asked by the sheet alone
+    assert frames_without_all_leds(seed, NavigatorSettings().learnt_place_sigmas) == 0
+
+
+def test_an_led_that_wanders_off_slower_than_any_frame_can_see_is_left_out_at_last():
+    """LED 2 goes 0.1 mm outward in a second, 6 mm in all; the fusion follows it as if its place were being learnt."""
+    sky = Sky(None, still)
+    outward_D = sky.sheets.ring.positions_D[2] / np.linalg.norm(sky.sheets.ring.positions_D[2])
+    for tick in range(6000):
+        sky.misplaced_D[2] = 1e-6 * tick * outward_D
+        solution = step_on_leds(sky, range(8))
+    assert solution.status == "pose used"
+    assert np.flatnonzero(~np.isfinite(solution.led_pixels_px).all(axis=1)).tolist() == [2]
+    assert np.abs(solution.p_PD_B - still(0.0))[1:].max() < 0.005
 
 
 def test_contact_may_be_claimed_near_and_recent_and_not_before_a_pose(render):
