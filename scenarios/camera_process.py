@@ -30,7 +30,7 @@ from dockair.sim.camera.camera import NearInfraredCamera
 from dockair.sim.camera.scene_state import SceneState, size_of
 
 _SLOTS = 4  # frames under way: two at 50 Hz and 10 ms; more when the transfer takes long
-_PIECES_AHEAD = 2  # of tables, after a frame: half a millisecond, so that the camera is idle when the next order comes
+_PIECES_AHEAD = 3  # of what comes next, after a frame: so that the camera is idle again when the next order comes
 _GOODBYE_S = 5.0  # for a process to end by itself; it has at most _SLOTS frames to finish
 
 

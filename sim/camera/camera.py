@@ -31,6 +31,7 @@ from dockair.sim.camera.electronics import digitise, output_gain
 from dockair.sim.camera.exposure import ExposureControl
 from dockair.sim.camera.fixed_pattern import FixedPattern
 from dockair.sim.camera.glare import Glare
+from dockair.sim.camera.normals_ahead import NormalsAhead
 from dockair.sim.camera.optics import PointSpread
 from dockair.sim.camera.point_sources import PointSources
 from dockair.sim.camera.radiometry import extinction_1_m, led_wavelength_m, responses
@@ -111,6 +112,7 @@ class NearInfraredCamera:
         self._sources = PointSources(model, sheets, as_built, self._response, self._sun, self._extinction_1_m)
         self._defects = Defects(camera, sheets.glare, sheets.exposure, self._faults, noise.dirt, noise.hot_pixels)
         self._pattern = FixedPattern(sheets.sensor, noise.fixed_pattern, camera.height_px, camera.width_px)
+        self._normals = NormalsAhead(noise.image, (camera.height_px, camera.width_px))
         self._control = ExposureControl(sheets.exposure, sheets.sensor, automatic=automatic_exposure)
         self._last: CameraFrame | None = None
         self._memory = np.empty(0, dtype=np.float32)  # of each frame's expected electrons: new memory takes its time
@@ -148,8 +150,9 @@ class NearInfraredCamera:
         start = window.row_start, window.column_start
         expected = self.expected_electrons(data, window, time_s, exposure_s, self._room_for(window))
         pixels = digitise(
-            expected, self._sheets.sensor, self._pattern, self._noise.image, frame_number, start, exposure_s
-        )
+            expected, self._sheets.sensor, self._pattern, self._noise.image, frame_number, start, exposure_s,
+            ahead=self._normals,
+        )  # fmt: skip
         self._defects.whiten(pixels, window, fault.hot_pixels)
         if not asked:
             self._control.step(pixels, exposure_s)
@@ -199,11 +202,11 @@ class NearInfraredCamera:
         self._last = None
 
     def work_ahead(self) -> bool:
-        """Make a little of the tables that later frames may need, in time that none waits for.
+        """Make a little of the numbers and tables that later frames may need, in time that none waits for.
 
         It says whether anything lacked, and takes a millisecond or two at most. No bit of any frame depends on it.
         """
-        return self._spread.work_ahead() or self._background.work_ahead()
+        return self._normals.work_ahead() or self._spread.work_ahead() or self._background.work_ahead()
 
     def close(self) -> None:
         """Free the OpenGL context."""

@@ -32,6 +32,7 @@ from numpy.typing import NDArray
 
 from dockair.errors import DockairError
 from dockair.sim.camera.fixed_pattern import FixedPattern
+from dockair.sim.camera.normals_ahead import NOTHING_AHEAD, NormalsAhead
 from dockair.sim.camera.pixel_noise import EXACT_BELOW_E, POISSON_CDF, POISSON_GUIDE, Chain, digitise_rows
 from dockair.sim.camera.readout import overhead_time_s, row_time_s
 from dockair.sim.camera.sheets import SensorParameters
@@ -86,6 +87,7 @@ def digitise(
     start: tuple[int, int],
     exposure_s: float,
     bits: int = OUTPUT_BITS,
+    ahead: NormalsAhead | None = None,
 ) -> NDArray[np.unsignedinteger]:
     """Return (rows, columns) grey levels of one exposure, Eqs. (1) to (4).
 
@@ -98,11 +100,15 @@ def digitise(
         start: (row, column) on the sensor of the first pixel.
         exposure_s: during which `expected` was collected.
         bits: of the result; 8 (uint8), or the converter's own (uint16: the raw frame).
+        ahead: normal numbers of the same key that may be known already; they change no bit.
 
     Raises:
         DockairError: other bits; pixels outside the pattern.
     """
     _check(expected.shape, start, pattern.shape, sensor, bits)
+    exact = sensor.read_noise_e < EXACT_BELOW_E
+    rows, columns = expected.shape
+    normals, normals_start = NOTHING_AHEAD if ahead is None or exact else ahead.of(frame_number, start, (rows, columns))
     out = np.empty(expected.shape, dtype=np.uint8 if bits == OUTPUT_BITS else np.uint16)
     digitise_rows(
         np.ascontiguousarray(expected, dtype=np.float32),
@@ -115,9 +121,11 @@ def digitise(
         start,
         (sensor.parasitic_light_sensitivity, exposure_s, overhead_time_s(sensor), row_time_s(sensor)),
         _chain(sensor, pattern, exposure_s, bits),
-        sensor.read_noise_e < EXACT_BELOW_E,
+        exact,
         POISSON_CDF,
         POISSON_GUIDE,
+        normals,
+        normals_start,
     )
     return out
 

@@ -30,7 +30,7 @@ Real = float | np.float32
 EXACT_BELOW_E = 4.0  #: read noise [e-] under which shot noise is drawn from the exact law
 POISSON_LIMIT = 30.0  #: electrons above which the exact law gives way to a normal number with the right skew
 _STEPS = 4  # tabled Poisson laws per electron
-_LANES = 64  # pixels that are worked on at once
+LANES = 64  #: pixels that are worked on at once
 _GUIDE = 64  # cells of the guide into each tabled law
 
 #: ln(1 + m) on [sqrt(1/2) - 1, sqrt(2) - 1] to 9e-6; highest power first.
@@ -161,15 +161,29 @@ def _level(m: np.float32, o: np.int8, c: np.float32, chain: Chain) -> np.int32:
     return np.int32(min(max(y, np.float32(0.0)), chain.top_dn)) >> chain.shift
 
 
+@njit(cache=True)
+def fill_normals(out: Reals, seed: np.uint32, step: np.uint32) -> None:
+    """Fill a row with z of its pixels, Eq. (2); seed and step are `row_bits`'."""
+    for i in range(out.size):
+        out[i] = normal_from_bits(mix(np.uint32(seed + np.uint32(i) * step)))
+
+
+@njit(cache=True)
+def row_bits(key: np.uint64, frame_number: int, row: int, first: int) -> tuple[np.uint32, np.uint32]:
+    """Return what the bits of a row's pixels from column `first` on begin at, and their step, Eq. (1)."""
+    bits = row_key(key, frame_number, row)
+    step = np.uint32(bits >> np.uint64(32)) | np.uint32(1)  # odd: no two columns alike
+    return np.uint32(np.uint32(bits & np.uint64(0xFFFFFFFF)) + np.uint32(first) * step), step
+
+
 @njit(cache=True, error_model="numpy")
 def _row(
     x: Reals,
+    z: Reals,
     gain: Bytes,
     offset: Bytes,
     column: Reals,
     out: Levels,
-    seed: np.uint32,
-    step: np.uint32,
     row_gain: np.float32,
     chain: Chain,
 ) -> np.int32:
@@ -179,14 +193,13 @@ def _row(
     """
     highest = np.int32(0)
     for i in range(out.size):
-        z = normal_from_bits(mix(np.uint32(seed + np.uint32(i) * step)))
         e = _electrons(x[i], gain[i], row_gain, chain)
         highest = max(highest, np.float32(e).view(np.int32))
         kept = min(e, chain.full_well_e)
         shot = e if e < chain.far_e else np.float32(0.0)
         v = np.float32(shot + chain.variance_e2)
         skew = np.float32(np.float32(0.16666667) * shot / v)
-        m = fma(skew, fma(z, z, np.float32(-1.0)), fma(np.sqrt(v), z, kept))
+        m = fma(skew, fma(z[i], z[i], np.float32(-1.0)), fma(np.sqrt(v), z[i], kept))
         out[i] = _level(m, offset[i], column[i], chain)
     return highest
 
@@ -266,30 +279,43 @@ def digitise_rows(
     exact: bool,
     cdf: Array,
     guide: NDArray[np.int16],
+    ahead: Reals,
+    ahead_start: tuple[int, int],
 ) -> None:
     """Fill `out` with the levels of a window that starts at `start`; gain, offset and column are the sensor's.
 
-    `parasitic` are P, t, the first row's wait and a row's time, of Eq. (1) there.
+    `parasitic` are P, t, the first row's wait and a row's time, of Eq. (1) there. `ahead` (rows, columns) are normal
+    numbers of this frame that are known already, from `ahead_start` on the sensor; none if they do not hold the window.
     """
     rows, columns = x.shape
     first, chain = start[1], _single(in_double)
     # A row goes on into the next, whose turn is later, up to whole lanes: single pixels take ten times as long
-    padded = min((columns + _LANES - 1) // _LANES * _LANES, gain.shape[1] - first)
-    flat, levels = x.ravel(), out.ravel()
+    padded = padded_columns(columns, first, gain.shape[1])
+    flat, levels, line = x.ravel(), out.ravel(), np.empty(padded, np.float32)
     near = np.float32(chain.near_e).view(np.int32)
     sensitivity, exposure_s, overhead_s, row_s = parasitic
+    down, right = start[0] - ahead_start[0], first - ahead_start[1]
     for r in range(rows):
         waits_s = overhead_s + (start[0] + r) * row_s
         row_gain = np.float32(1.0 + sensitivity * waits_s / exposure_s)
-        bits = row_key(key, frame_number, r + start[0])
-        step = np.uint32(bits >> np.uint64(32)) | np.uint32(1)  # odd: no two columns alike
-        seed = np.uint32(np.uint32(bits & np.uint64(0xFFFFFFFF)) + np.uint32(first) * step)
+        seed, step = row_bits(key, frame_number, r + start[0], first)
         begin, end = r * columns, min(r * columns + padded, flat.size)
         last = first + end - begin
         g, o, c = gain[r + start[0], first:last], offset[r + start[0], first:last], column[first:last]
         if exact:
             _row_exact(x[r], g, o, c, out[r], seed, step, row_gain, chain, cdf, guide)
             continue
-        highest = _row(flat[begin:end], g, o, c, levels[begin:end], seed, step, row_gain, chain)
+        z = line[: end - begin]
+        if ahead.size > 0:
+            z = ahead[r + down, right : right + end - begin]
+        else:
+            fill_normals(z, seed, step)
+        highest = _row(flat[begin:end], z, g, o, c, levels[begin:end], row_gain, chain)
         if highest >= near:
             _row_near_full_well(x[r], g, o, c, out[r], seed, step, row_gain, chain)
+
+
+@njit(cache=True)
+def padded_columns(columns: int, first: int, sensor_columns: int) -> int:
+    """How many pixels of a row are worked on: whole lanes, as far as the sensor goes."""
+    return min((columns + LANES - 1) // LANES * LANES, sensor_columns - first)
