@@ -15,9 +15,9 @@ the modes'
     s_i' <- s_i' + c_i df                                                                                 (2)
 
 A Kalman filter follows (m, d, s_i, s_i', g) from p and its rate, which is late where the drogue accelerates, since
-nobody measures that: seen is y_D' - tau_v y_D''. Its gains, which depend on nothing that is seen, are worked out
-beforehand until they stay the same. Its prediction over the response time is what a command given now can
-still meet.
+nobody measures that: seen is y_D' - tau_v y_D''. Its covariance goes on while nothing is seen: a drogue of which there
+are glimpses alone would otherwise be followed with the gains of one that is seen all the time, and the state run away.
+Its prediction over the response time is what a command given now can still meet.
 
 Not modelled: coupling of the axes, other frequencies for another length of hose, how a gust that is felt goes on, what
 the bow wave does to the overtones. Forward there is the reel: one mode, well damped, and nothing is felt.
@@ -30,7 +30,7 @@ from functools import lru_cache
 
 import numpy as np
 from numba import njit
-from scipy.linalg import expm, solve_continuous_lyapunov, solve_discrete_are
+from scipy.linalg import expm, solve_continuous_lyapunov
 
 from dockair.rotations import Array
 
@@ -79,7 +79,6 @@ class SwingSettings:
     rattle_density: tuple[float, float, float] = (0.0, 0.035, 0.035)
     drift_sigma_m_s: float = 0.4  # of d at the start: the inertial velocity's bias, twice its 0.2 m/s
     drift_kept_sigma_m_s: float = 0.1  # of d where the swing alone is begun anew: it has not changed much meanwhile
-    learning_s: float = 12.0  # after which the gains stay the same: drift and swing are told apart within a few periods
     drift_density: float = 0.03  # of d' [m/s^2/sqrt(Hz)]: the inertial velocity's drift, gusts far below the swing
     #: Of the place, and of its rate, in a tick of 0.01 s; at other rates the same white noise. The camera knows the
     #: place across to a millimetre, but for what does not change; the fusion's rate is as good as its own model of the
@@ -119,12 +118,14 @@ class DrogueMotion:
         self._A = np.stack([_dynamics(settings, axis) for axis in range(3)])
         self._F = np.stack([expm(A * step_s) for A in self._A])
         self._lead = np.stack([expm(A * lead) for A, lead in zip(self._A, self._lead_s, strict=True)])
-        self._K_begun, self._K_resumed = (
-            np.stack([_gains(settings, axis, step_s, sigma) for axis in range(3)], axis=1)
+        self._Q = np.stack([_step_noise(settings, axis, step_s) for axis in range(3)])
+        sigmas = np.array([settings.position_sigma_m, settings.rate_sigma_m_s]).T
+        self._R = sigmas**2 * (_FITTED_STEP_S / step_s)
+        self._P_begun, self._P_resumed = (
+            np.stack([_any_moment(settings, axis, sigma) for axis in range(3)])
             for sigma in (settings.drift_sigma_m_s, settings.drift_kept_sigma_m_s)
         )
-        self._K = self._K_begun
-        self._ticks = 0
+        self._P: Array = self._P_begun.copy()
         self._seen_rate = np.stack([_rate_row(settings, A) for A in self._A])
         self._rate_lag_s = settings.rate_lag_s
         self._pushed = np.stack([_held(A, step_s) for A in self._A])
@@ -135,12 +136,12 @@ class DrogueMotion:
 
     def start(self, place_m: Array, velocity_m_s: Array) -> None:
         """Begin anew, at rest but for the swing; (3,) each."""
-        self._x, self._ticks, self._K = np.zeros((3, self._states)), 0, self._K_begun
+        self._x, self._P = np.zeros((3, self._states)), self._P_begun.copy()
         self._x[:, 0], self._x[:, _FIRST + 1] = place_m, velocity_m_s
 
     def resume(self, place_m: Array) -> None:
         """Begin anew at a place (3,) where it comes into view again, whatever the swing; the drift stays as learnt."""
-        self._x[:, 0], self._x[:, _FIRST:], self._ticks, self._K = place_m, 0.0, 0, self._K_resumed
+        self._x[:, 0], self._x[:, _FIRST:], self._P = place_m, 0.0, self._P_resumed.copy()
 
     def step(self, place_m: Array | None, velocity_m_s: Array | None, push_m_s2: Array, felt_m_s: Array) -> None:
         """Advance by one control period.
@@ -152,13 +153,13 @@ class DrogueMotion:
             felt_m_s: (3,) df over the period.
         """
         seen = place_m is not None and velocity_m_s is not None
-        gains = self._K[min(self._ticks, len(self._K) - 1)]
         if place_m is None or velocity_m_s is None:
             place_m = velocity_m_s = push_m_s2  # of the right shape, and not looked at
-        rate = self._seen_rate, self._rate_lag_s
-        felt = self._felt_share, felt_m_s
-        _advance(self._x, *felt, self._F, self._pushed, push_m_s2, gains, *rate, seen, place_m, velocity_m_s)
-        self._ticks += seen
+        _foretell(self._x, self._felt_share, felt_m_s, self._F, self._pushed, push_m_s2)
+        if seen:
+            rate = self._seen_rate, self._rate_lag_s
+            _correct(self._x, self._P, self._R, *rate, push_m_s2, place_m, velocity_m_s)
+        _spread(self._P, self._F, self._Q)
 
     @property
     def drift_m_s(self) -> Array:
@@ -222,8 +223,8 @@ def _at(x, first):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _advance(x, share, felt, F, pushed, push, K, seen_rate, lag_s, seen, place, velocity):  # type: ignore[no-untyped-def]
-    """A step of the filter in place: x (3, n), share (modes, 3), F (3, n, n), pushed (3, n), K (3, n, 2)."""
+def _foretell(x, share, felt, F, pushed, push):  # type: ignore[no-untyped-def]
+    """A step of Eqs. (1) and (2) in place: x (3, n), share (modes, 3), F (3, n, n), pushed (3, n)."""
     n = x.shape[1]
     later = np.empty(n)
     for axis in range(3):
@@ -233,13 +234,51 @@ def _advance(x, share, felt, F, pushed, push, K, seen_rate, lag_s, seen, place, 
             later[i] = pushed[axis, i] * push[axis]
             for j in range(n):
                 later[i] += F[axis, i, j] * x[axis, j]
-        off, off_rate = 0.0, 0.0
-        if seen:
-            off, off_rate = place[axis] - _at(later, 0), velocity[axis] + lag_s * push[axis]
-            for j in range(n):
-                off_rate -= seen_rate[axis, j] * later[j]
+        x[axis] = later
+
+
+@njit(cache=True)
+def _correct(x, P, R, seen_rate, lag_s, push, place, velocity):  # type: ignore[no-untyped-def]
+    """Correct the state (3, n) and its covariance P (3, n, n) in place by what is seen, with variances R (3, 2)."""
+    n = x.shape[1]
+    PH = np.empty((n, 2))
+    for axis in range(3):
+        off, off_rate = place[axis] - _at(x[axis], 0), velocity[axis] + lag_s * push[axis]
         for i in range(n):
-            x[axis, i] = later[i] + K[axis, i, 0] * off + K[axis, i, 1] * off_rate
+            off_rate -= seen_rate[axis, i] * x[axis, i]
+            PH[i, 0] = _at(P[axis, i], 0)
+            PH[i, 1] = 0.0
+            for j in range(n):
+                PH[i, 1] += P[axis, i, j] * seen_rate[axis, j]
+        a, b, c = _at(PH[:, 0], 0) + R[axis, 0], _at(PH[:, 1], 0), R[axis, 1]
+        for i in range(n):
+            c += seen_rate[axis, i] * PH[i, 1]
+        whole = a * c - b * b
+        for i in range(n):
+            k, k_rate = (c * PH[i, 0] - b * PH[i, 1]) / whole, (a * PH[i, 1] - b * PH[i, 0]) / whole
+            x[axis, i] += k * off + k_rate * off_rate
+            for j in range(i + 1):
+                P[axis, i, j] -= k * PH[j, 0] + k_rate * PH[j, 1]
+                P[axis, j, i] = P[axis, i, j]
+
+
+@njit(cache=True)
+def _spread(P, F, Q):  # type: ignore[no-untyped-def]
+    """P <- F P F' + Q of each axis in place, (3, n, n)."""
+    n = P.shape[1]
+    FP = np.empty((n, n))
+    for axis in range(3):
+        for i in range(n):
+            for j in range(n):
+                FP[i, j] = 0.0
+                for k in range(n):
+                    FP[i, j] += F[axis, i, k] * P[axis, k, j]
+        for i in range(n):
+            for j in range(i + 1):
+                total = Q[axis, i, j]
+                for k in range(n):
+                    total += FP[i, k] * F[axis, j, k]
+                P[axis, i, j] = P[axis, j, i] = total
 
 
 @njit(cache=True)
@@ -306,11 +345,6 @@ def _drive(settings: SwingSettings, axis: int) -> Array:
     return np.diag(densities**2)
 
 
-def _place_row(states: int) -> Array:
-    """(n,) what is seen of the place."""
-    return np.append((np.arange(states - 1) % 2 == 0).astype(float), 0.0)
-
-
 def _rate_row(settings: SwingSettings, A: Array) -> Array:
     """(n,) what is seen of the rate, b apart: late by tau_v."""
     rate = np.append((np.arange(len(A) - 1) % 2 == 1).astype(float), 0.0)
@@ -326,21 +360,20 @@ def _held(A: Array, step_s: float) -> Array:
 
 
 @lru_cache(maxsize=24)
-def _gains(settings: SwingSettings, axis: int, step_s: float, drift_sigma_m_s: float) -> Array:
-    """(ticks, n, 2) gains of the Kalman filter tick by tick, the last for good; the step's noise by Van Loan's."""
+def _step_noise(settings: SwingSettings, axis: int, step_s: float) -> Array:
+    """(n, n) covariance of what drives Eq. (1) over a step, by Van Loan's method."""
     A, drive = _dynamics(settings, axis), _drive(settings, axis)
     n = len(A)
-    H = np.stack([_place_row(n), _rate_row(settings, A)])
     loan = expm(np.block([[-A, drive], [np.zeros_like(A), A.T]]) * step_s)
-    F = loan[n:, n:].T
-    Q, R = F @ loan[:n, n:], np.diag([settings.position_sigma_m[axis], settings.rate_sigma_m_s[axis]]) ** 2
-    R *= _FITTED_STEP_S / step_s
-    P, gains = np.zeros((n, n)), []
-    P[_FIRST:, _FIRST:] = solve_continuous_lyapunov(A[_FIRST:, _FIRST:], -drive[_FIRST:, _FIRST:])  # any moment
+    Q = loan[n:, n:].T @ loan[:n, n:]
+    return np.asarray(0.5 * (Q + Q.T))
+
+
+@lru_cache(maxsize=24)
+def _any_moment(settings: SwingSettings, axis: int, drift_sigma_m_s: float) -> Array:
+    """(n, n) covariance of a state at any moment, place and drift not known but for `drift_sigma_m_s`."""
+    A, drive = _dynamics(settings, axis), _drive(settings, axis)
+    P = np.zeros_like(A)
+    P[_FIRST:, _FIRST:] = solve_continuous_lyapunov(A[_FIRST:, _FIRST:], -drive[_FIRST:, _FIRST:])
     P[0, 0], P[1, 1] = P[_FIRST, _FIRST], drift_sigma_m_s**2
-    for _ in range(round(settings.learning_s / step_s)):
-        gains.append(P @ H.T @ np.linalg.inv(H @ P @ H.T + R))
-        P = F @ (P - gains[-1] @ H @ P) @ F.T + Q
-    P = solve_discrete_are(F.T, H.T, 0.5 * (Q + Q.T), R)
-    gains.append(P @ H.T @ np.linalg.inv(H @ P @ H.T + R))
-    return np.array(gains)
+    return P

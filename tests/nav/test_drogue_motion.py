@@ -4,11 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from filterpy.kalman import KalmanFilter
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from dockair.nav.guidance.drogue_motion import DrogueMotion, HoseMode, SwingSettings, _dynamics, _place_row
+from dockair.nav.guidance.drogue_motion import DrogueMotion, HoseMode, SwingSettings, _dynamics
 
+PLACE_ROW = np.array([1.0, 0.0] * 4 + [0.0])
 STEP_S, LEAD_S = 0.01, np.array([0.4, 0.17, 0.14])
 CALM = STILL = np.zeros(3)
 SWING = SwingSettings(  # alone, for what has a closed form for one mode only
@@ -193,7 +195,7 @@ def test_a_hose_that_is_stretched_less_swings_more_slowly():
 
 
 def test_it_learns_a_large_drift_within_two_swings():
-    """The gains of the start are those of a filter that knows that it does not know the drift yet."""
+    """At the start the filter knows that it does not know the drift yet."""
     omega, drift = 2.0 * np.pi * 0.33, np.array([0.2, -0.3, 0.3])
     t, motion = follow(
         lambda t: drift * t + 0.2 * np.sin(omega * t), lambda t: drift + 0.2 * omega * np.cos(omega * t), 6.0
@@ -260,9 +262,52 @@ def test_the_filter_answers_as_fast_at_another_control_rate(axis):
 
     def poles_1_s(hz):
         motion = DrogueMotion(SwingSettings(), 1.0 / hz, LEAD_S, 0.1)
-        H = np.stack([_place_row(9), motion._seen_rate[axis]])
-        error = (np.eye(9) - motion._K[-1, axis] @ H) @ motion._F[axis]
+        for _ in range(60 * hz):
+            motion.step(CALM, CALM, CALM, STILL)
+        H, P = np.stack([PLACE_ROW, motion._seen_rate[axis]]), motion._P[axis]
+        K = P @ H.T @ np.linalg.inv(H @ P @ H.T + np.diag(motion._R[axis]))
+        error = (np.eye(9) - K @ H) @ motion._F[axis]
         return np.sort(np.abs(np.log(np.linalg.eigvals(error)) * hz))
 
     for hz in (50, 180):
         np.testing.assert_allclose(poles_1_s(hz), poles_1_s(100), rtol=0.01)
+
+
+def test_with_gaps_it_is_the_kalman_filter_of_another_program():
+    """filterpy's, over 20 s of which a third is seen, in glimpses of any length, with a push and with what is felt."""
+    settings, rng = SwingSettings(), np.random.default_rng(4)
+    motion, others = DrogueMotion(settings, STEP_S, LEAD_S, 0.1), []
+    motion.start(np.array([4.0, 0.1, -0.2]), np.array([0.0, 0.4, 0.3]))
+    for axis in range(3):
+        other = KalmanFilter(dim_x=9, dim_z=2, dim_u=1)
+        other.F, other.Q, other.B = motion._F[axis], motion._Q[axis], motion._pushed[axis][:, np.newaxis]
+        other.H, other.R = np.stack([PLACE_ROW, motion._seen_rate[axis]]), np.diag(motion._R[axis])
+        other.x, other.P = motion._x[axis][:, np.newaxis].copy(), motion._P[axis].copy()
+        others.append(other)
+    seen = False
+    for k in range(2000):
+        seen = rng.random() < 0.1 if not seen else rng.random() < 0.8
+        place, velocity, push, felt = rng.standard_normal((4, 3)) * [[1.0], [2.0], [0.5], [0.02]]
+        motion.step(place if seen else None, velocity if seen else None, push, felt)
+        for axis, other in enumerate(others):
+            other.x[3:8:2, 0] += [mode.felt_share[axis] * felt[axis] for mode in settings.modes]
+            if k > 0:
+                other.P = other.F @ other.P @ other.F.T + other.Q
+            other.x = other.F @ other.x + other.B * push[axis]
+            if seen:
+                other.update(np.array([[place[axis]], [velocity[axis] + settings.rate_lag_s * push[axis]]]))
+        np.testing.assert_allclose(motion._x, [other.x[:, 0] for other in others], rtol=1e-7, atol=1e-9)
+
+
+def test_a_drogue_that_whips_about_and_is_seen_in_glimpses_does_not_lead_it_far_away():
+    """Rates of some metres a second that no model foresees, in glimpses: gains of steady sight made 250 km of them."""
+    rng = np.random.default_rng(5)
+    motion, farthest = DrogueMotion(SwingSettings(), STEP_S, LEAD_S, 0.1), 0.0
+    motion.start(np.array([4.0, 0.0, 0.0]), np.zeros(3))
+    for _ in range(100):
+        place, velocity = [4.0, 0.0, 0.0] + rng.uniform(-1.0, 1.0, 3), rng.uniform(-4.0, 4.0, 3)
+        for k in range(40):
+            glimpsed = k < rng.integers(1, 4)
+            motion.step(place if glimpsed else None, velocity if glimpsed else None, CALM, STILL)
+        farthest = max(farthest, float(np.abs(motion.middle_m - [4.0, 0.0, 0.0]).max()))
+    assert farthest < 10.0
