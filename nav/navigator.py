@@ -217,7 +217,7 @@ class Navigator:
         """
         most_m = self._settings.learnt_place_sigmas * self._settings.led_position_sigma_m
         learnt_D = self._filter.led_points_D(time_s) - self._points_D
-        return np.asarray(self._points_D + np.clip(learnt_D, -most_m, most_m))
+        return np.asarray(self._points_D + np.minimum(np.maximum(learnt_D, -most_m), most_m))
 
     def _ask_coasting(self, time_s: float) -> None:
         """Hold what had been foretold for a frame against what is believed with it."""
