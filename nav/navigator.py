@@ -27,6 +27,7 @@ from dockair.nav.integrity.coasting import CoastingError, CoastingSettings
 from dockair.nav.integrity.contact import ContactClaim, ContactLimits, usable_for_contact
 from dockair.nav.integrity.fault_test import IntegritySettings
 from dockair.nav.integrity.monitor import Integrity, IntegrityStatus, check_integrity
+from dockair.nav.integrity.sensitivity import moved_by_places
 from dockair.nav.pose.estimate import PoseStatus, solve_pose
 from dockair.nav.pose.measurement import lines_of_sight_from_pixels
 from dockair.nav.pose.prior import AttitudePrior
@@ -74,12 +75,15 @@ class Navigator:
 
     Raises:
         DockairError: a ring that cannot be identified, or numbered by the code it has; a horizon of coasting that the
-            filter's buffer does not hold.
+            filter's buffer does not hold; fewer than no tolerances of a learnt place.
     """
 
     def __init__(self, sheets: NavigationSheets, settings: NavigatorSettings | None = None) -> None:
         _check_ring(sheets.ring)
         self._sheets, self._settings = sheets, settings or NavigatorSettings()
+        learnt_sigmas = self._settings.learnt_place_sigmas
+        if not learnt_sigmas >= 0.0:
+            raise DockairError("navigator.learnt_place_sigmas", expected="a number, 0 or more", got=learnt_sigmas)
         horizon_s, buffer_s = self._settings.coasting.horizon_s, self._settings.fusion.buffer_s
         if not horizon_s < buffer_s:
             expected = f"less than fusion.buffer_s = {buffer_s}, in which what was foretold is kept"
@@ -98,6 +102,7 @@ class Navigator:
         self._used_time_s = self._posed_time_s = self._begun_s = float("nan")
         self._felt_time_s = 0.0
         self._integrity: Integrity | None = None
+        self._learnt_m: Array = np.zeros(3)  # what its pose owes to the LEDs' places that are learnt, camera axes
         self._coasting, self._in_basket = CoastingError(self._settings.coasting), False
         self._status = self._finder.status
         self._candidates_px: Array = np.empty((0, 2))
@@ -204,6 +209,7 @@ class Navigator:
             return "pose refused by the gate"
         if not time_s < self._posed_time_s:  # a late one corrects the belief, and the claim stays that of a newer
             self._integrity, self._posed_time_s = checked, time_s
+            self._learnt_m = moved_by_places(checked.pose, self._points_D[named[kept]])[3:]
             if self._coasting.due(time_s):
                 self._ask_coasting(time_s)
         self._used_time_s = max(time_s, self._used_time_s)  # NaN before the first: the first of the two then
@@ -247,7 +253,8 @@ class Navigator:
             return None
         offset_m = self._integrity.pose.p_CD - self._filter.predicted_pose(self._posed_time_s)[1]
         age_s = self._time_s - self._posed_time_s
-        levels = self._coasting.added(self._integrity.levels.about(offset_m), age_s, self._sigmas_to_ask_m())
+        levels = self._integrity.levels.about(offset_m).about(self._learnt_m)  # what is learnt may be a fault
+        levels = self._coasting.added(levels, age_s, self._sigmas_to_ask_m())
         return usable_for_contact(
             self._integrity, age_s, self._settings.contact, levels=levels, in_basket=self._in_basket
         )
@@ -272,7 +279,7 @@ class Navigator:
         state = self._filter.state(self._time_s)
         sigma_lateral_m = float(np.sqrt(np.linalg.eigvalsh(state.covariance[4:6, 4:6])[-1]))
         aged_s = self._time_s - self._used_time_s
-        known = is_finite(state.p_PD_B) and is_finite(state.covariance)
+        known = is_finite(state.p_PD_B) and is_finite(state.rate_PD_B) and is_finite(state.covariance)
         valid = known and sigma_lateral_m <= self._settings.usable_sigma_m and aged_s <= self._settings.usable_age_s
         claim = self.contact_claim()
         contact_usable = valid and claim is not None and claim.usable

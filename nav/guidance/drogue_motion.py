@@ -152,11 +152,8 @@ class DrogueMotion:
             push_m_s2: (3,) b.
             felt_m_s: (3,) df over the period.
         """
-        seen = place_m is not None and velocity_m_s is not None
-        if place_m is None or velocity_m_s is None:
-            place_m = velocity_m_s = push_m_s2  # of the right shape, and not looked at
         _foretell(self._x, self._felt_share, felt_m_s, self._F, self._pushed, push_m_s2)
-        if seen:
+        if place_m is not None and velocity_m_s is not None:
             rate = self._seen_rate, self._rate_lag_s
             _correct(self._x, self._P, self._R, *rate, push_m_s2, place_m, velocity_m_s)
         _spread(self._P, self._F, self._Q)

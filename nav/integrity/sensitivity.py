@@ -12,6 +12,10 @@ attitude) for one unit of what it shows is at most, over all directions b,
 
     slope_i = largest singular value of rows(K_i) C_i^-T,     S_i = C_i C_i'              (3)
 
+An LED that is taken to be d (3,) off its place moves the pose as the same error of its ray would,
+
+    sum_i P A_i' A_i [0 R]' d_i                                                                           (4)
+
 Source: R. G. Brown, A baseline GPS RAIM scheme, 1992 (slope), W. Baarda, A testing procedure for use in geodetic
 networks, 1968 (local test); a GPS satellite has one axis, an LED two.
 """
@@ -21,6 +25,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
+from dockair.nav.pose.estimate import PoseEstimate
 from dockair.nav.pose.measurement import LinesOfSight
 from dockair.rotations import Array
 
@@ -50,6 +55,21 @@ def sensitivity(sight: LinesOfSight, R_CD: Array, p_CD: Array, covariance: Array
         sight.rays, sight.weights, sight.points_D, np.ascontiguousarray(R_CD), np.ascontiguousarray(p_CD), covariance
     )
     return Sensitivity(local_chi2=local_chi2, slopes=slopes, sigmas=worst_sigmas(covariance))
+
+
+def moved_by_places(pose: PoseEstimate, places_D: Array) -> Array:
+    """(6,) of (phi, delta) by which a pose would be another with its LEDs elsewhere, Eq. (4).
+
+    Args:
+        pose: converged, with its lines of sight.
+        places_D: (n, 3) the LEDs' other places [m].
+    """
+    sight = pose.measurement
+    if sight is None:
+        raise ValueError("a pose without lines of sight")
+    R, p = np.ascontiguousarray(pose.R_CD), np.ascontiguousarray(pose.p_CD)
+    moved = (sight.points_D - places_D) @ R.T
+    return np.asarray(pose.covariance @ _information_moved(sight.rays, sight.weights, sight.points_D, R, p, moved))
 
 
 @njit(cache=True)
@@ -107,6 +127,22 @@ def _largest_singular_value(K: Array, first: int, last: int, c00: float, c10: fl
         y = (K[j, 1] - c10 * x) / c11
         g00, g01, g11 = g00 + x * x, g01 + x * y, g11 + y * y
     return float(np.sqrt(0.5 * (g00 + g11) + np.sqrt(0.25 * (g00 - g11) ** 2 + g01 * g01)))
+
+
+@njit(cache=True)
+def _information_moved(rays: Array, weights: Array, points: Array, R: Array, p: Array, moved: Array) -> Array:
+    """(6,) sum of A_i' A_i [0 I]' times how far each LED is moved (n, 3), camera axes."""
+    w, A, out = np.empty(2), np.empty((2, 6)), np.zeros(6)
+    for i in range(len(rays)):
+        a = np.zeros(3)
+        for j in range(3):
+            a[j] = R[j, 0] * points[i, 0] + R[j, 1] * points[i, 1] + R[j, 2] * points[i, 2]
+        _whitened(rays[i], weights[i], a, p, w, A)
+        for k in range(2):
+            shown = A[k, 3] * moved[i, 0] + A[k, 4] * moved[i, 1] + A[k, 5] * moved[i, 2]
+            for j in range(6):
+                out[j] += A[k, j] * shown
+    return out
 
 
 @njit(cache=True)

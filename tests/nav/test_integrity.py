@@ -15,7 +15,7 @@ from dockair.nav.integrity.contact import ContactLimits, Doubt, usable_for_conta
 from dockair.nav.integrity.fault_test import IntegritySettings, fault_test
 from dockair.nav.integrity.levels import ProtectionLevels
 from dockair.nav.integrity.monitor import Integrity, IntegrityStatus, check_integrity
-from dockair.nav.integrity.sensitivity import ATTITUDE, LATERAL, RANGE, sensitivity, worst_sigmas
+from dockair.nav.integrity.sensitivity import ATTITUDE, LATERAL, RANGE, moved_by_places, sensitivity, worst_sigmas
 from dockair.nav.pose.difference import pose_difference
 from dockair.nav.pose.estimate import PoseOptions, PoseStatus, solve_pose
 from dockair.nav.pose.measurement import lines_of_sight_from_pixels
@@ -115,6 +115,15 @@ def test_slopes_are_the_worst_of_all_directions_of_a_fault_that_was_solved(range
             moved = [abs(step[3]), np.hypot(*step[4:]), np.linalg.norm(step[:3])]
             worst = np.maximum(worst, np.array(moved) / np.sqrt(end.chi2))
         np.testing.assert_allclose(slopes[led], worst, rtol=0.01)
+
+
+@pytest.mark.parametrize(("range_m", "seen"), [(3.0, 8), (7.0, 8), (7.0, 5)])
+def test_other_places_of_leds_move_the_pose_as_solving_it_again_does(range_m, seen):
+    pixels, rng = pixels_at(*pose_at(range_m, 12.0))[:seen], np.random.default_rng(3)
+    places = RING[:seen] + 1e-6 * rng.standard_normal((seen, 3))
+    pose, again = (solve_pose(pixels, points, CAMERA, sigma_px=SIGMA_PX) for points in (RING[:seen], places))
+    moved = pose_difference(again.R_CD, again.p_CD, pose.R_CD, pose.p_CD)
+    np.testing.assert_allclose(moved_by_places(pose, places), moved, rtol=2e-3, atol=1e-3 * np.abs(moved).max())
 
 
 def test_local_test_is_what_the_cost_loses_without_the_led():
