@@ -13,9 +13,9 @@ from dockair.messages import Navigates
 from dockair.nav.guidance.announced_path import AnnouncedPathSettings
 from dockair.nav.guidance.approach import GuidanceSettings
 from dockair.nav.guidance.bow_wave_push import BowWavePush
-from dockair.nav.guidance.drogue_motion import SwingSettings
 from dockair.nav.guidance.guidance_settings import PredictiveSettings
 from dockair.nav.guidance.phases import PhaseLimits
+from dockair.nav.guidance.swing_model import SwingSettings
 from dockair.nav.heading.own_heading import OwnHeadingSettings
 from dockair.nav.navigator import Navigator, NavigatorSettings
 from dockair.parameters import load_parameters

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dockair.nav.guidance.drogue_motion import frequency_ratio
+from dockair.nav.guidance.swing_model import frequency_ratio
 from dockair.rotations import Array
 
 

@@ -1,107 +1,33 @@
-"""Where the drogue will be in a moment: its swing, estimated on the receiver's own scale (`own_path`).
+"""Where the drogue will be in a moment: its swing (`swing_model`), estimated on the receiver's own scale (`own_path`).
 
 With y_r the receiver's place by its commands and what it felt besides, y_D = p + y_r is the drogue's place on a scale
-that drifts steadily with the bias of the receiver's inertial velocity. Each axis of y_D is modelled as drift plus the
-modes i of a hose with a drogue on its end, a swing (i = 1) and two overtones, that coloured gusts g drive, each by its
-share q_i, and noise of their own; the receiver's bow wave b pushes the swing:
-
-    m' = d,   d' = noise;     s_i'' = -omega_i^2 s_i - 2 zeta_i omega_i s_i' + q_i g + noise,   b besides for i = 1
-    g' = -g/T + noise;        y_D = m + sum_i s_i                                                         (1)
-
-What a gust gives the drogue the hose takes back when the wave from the pod has come down, half a second later: that is
-the overtones' part. The gust reaches the receiver, too, and its tip is felt to change its velocity by df; with it, up,
-the modes'
-
-    s_i' <- s_i' + c_i df                                                                                 (2)
-
-A Kalman filter follows (m, d, s_i, s_i', g) from p and its rate, which is late where the drogue accelerates, since
-nobody measures that: seen is y_D' - tau_v y_D''. Its covariance goes on while nothing is seen: a drogue of which there
-are glimpses alone would otherwise be followed with the gains of one that is seen all the time, and the state run away.
-Its prediction over the response time is what a command given now can still meet.
-
-Not modelled: coupling of the axes, other frequencies for another length of hose, how a gust that is felt goes on, what
-the bow wave does to the overtones. Forward there is the reel: one mode, well damped, and nothing is felt.
-Settings: fitted to the simulated drogue (15 m of hose, 20 kg) at 180 m/s in moderate gusts, as one would to a record of
-flight; the peers' hoses and research on hose-drogue dynamics give 0.2-0.5 Hz for the swing.
+that drifts steadily with the bias of the receiver's inertial velocity: Eqs. (1) and (2) of `swing_model`. A Kalman
+filter follows their state from p and its rate, which is late where the drogue accelerates, since nobody measures that:
+seen is y_D' - tau_v y_D''. Its covariance goes on while nothing is seen: a drogue of which there are glimpses alone
+would otherwise be followed with the gains of one that is seen all the time, and the state run away. Its prediction over
+the response time is what a command given now can still meet.
 """
-
-from dataclasses import dataclass, replace
-from functools import lru_cache
 
 import numpy as np
 from numba import njit
-from scipy.linalg import expm, solve_continuous_lyapunov
+from scipy.linalg import expm
 
+from dockair.nav.guidance.swing_model import (
+    FIRST_MODE,
+    SwingSettings,
+    any_moment,
+    dynamics,
+    held_push,
+    rate_row,
+    step_noise,
+)
 from dockair.rotations import Array
 
-_FIRST = 2  # of the states: m and d, then place and rate of each mode, then g
-_FITTED_AT_PA = 10_690.0  # dynamic pressure at 180 m/s and 6000 m
-_FITTED_STEP_S = 0.01
-_STIFFENS = 0.4  # frequencies over dynamic pressure: at 120 m/s and 3000 m, 0.61 of it, 0.83 foretells best
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class HoseMode:
-    """A mode of the hose; (3,) values are forward, left, up."""
-
-    frequency_hz: tuple[float, float, float]
-    damping: tuple[float, float, float]
-    gust_density: tuple[float, float, float]  # q_i, of a g' of one [m/s^3/sqrt(Hz)]; below zero: against the swing
-    felt_share: tuple[float, float, float] = (0.0, 0.0, 0.0)  # c_i
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SwingSettings:
-    """Model of the drogue's motion; (3,) values are forward, left, up."""
-
-    modes: tuple[HoseMode, ...] = (
-        HoseMode(
-            frequency_hz=(0.44, 0.345, 0.433),
-            damping=(0.5, 0.073, 0.177),
-            gust_density=(0.7, 1.49, 4.09),
-            felt_share=(0.0, 0.0, -0.52),
-        ),
-        HoseMode(
-            frequency_hz=(0.9, 0.869, 0.865),
-            damping=(0.5, 0.03, 0.074),
-            gust_density=(0.0, -0.4, 1.76),
-            felt_share=(0.0, 0.0, -0.83),
-        ),
-        HoseMode(
-            frequency_hz=(1.5, 1.486, 1.437),
-            damping=(0.5, 0.03, 0.051),
-            gust_density=(0.0, 0.11, -1.38),
-            felt_share=(0.0, 0.0, 0.87),
-        ),
-    )
-    gust_time_s: tuple[float, float, float] = (1.2, 2.8, 0.7)  # T
-    #: Of every s_i'': what drives a mode by itself [m/s^2/sqrt(Hz)]. Forward there is the reel, and no mode.
-    rattle_density: tuple[float, float, float] = (0.0, 0.035, 0.035)
-    drift_sigma_m_s: float = 0.4  # of d at the start: the inertial velocity's bias, twice its 0.2 m/s
-    drift_kept_sigma_m_s: float = 0.1  # of d where the swing alone is begun anew: it has not changed much meanwhile
-    drift_density: float = 0.03  # of d' [m/s^2/sqrt(Hz)]: the inertial velocity's drift, gusts far below the swing
-    #: Of the place, and of its rate, in a tick of 0.01 s; at other rates the same white noise. The camera knows the
-    #: place across to a millimetre, but for what does not change; the fusion's rate is as good as its own model of the
-    #: drogue, 0.05 m/s left and 0.08 m/s up in error.
-    position_sigma_m: tuple[float, float, float] = (0.02, 0.002, 0.002)
-    rate_sigma_m_s: tuple[float, float, float] = (0.05, 0.12, 0.12)
-    rate_lag_s: float = 0.015  # tau_v: half a frame, its way here, and what the fusion's own filter needs
-
-    def at(self, dynamic_pressure_pa: float) -> "SwingSettings":
-        """Return the same for another dynamic pressure [Pa], which stretches the hose more or less across."""
-        k = frequency_ratio(dynamic_pressure_pa)
-        across = ((mode.frequency_hz[0], k * mode.frequency_hz[1], k * mode.frequency_hz[2]) for mode in self.modes)
-        modes = (replace(mode, frequency_hz=f) for mode, f in zip(self.modes, across, strict=True))
-        return replace(self, modes=tuple(modes))
-
-
-def frequency_ratio(dynamic_pressure_pa: float) -> float:
-    """Return the modes' frequencies across at a dynamic pressure [Pa], of those that the settings have."""
-    return float((dynamic_pressure_pa / _FITTED_AT_PA) ** _STIFFENS)
+_FITTED_STEP_S = 0.01  # of the settings' variances
 
 
 class DrogueMotion:
-    """Filter of Eq. (1) for three axes.
+    """Filter of the swing for three axes.
 
     Args:
         settings: the model.
@@ -114,34 +40,34 @@ class DrogueMotion:
         self._lead_s = np.asarray(lead_s)
         self._omega_rad_s = 2.0 * np.pi * np.array([mode.frequency_hz for mode in settings.modes])  # (modes, 3)
         self._felt_share = np.array([mode.felt_share for mode in settings.modes])
-        self._states = _FIRST + 2 * len(settings.modes) + 1
-        self._A = np.stack([_dynamics(settings, axis) for axis in range(3)])
+        self._states = FIRST_MODE + 2 * len(settings.modes) + 1
+        self._A = np.stack([dynamics(settings, axis) for axis in range(3)])
         self._F = np.stack([expm(A * step_s) for A in self._A])
         self._lead = np.stack([expm(A * lead) for A, lead in zip(self._A, self._lead_s, strict=True)])
-        self._Q = np.stack([_step_noise(settings, axis, step_s) for axis in range(3)])
+        self._Q = np.stack([step_noise(settings, axis, step_s) for axis in range(3)])
         sigmas = np.array([settings.position_sigma_m, settings.rate_sigma_m_s]).T
         self._R = sigmas**2 * (_FITTED_STEP_S / step_s)
         self._P_begun, self._P_resumed = (
-            np.stack([_any_moment(settings, axis, sigma) for axis in range(3)])
+            np.stack([any_moment(settings, axis, sigma) for axis in range(3)])
             for sigma in (settings.drift_sigma_m_s, settings.drift_kept_sigma_m_s)
         )
         self._P: Array = self._P_begun.copy()
-        self._seen_rate = np.stack([_rate_row(settings, A) for A in self._A])
+        self._seen_rate = np.stack([rate_row(settings, A) for A in self._A])
         self._rate_lag_s = settings.rate_lag_s
-        self._pushed = np.stack([_held(A, step_s) for A in self._A])
+        self._pushed = np.stack([held_push(A, step_s) for A in self._A])
         self._F_node = np.stack([expm(A * node_s) for A in self._A])
-        self._pushed_node = np.stack([_held(A, node_s) for A in self._A])
+        self._pushed_node = np.stack([held_push(A, node_s) for A in self._A])
         self._node_s = node_s
         self._x: Array = np.zeros((3, self._states))
 
     def start(self, place_m: Array, velocity_m_s: Array) -> None:
         """Begin anew, at rest but for the swing; (3,) each."""
         self._x, self._P = np.zeros((3, self._states)), self._P_begun.copy()
-        self._x[:, 0], self._x[:, _FIRST + 1] = place_m, velocity_m_s
+        self._x[:, 0], self._x[:, FIRST_MODE + 1] = place_m, velocity_m_s
 
     def resume(self, place_m: Array) -> None:
         """Begin anew at a place (3,) where it comes into view again, whatever the swing; the drift stays as learnt."""
-        self._x[:, 0], self._x[:, _FIRST:], self._P = place_m, 0.0, self._P_resumed.copy()
+        self._x[:, 0], self._x[:, FIRST_MODE:], self._P = place_m, 0.0, self._P_resumed.copy()
 
     def step(self, place_m: Array | None, velocity_m_s: Array | None, push_m_s2: Array, felt_m_s: Array) -> None:
         """Advance by one control period.
@@ -174,7 +100,7 @@ class DrogueMotion:
 
         Of the modes, the root of the sum of squares.
         """
-        omega, s, rate = self._omega_rad_s, self._x[:, _FIRST:-1:2].T, self._x[:, _FIRST + 1 : -1 : 2].T
+        omega, s, rate = self._omega_rad_s, self._x[:, FIRST_MODE:-1:2].T, self._x[:, FIRST_MODE + 1 : -1 : 2].T
         return np.asarray(np.linalg.norm(omega * np.hypot(omega * s, rate), axis=0))
 
     def ahead(self, push_m_s2: Array, push_then_m_s2: Array) -> tuple[Array, Array, Array]:
@@ -226,7 +152,7 @@ def _foretell(x, share, felt, F, pushed, push):  # type: ignore[no-untyped-def]
     later = np.empty(n)
     for axis in range(3):
         for mode in range(len(share)):
-            x[axis, _FIRST + 1 + 2 * mode] += share[mode, axis] * felt[axis]
+            x[axis, FIRST_MODE + 1 + 2 * mode] += share[mode, axis] * felt[axis]
         for i in range(n):
             later[i] = pushed[axis, i] * push[axis]
             for j in range(n):
@@ -308,8 +234,8 @@ def _go_on(x, lead, lead_s, F, pushed, push, out):  # type: ignore[no-untyped-de
             for j in range(n):
                 state[i] += lead[axis, i, j] * x[axis, j]
         tau, now, then = lead_s[axis], push[0, axis], push[1, axis]
-        state[_FIRST] += tau * tau * (now / 3.0 + then / 6.0)
-        state[_FIRST + 1] += 0.5 * tau * (now + then)
+        state[FIRST_MODE] += tau * tau * (now / 3.0 + then / 6.0)
+        state[FIRST_MODE + 1] += 0.5 * tau * (now + then)
         for k in range(len(out)):
             b = 0.5 * (push[k + 1, axis] + push[k + 2, axis])
             for i in range(n):
@@ -318,59 +244,3 @@ def _go_on(x, lead, lead_s, F, pushed, push, out):  # type: ignore[no-untyped-de
                     later[i] += F[axis, i, j] * state[j]
             state[:] = later
             out[k, axis] = _at(state, 0)
-
-
-def _dynamics(settings: SwingSettings, axis: int) -> Array:
-    """(n, n) A of Eq. (1), b apart."""
-    n = _FIRST + 2 * len(settings.modes) + 1
-    A = np.zeros((n, n))
-    A[0, 1] = 1.0
-    for i, mode in enumerate(settings.modes):
-        omega, s = 2.0 * np.pi * mode.frequency_hz[axis], _FIRST + 2 * i
-        A[s, s + 1] = 1.0
-        A[s + 1, s : s + 2] = -(omega**2), -2.0 * mode.damping[axis] * omega
-        A[s + 1, -1] = mode.gust_density[axis]
-    A[-1, -1] = -1.0 / settings.gust_time_s[axis]
-    return A
-
-
-def _drive(settings: SwingSettings, axis: int) -> Array:
-    """(n, n) densities, squared, of what drives Eq. (1); that of g' is one."""
-    densities = np.zeros(_FIRST + 2 * len(settings.modes) + 1)
-    densities[1], densities[_FIRST + 1 : -1 : 2] = settings.drift_density, settings.rattle_density[axis]
-    densities[-1] = 1.0
-    return np.diag(densities**2)
-
-
-def _rate_row(settings: SwingSettings, A: Array) -> Array:
-    """(n,) what is seen of the rate, b apart: late by tau_v."""
-    rate = np.append((np.arange(len(A) - 1) % 2 == 1).astype(float), 0.0)
-    return np.asarray(rate - settings.rate_lag_s * (rate @ A))
-
-
-def _held(A: Array, step_s: float) -> Array:
-    """(n,) what an acceleration of the swing of one, held for a step, adds to the state."""
-    n = len(A)
-    augmented = np.zeros((n + 1, n + 1))
-    augmented[:n, :n], augmented[_FIRST + 1, n] = A, 1.0
-    return np.asarray(expm(augmented * step_s)[:n, n])
-
-
-@lru_cache(maxsize=24)
-def _step_noise(settings: SwingSettings, axis: int, step_s: float) -> Array:
-    """(n, n) covariance of what drives Eq. (1) over a step, by Van Loan's method."""
-    A, drive = _dynamics(settings, axis), _drive(settings, axis)
-    n = len(A)
-    loan = expm(np.block([[-A, drive], [np.zeros_like(A), A.T]]) * step_s)
-    Q = loan[n:, n:].T @ loan[:n, n:]
-    return np.asarray(0.5 * (Q + Q.T))
-
-
-@lru_cache(maxsize=24)
-def _any_moment(settings: SwingSettings, axis: int, drift_sigma_m_s: float) -> Array:
-    """(n, n) covariance of a state at any moment, place and drift not known but for `drift_sigma_m_s`."""
-    A, drive = _dynamics(settings, axis), _drive(settings, axis)
-    P = np.zeros_like(A)
-    P[_FIRST:, _FIRST:] = solve_continuous_lyapunov(A[_FIRST:, _FIRST:], -drive[_FIRST:, _FIRST:])
-    P[0, 0], P[1, 1] = P[_FIRST, _FIRST], drift_sigma_m_s**2
-    return P

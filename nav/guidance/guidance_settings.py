@@ -8,9 +8,9 @@ import numpy as np
 from dockair.nav.guidance.announced_path import AnnouncedPathSettings
 from dockair.nav.guidance.bow_wave_push import BowWavePush
 from dockair.nav.guidance.closing import ClosingSettings
-from dockair.nav.guidance.drogue_motion import SwingSettings
 from dockair.nav.guidance.path_plan import PlanSettings
 from dockair.nav.guidance.phases import PhaseLimits
+from dockair.nav.guidance.swing_model import SwingSettings
 from dockair.rotations import Array
 
 ControllerName = Literal["predictive", "pid"]

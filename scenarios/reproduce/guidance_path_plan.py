@@ -1,6 +1,6 @@
 """What planning for the moment of contact is worth: a drogue that swings as a filter believes, followed and met.
 
-The drogue's paths are Eq. (1) of `nav.guidance.drogue_motion`, of the swing alone, driven by white noise; the filter
+The drogue's paths are Eq. (1) of `nav.guidance.swing_model`, of the swing alone, driven by white noise; the filter
 sees them as well as a camera shows them, and the plan flies what the filter predicts, a response time ahead. Every few
 seconds a contact is due: the miss is the distance across at that moment.
 
@@ -13,8 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from dockair.nav.guidance.drogue_motion import DrogueMotion, HoseMode, SwingSettings
+from dockair.nav.guidance.drogue_motion import DrogueMotion
 from dockair.nav.guidance.path_plan import PathPlan, PlanSettings
+from dockair.nav.guidance.swing_model import HoseMode, SwingSettings
 from dockair.rotations import Array
 from dockair.scenarios.reproduce.reference import picture_name
 

@@ -8,7 +8,8 @@ from filterpy.kalman import KalmanFilter
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from dockair.nav.guidance.drogue_motion import DrogueMotion, HoseMode, SwingSettings, _dynamics
+from dockair.nav.guidance.drogue_motion import DrogueMotion
+from dockair.nav.guidance.swing_model import HoseMode, SwingSettings, dynamics
 
 PLACE_ROW = np.array([1.0, 0.0] * 4 + [0.0])
 STEP_S, LEAD_S = 0.01, np.array([0.4, 0.17, 0.14])
@@ -120,14 +121,14 @@ def test_prediction_is_as_good_as_its_own_covariance_says():
     """
     settings, rng, ticks, states = SwingSettings(), np.random.default_rng(2), 60_000, 9
     place, rate = np.array([1.0, 0.0] * 4 + [0.0]), np.array([0.0, 1.0] * 4 + [0.0])
-    H = [np.stack([place, rate - settings.rate_lag_s * (rate @ _dynamics(settings, axis))]) for axis in range(3)]
+    H = [np.stack([place, rate - settings.rate_lag_s * (rate @ dynamics(settings, axis))]) for axis in range(3)]
     sigmas = np.array(list(zip(settings.position_sigma_m, settings.rate_sigma_m_s, strict=True)))  # (3, 2)
     lead, F, expected = np.round(LEAD_S / STEP_S).astype(int), [], []
     densities = np.zeros((3, states))
     densities[:, 1], densities[:, 8] = settings.drift_density, 1.0
     densities[:, 3:8:2] = np.array(settings.rattle_density)[:, np.newaxis]
     for axis in range(3):
-        F.append(expm(_dynamics(settings, axis) * STEP_S))
+        F.append(expm(dynamics(settings, axis) * STEP_S))
         Q, P = np.diag(densities[axis] ** 2) * STEP_S, np.eye(states)
         for _ in range(6000):
             P = F[-1] @ P @ F[-1].T + Q

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from dockair.nav.guidance.drogue_motion import SwingSettings
+from dockair.nav.guidance.swing_model import SwingSettings
 from dockair.parameters import load_parameters
 from dockair.sim.air.atmosphere import standard_atmosphere
 from dockair.sim.hose.chain import DrogueParameters, HoseParameters
