@@ -18,6 +18,7 @@ q is estimated from the candidates that are no members, a kernel each, and from 
 are taken as independent; a reflection of each LED, as bright as its LED and in a ring, is beyond this.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -75,26 +76,44 @@ def brightness_model(flux: Array, settings: BrightnessSettings, spread: float = 
     """
     known = np.isfinite(flux) & (flux > 0.0)
     x = np.log(flux, where=known, out=np.zeros(len(flux)))
-    middle = _median(x[known]) if known.any() else 0.0
-    x = np.where(known, x, middle)
-    x = np.minimum(np.maximum(x, middle - settings.mean_range), middle + settings.mean_range)
+    faintest, brightest = _bound(x, known, settings.mean_range)
     sigma = float(np.hypot(settings.sigma, spread))
     step, margin = _STEP_SIGMAS * sigma, _MARGIN_SIGMAS * sigma
-    mu = np.arange(x.min() - margin, x.max() + margin + step, step)
+    mu = np.arange(faintest - margin, brightest + margin + step, step)
     return BrightnessModel(
-        led=_normal(x[:, None] - mu, sigma), kernel=_normal(x[:, None] - x, settings.kernel) * known, known=known,
+        led=_normal(x, mu, sigma), kernel=_normal(x, x, settings.kernel) * known, known=known,
         step=step, settings=settings,
     )  # fmt: skip
 
 
-def _median(x: Array) -> float:
-    """Of a few numbers; NumPy's own costs ten times as much."""
-    x = np.sort(x)
-    return 0.5 * float(x[(len(x) - 1) // 2] + x[len(x) // 2])
+@njit(cache=True)
+def _bound(x, known, reach):  # type: ignore[no-untyped-def]
+    """Bring x (n,) within reach of the median of those known, the others to it; the least and the largest."""
+    middle = 0.0
+    if known.any():
+        ordered = np.sort(x[known])
+        middle = 0.5 * (ordered[(len(ordered) - 1) // 2] + ordered[len(ordered) // 2])
+    for k in range(len(x)):
+        x[k] = min(max(x[k] if known[k] else middle, middle - reach), middle + reach)
+    return x.min(), x.max()
 
 
-def _normal(deviation: Array, sigma: float) -> Array:
-    return np.asarray(np.exp(-0.5 * (deviation / sigma) ** 2) / (np.sqrt(2.0 * np.pi) * sigma))
+def _normal(x: Array, mean: Array, sigma: float) -> Array:
+    """(n, m) density at x (n,) of normals about means (m,)."""
+    density = _exponents(x, mean, sigma)
+    np.exp(density, out=density)  # the library's, whose digits are others than those of a kernel's
+    density /= math.sqrt(2.0 * math.pi) * sigma
+    return density
+
+
+@njit(cache=True)
+def _exponents(x: Array, mean: Array, sigma: float) -> Array:
+    """(n, m) of `_normal`."""
+    exponents = np.empty((len(x), len(mean)))
+    for i in range(len(x)):
+        for j in range(len(mean)):
+            exponents[i, j] = -0.5 * ((x[i] - mean[j]) / sigma) ** 2
+    return exponents
 
 
 @njit(cache=True)

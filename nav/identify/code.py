@@ -13,7 +13,7 @@ weighed by the clutter about (`chance`).
 Left out: flux is not corrected for the pattern's fall with the angle, which all LEDs share but for perspective.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,16 +43,13 @@ class Code:
     offset_rad: Array  #: (8,) of each LED from its place, 0 when it is there
     log_brightness: Array | None  #: (8,)
     settings: CodeSettings
+    displaced: NDArray[np.int64] = field(init=False)  #: numbers of the LEDs off their place
+    says_something: bool = field(init=False)  #: whether there is a code at all
 
-    @property
-    def displaced(self) -> NDArray[np.int64]:
-        """Numbers of the LEDs off their place."""
-        return np.flatnonzero(self.offset_rad)
-
-    @property
-    def says_something(self) -> bool:
-        """Whether there is a code at all."""
-        return len(self.displaced) > 0 or self.log_brightness is not None
+    def __post_init__(self) -> None:
+        displaced = np.flatnonzero(self.offset_rad)
+        object.__setattr__(self, "displaced", displaced)
+        object.__setattr__(self, "says_something", len(displaced) > 0 or self.log_brightness is not None)
 
     @property
     def is_the_same_turned(self) -> bool:

@@ -95,10 +95,11 @@ def _named(points, predicted, radius, reach, rival):  # type: ignore[no-untyped-
 
 
 @njit(cache=True)
-def _compared(points, member, predicted, slots, centre):  # type: ignore[no-untyped-def]
-    """Roll of a ring fitted to the members, how far its centre is from the prediction's, and `_shape_error`."""
+def _compared(points, member, kept, predicted, slots, centre):  # type: ignore[no-untyped-def]
+    """Whether a fit to the members has kept just them, its roll, how far its centre is off, and `_shape_error`."""
     u, v = predicted[:, 0].mean(), predicted[:, 1].mean()
-    return _roll_and_radius(slots)[0], np.hypot(centre[0] - u, centre[1] - v), _shape_error(points, member, predicted)
+    off = np.hypot(centre[0] - u, centre[1] - v)
+    return (kept == member).all(), _roll_and_radius(slots)[0], off, _shape_error(points, member, predicted)
 
 
 @njit(cache=True)
@@ -181,11 +182,13 @@ def followed_ring(
         tolerance_per_radius=settings.tolerance_sigmas * settings.ring_sigma,
         max_tilt_rad=settings.max_tilt_rad,
     )  # fmt: skip
-    roll, off_px, shape_error_px = _compared(points, member, predicted_px, fit.slots_px, fit.centre_px)
+    same, roll, off_px, shape_error_px = _compared(
+        points, member, fit.candidate, predicted_px, fit.slots_px, fit.centre_px
+    )
     wanted_rad = believed_rad if roll_rad is None or not math.isfinite(roll_rad) else roll_rad
     shape_px = settings.predicted_shape_tolerance * radius_px + settings.predicted_shape_sigmas * sigma_px
     if not (
-        (fit.candidate == member).all()
+        same
         and fit.tilt_rad <= settings.max_tilt_rad
         and abs(fit.radius_px - radius_px) <= settings.predicted_radius_tolerance * radius_px
         and off_px <= reach_px

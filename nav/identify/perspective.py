@@ -73,24 +73,21 @@ def fit_ring(
         tolerance_per_radius: for the LEDs' own position errors [px/px].
         max_tilt_rad: of the two poses one beyond it gives way.
     """
-    middle = np.array(principal_point_px)
-    relative = (points - middle) / focal_length_px
-    chosen, pose, squares, tolerance, image = fit_members(
-        relative, candidate, tolerance_px / focal_length_px, tolerance_per_radius, math.cos(max_tilt_rad)
-    )
-    image = image * focal_length_px + middle
-    freedom = 2 * int(np.count_nonzero(chosen >= 0)) - 6
+    chosen, pose, image, rms_px, largest_px = fit_members(
+        points, candidate, focal_length_px, principal_point_px, tolerance_px, tolerance_per_radius,
+        math.cos(max_tilt_rad),
+    )  # fmt: skip
     return RingFit(
         candidate=chosen,
         slots_px=image[:SLOTS],
         centre_px=image[SLOTS],
         radius_px=float(focal_length_px / pose[0, 0]),
         tilt_rad=math.acos(min(1.0, max(-1.0, facing(pose)))),
-        tolerance_px=float(tolerance * focal_length_px),
+        tolerance_px=largest_px,
         pose=pose,
         focal_length_px=focal_length_px,
         principal_point_px=principal_point_px,
-        rms_px=math.sqrt(squares / freedom) * focal_length_px if freedom > 0 else 0.0,
+        rms_px=rms_px,
     )
 
 

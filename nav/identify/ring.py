@@ -45,6 +45,7 @@ from dockair.nav.identify.perspective import SLOTS, RingFit, undistorted
 from dockair.nav.identify.prior import ANYWHERE_PX, RingPrior, make_prior
 from dockair.nav.identify.result import Identification, IdentificationStatus, nothing
 from dockair.rotations import Array
+from dockair.vectors import is_finite
 
 __all__ = ["METHODS", "Identification", "IdentificationStatus", "IdentifySettings", "identify"]
 
@@ -137,7 +138,7 @@ def _checked(centroids_px: Array, brightness: Array | None, method: str, ring: L
 
 def _is_prediction(led_px: Array | None) -> TypeGuard[Array]:
     """Whether it says where every LED is."""
-    return led_px is not None and np.shape(led_px) == (SLOTS, 2) and bool(np.isfinite(led_px).all())
+    return led_px is not None and np.shape(led_px) == (SLOTS, 2) and is_finite(led_px)
 
 
 def _found(

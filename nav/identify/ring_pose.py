@@ -246,7 +246,7 @@ def _drop_outliers(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def fit_members(points, first_candidate, tolerance, tolerance_per_radius, min_facing):  # type: ignore[no-untyped-def]
+def _members(points, first_candidate, tolerance, tolerance_per_radius, min_facing):  # type: ignore[no-untyped-def]
     """Candidates (8,), pose (3, 3), squared residuals, largest residual allowed, image (9, 2): focal length 1."""
     candidate = first_candidate.copy()
     pose, squares = _best_pose(points, candidate, min_facing)
@@ -261,3 +261,37 @@ def fit_members(points, first_candidate, tolerance, tolerance_per_radius, min_fa
             candidate = collected
             pose, squares = _best_pose(points, candidate, min_facing)
     return _drop_outliers(points, candidate, pose, squares, tolerance, tolerance_per_radius, min_facing)
+
+
+@njit(cache=True)
+def fit_members(  # type: ignore[no-untyped-def]
+    points_px, first_candidate, focal_px, middle_px, tolerance_px, tolerance_per_radius, min_facing
+):
+    """The pose of a ring, and the candidates that are on it.
+
+    Args:
+        points_px: (n, 2) all candidates.
+        first_candidate: (8,) which of them is in each slot at first, -1 for none.
+        focal_px: focal length.
+        middle_px: principal point.
+        tolerance_px: largest residual; to it comes, root of the sum of squares,
+        tolerance_per_radius: for the LEDs' own position errors [px/px].
+        min_facing: cosine of the largest tilt, as of `facing`.
+
+    Returns:
+        candidates (8,), pose (3, 3), image (9, 2) of the slots and the centre [px], root of the squared residuals over
+        the degrees of freedom and largest residual allowed [px].
+    """
+    points = np.empty(points_px.shape)
+    for k in range(len(points)):
+        points[k, 0] = (points_px[k, 0] - middle_px[0]) / focal_px
+        points[k, 1] = (points_px[k, 1] - middle_px[1]) / focal_px
+    candidate, pose, squares, limit, image = _members(
+        points, first_candidate, tolerance_px / focal_px, tolerance_per_radius, min_facing
+    )
+    for s in range(SLOTS + 1):
+        image[s, 0] = image[s, 0] * focal_px + middle_px[0]
+        image[s, 1] = image[s, 1] * focal_px + middle_px[1]
+    freedom = 2 * (candidate >= 0).sum() - 6
+    rms = np.sqrt(squares / freedom) if freedom > 0 else 0.0
+    return candidate, pose, image, rms * focal_px, limit * focal_px
