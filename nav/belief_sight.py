@@ -124,10 +124,10 @@ class Sight:
             (8, 2) pixels, NaN behind the camera; (8,) standard deviation of each in its worst direction [px], without
             the centroid's noise, the lens's distortion neglected.
         """
-        a = self.led_points_D(belief) @ seen.R_CD.T
-        pixels = camera.pixels_from_points(a + seen.p_CD)
-        variances = _led_variances(a, seen.R_CD, seen.p_CD, seen.M, belief.P, CALIBRATION.start, RING.start)
-        return pixels, camera.focal_length_px * np.sqrt(variances)
+        ab, sigma = _leds_seen(
+            self.points_D, belief.ring, seen.R_CD, seen.p_CD, seen.M, belief.P, CALIBRATION.start, RING.start
+        )
+        return camera.pixels_from_slopes(ab), camera.focal_length_px * sigma
 
 
 @njit(cache=True, error_model="numpy")
@@ -198,30 +198,61 @@ def _with_leds(
 @njit(cache=True, error_model="numpy")
 def _led_variances(a: Array, R_CD: Array, p_CD: Array, M: Array, P: Array, turn: int, ring: int) -> Array:
     """(n,) largest variance of the image, focal length 1, of LEDs at a (n, 3) from the ring's centre, NaN behind."""
-    columns, H, HP, out = np.empty(15, np.int64), np.empty((2, 15)), np.empty((2, 15)), np.full(len(a), np.nan)
-    for i in range(13):  # columns of M that are not zero, then the LED's own
-        columns[i] = i if i < 6 else turn + i - 6
+    columns, m, Q = np.empty(15, np.int64), np.empty((6, 13)), np.empty((15, 15))
+    H, HP, out = np.empty((2, 15)), np.empty((2, 15)), np.full(len(a), np.nan)
+    for b in range(13):  # columns of M that are not zero; the LED's own follow
+        columns[b] = b if b < 6 else turn + b - 6
+        for i in range(6):
+            m[i, b] = M[i, columns[b]]
+        for c in range(b + 1):
+            Q[b, c], Q[c, b] = P[columns[b], columns[c]], P[columns[c], columns[b]]
     for k in range(len(a)):
         x, y, z = a[k, 0] + p_CD[0], a[k, 1] + p_CD[1], a[k, 2] + p_CD[2]
         if not x > 0.0:
             continue
-        columns[13], columns[14] = ring + 2 * k, ring + 2 * k + 1
+        for b in (13, 14):
+            columns[b] = ring + 2 * k + b - 13
+            for c in range(b + 1):
+                Q[b, c], Q[c, b] = P[columns[b], columns[c]], P[columns[c], columns[b]]
         for i in range(2):
             g0, g1, g2 = (y if i == 0 else z) / x**2, (-1.0 / x if i == 0 else 0.0), (-1.0 / x if i == 1 else 0.0)
             t0, t1, t2 = g2 * a[k, 1] - g1 * a[k, 2], g0 * a[k, 2] - g2 * a[k, 0], g1 * a[k, 0] - g0 * a[k, 1]
             for c in range(13):
-                m = M[:, columns[c]]
-                H[i, c] = t0 * m[0] + t1 * m[1] + t2 * m[2] + g0 * m[3] + g1 * m[4] + g2 * m[5]
+                H[i, c] = t0 * m[0, c] + t1 * m[1, c] + t2 * m[2, c] + g0 * m[3, c] + g1 * m[4, c] + g2 * m[5, c]
             for c in range(2):
                 H[i, 13 + c] = g0 * R_CD[0, 1 + c] + g1 * R_CD[1, 1 + c] + g2 * R_CD[2, 1 + c]
-        for i in range(2):
+        HP[:] = 0.0
+        uu, uv, vv = 0.0, 0.0, 0.0
+        for b in range(15):
             for c in range(15):
-                HP[i, c] = 0.0
-                for b in range(15):
-                    HP[i, c] += H[i, b] * P[columns[b], columns[c]]
-        uu, uv, vv = (HP[0] * H[0]).sum(), (HP[0] * H[1]).sum(), (HP[1] * H[1]).sum()
+                HP[0, c] += H[0, b] * Q[b, c]
+                HP[1, c] += H[1, b] * Q[b, c]
+        for c in range(15):
+            uu += HP[0, c] * H[0, c]
+            uv += HP[0, c] * H[1, c]
+            vv += HP[1, c] * H[1, c]
         out[k] = 0.5 * (uu + vv) + np.sqrt(0.25 * (uu - vv) ** 2 + uv**2)  # eigenvalue
     return out
+
+
+@njit(cache=True, error_model="numpy")
+def _leds_seen(
+    points_D: Array, off: Array, R_CD: Array, p_CD: Array, M: Array, P: Array, turn: int, ring: int
+) -> tuple[Array, Array]:
+    """(n, 2) images (-y/x, -z/x) of LEDs, NaN behind the camera, and (n,) the roots of `_led_variances`.
+
+    Their places points_D (n, 3) are off by `off` (2n,) in the ring's plane; the product is the library's.
+    """
+    places, ab = points_D.copy(), np.full((len(points_D), 2), np.nan)
+    for k in range(len(places)):
+        places[k, 1] += off[2 * k]
+        places[k, 2] += off[2 * k + 1]
+    a = np.dot(places, R_CD.T)
+    for k in range(len(places)):
+        x = a[k, 0] + p_CD[0]
+        if x > 0.0:
+            ab[k, 0], ab[k, 1] = -(a[k, 1] + p_CD[1]) / x, -(a[k, 2] + p_CD[2]) / x
+    return ab, np.sqrt(_led_variances(a, R_CD, p_CD, M, P, turn, ring))
 
 
 def ring_sensitivity(R_CD: Array, p_CD: Array, points_D: Array) -> Array:

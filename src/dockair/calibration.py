@@ -134,7 +134,10 @@ class Camera:
         """(n, 2) pixels (u, v) of points p_C (n, 3) [m] in camera axes; NaN where x <= 0 (behind the camera)."""
         p_C = np.asarray(p_C, dtype=float).reshape(-1, 3)
         x = p_C[:, :1]
-        ab: Array = -p_C[:, 1:] / np.where(x > 0.0, x, np.nan)
+        return self.pixels_from_slopes(-p_C[:, 1:] / np.where(x > 0.0, x, np.nan))
+
+    def pixels_from_slopes(self, ab: Array) -> Array:
+        """(n, 2) pixels (u, v) of points whose (-y/x, -z/x) in camera axes is ab (n, 2)."""
         if self.distortion is not None:
             ab = _distort(ab, self.distortion)
         return np.asarray(self.focal_length_px * ab + self.principal_point_px)
