@@ -196,24 +196,29 @@ def _with_leds(
 
 
 @njit(cache=True, error_model="numpy")
+def _take(P: Array, columns: NDArray[np.int64], first: int, stop: int, Q: Array) -> None:
+    """Put what the columns first to stop - 1 of those chosen have in P with all before them into Q (15, 15)."""
+    for b in range(first, stop):
+        for c in range(b + 1):
+            Q[b, c], Q[c, b] = P[columns[b], columns[c]], P[columns[c], columns[b]]
+
+
+@njit(cache=True, error_model="numpy")
 def _led_variances(a: Array, R_CD: Array, p_CD: Array, M: Array, P: Array, turn: int, ring: int) -> Array:
     """(n,) largest variance of the image, focal length 1, of LEDs at a (n, 3) from the ring's centre, NaN behind."""
     columns, m, Q = np.empty(15, np.int64), np.empty((6, 13)), np.empty((15, 15))
     H, HP, out = np.empty((2, 15)), np.empty((2, 15)), np.full(len(a), np.nan)
-    for b in range(13):  # columns of M that are not zero; the LED's own follow
-        columns[b] = b if b < 6 else turn + b - 6
+    for c in range(13):  # columns of M that are not zero; the LED's own follow
+        columns[c] = c if c < 6 else turn + c - 6
         for i in range(6):
-            m[i, b] = M[i, columns[b]]
-        for c in range(b + 1):
-            Q[b, c], Q[c, b] = P[columns[b], columns[c]], P[columns[c], columns[b]]
+            m[i, c] = M[i, columns[c]]
+    _take(P, columns, 0, 13, Q)
     for k in range(len(a)):
         x, y, z = a[k, 0] + p_CD[0], a[k, 1] + p_CD[1], a[k, 2] + p_CD[2]
         if not x > 0.0:
             continue
-        for b in (13, 14):
-            columns[b] = ring + 2 * k + b - 13
-            for c in range(b + 1):
-                Q[b, c], Q[c, b] = P[columns[b], columns[c]], P[columns[c], columns[b]]
+        columns[13], columns[14] = ring + 2 * k, ring + 2 * k + 1
+        _take(P, columns, 13, 15, Q)
         for i in range(2):
             g0, g1, g2 = (y if i == 0 else z) / x**2, (-1.0 / x if i == 0 else 0.0), (-1.0 / x if i == 1 else 0.0)
             t0, t1, t2 = g2 * a[k, 1] - g1 * a[k, 2], g0 * a[k, 2] - g2 * a[k, 0], g1 * a[k, 0] - g0 * a[k, 1]
