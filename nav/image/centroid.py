@@ -99,18 +99,13 @@ def measure_blobs(
         local_background: take b around each blob instead, where there is enough of it.
         windowed: Eqs. (4) and (5), else (1) and (2).
     """
-    thresholds, backgrounds = np.empty(runs.count, np.int64), np.empty(runs.count)
-    thresholds[:], backgrounds[:] = threshold, background_dn
-    table = measure(
+    thresholds = threshold if isinstance(threshold, np.ndarray) else np.full(runs.count, threshold, np.int64)
+    backgrounds = background_dn if isinstance(background_dn, np.ndarray) else np.full(runs.count, background_dn, float)
+    centroids_px, sigma_px, flux, peak, elongation, clipped = measure(
         np.ascontiguousarray(image), runs.row, runs.start, runs.stop, runs.offset, thresholds,
         (noise.gain_dn_per_electron, noise.noise_dn, noise.response_spread),
         (noise.floor_px, noise.clipped_floor_px), backgrounds, local_background, windowed, noise.saturation_dn,
     )  # fmt: skip
     return BlobMeasurements(
-        centroids_px=table[:, :2].copy(),
-        sigma_px=table[:, 2].copy(),
-        flux=table[:, 3].copy(),
-        peak=table[:, 4].astype(np.int64),
-        clipped=table[:, 6] > 0.0,
-        elongation=table[:, 5].copy(),
+        centroids_px=centroids_px, sigma_px=sigma_px, flux=flux, peak=peak, clipped=clipped, elongation=elongation
     )

@@ -135,13 +135,27 @@ def _start(image, patch, top, left, threshold, saturation):  # type: ignore[no-u
 
 
 @njit(cache=True)
-def _window_sums(image, patch, top, left, u, v, radius, model, background, texture):  # type: ignore[no-untyped-def]
-    """Sums of Eqs. (4) to (6).
+def _equation(image, patch, top, left, u, v, radius, background):  # type: ignore[no-untyped-def]
+    """Eq. (4) and its derivative J, of both coordinates: the sums of every step."""
+    eu, ev, ju, jv = 0.0, 0.0, 0.0, 0.0
+    for i in range(max(int(np.ceil(v - radius)), 0), min(int(v + radius) + 1, patch.shape[0])):
+        for j in range(max(int(np.ceil(u - radius)), 0), min(int(u + radius) + 1, patch.shape[1])):
+            dv, du = i - v, j - u
+            root = 1.0 - (du * du + dv * dv) / radius**2
+            if root <= 0.0 or not patch[i, j]:
+                continue
+            G, w = root * root, image[top + i, left + j] - background
+            eu += G * w * du
+            ev += G * w * dv
+            ju += w * (G - 4.0 * root * du * du / radius**2)
+            jv += w * (G - 4.0 * root * dv * dv / radius**2)
+    return eu, ev, ju, jv
 
-    Of both coordinates: equation, derivative, variance of the equation; second moments uu, vv, uv; the sum of their
-    weights; their variance.
-    """
-    sums = np.zeros(11)
+
+@njit(cache=True)
+def _spread(image, patch, top, left, u, v, radius, model, background, texture):  # type: ignore[no-untyped-def]
+    """Variances of Eq. (4) in both coordinates, and that of a coordinate by what the spot has merged with, Eq. (6)."""
+    var_u, var_v, uu, vv, uv, weight, noise = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(max(int(np.ceil(v - radius)), 0), min(int(v + radius) + 1, patch.shape[0])):
         for j in range(max(int(np.ceil(u - radius)), 0), min(int(u + radius) + 1, patch.shape[1])):
             dv, du = i - v, j - u
@@ -151,30 +165,19 @@ def _window_sums(image, patch, top, left, u, v, radius, model, background, textu
             level = float(image[top + i, left + j])
             G, w = root * root, level - background
             variance = _variance(level, background, model, texture)
-            sums[6] += G * w * du * du  # of all pixels in the window, whatever they belong to
-            sums[7] += G * w * dv * dv
-            sums[8] += G * w * du * dv
-            sums[9] += G * w
+            uu += G * w * du * du  # of all pixels in the window, whatever they belong to
+            vv += G * w * dv * dv
+            uv += G * w * du * dv
+            weight += G * w
             # structure beside the LED is what is looked for here, not noise
-            sums[10] += (G * (du * du + dv * dv)) ** 2 * (variance - texture)
-            if not patch[i, j]:
-                continue
-            sums[0] += G * w * du
-            sums[1] += G * w * dv
-            sums[2] += w * (G - 4.0 * root * du * du / radius**2)
-            sums[3] += w * (G - 4.0 * root * dv * dv / radius**2)
-            sums[4] += G * G * du * du * variance
-            sums[5] += G * G * dv * dv * variance
-    return sums
-
-
-@njit(cache=True)
-def _merged(sums):  # type: ignore[no-untyped-def]
-    """Variance of a coordinate from what the spot has merged with, Eq. (6)."""
-    if sums[9] <= 0.0:
-        return 0.0
-    a = np.sqrt((sums[6] - sums[7]) ** 2 + 4.0 * sums[8] ** 2)
-    return max(0.0, a - _SIGNIFICANT * np.sqrt(sums[10]) - _ROUND * (sums[6] + sums[7])) / sums[9]
+            noise += (G * (du * du + dv * dv)) ** 2 * (variance - texture)
+            if patch[i, j]:
+                var_u += G * G * du * du * variance
+                var_v += G * G * dv * dv * variance
+    if weight <= 0.0:
+        return var_u, var_v, 0.0
+    a = np.sqrt((uu - vv) ** 2 + 4.0 * uv**2)
+    return var_u, var_v, max(0.0, a - _SIGNIFICANT * np.sqrt(noise) - _ROUND * (uu + vv)) / weight
 
 
 @njit(cache=True)
@@ -182,16 +185,18 @@ def _windowed(image, patch, top, left, start, radius, model, background, texture
     """Eqs. (4) to (6) from a start, in the patch's coordinates: u, v, sigma; sigma -1 if the steps go astray."""
     u, v = start
     for _ in range(_STEPS):
-        sums = _window_sums(image, patch, top, left, u, v, radius, model, background, texture)
-        if sums[2] <= 0.0 or sums[3] <= 0.0:
+        last = u, v  # where all of the sums are taken
+        eu, ev, ju, jv = _equation(image, patch, top, left, u, v, radius, background)
+        if ju <= 0.0 or jv <= 0.0:
             return u, v, -1.0
-        du, dv = sums[0] / sums[2], sums[1] / sums[3]
+        du, dv = eu / ju, ev / jv
         u, v = u + du, v + dv
         if (u - start[0]) ** 2 + (v - start[1]) ** 2 > 0.25 * radius**2:
             return u, v, -1.0
         if abs(du) + abs(dv) < _CONVERGED_PX:
             break
-    return u, v, np.sqrt(max(sums[4] / sums[2] ** 2, sums[5] / sums[3] ** 2) + _merged(sums))
+    var_u, var_v, merged = _spread(image, patch, top, left, last[0], last[1], radius, model, background, texture)
+    return u, v, np.sqrt(max(var_u / ju**2, var_v / jv**2) + merged)
 
 
 @njit(cache=True)
@@ -216,13 +221,14 @@ def _centre(image, patch, top, left, threshold, model, levels, windowed, saturat
 
 @njit(cache=True)
 def measure(image, row, start, stop, offset, threshold, model, floors, given_background, local, windowed, saturation):  # type: ignore[no-untyped-def]
-    """(n, 7) u, v, sigma, flux, peak, elongation and clipped pixels of every component.
+    """Of every component u and v (n, 2), sigma, flux, peak, elongation, and whether it is clipped (n,).
 
     `model` is g, s_n, p; `floors` are that of a blob that is not clipped and that of one clipped pixel.
     """
-    table = np.empty((len(offset) - 1, 7))
-    margin = 3
-    for c in range(len(table)):
+    n, margin = len(offset) - 1, 3
+    centroids, sigmas, fluxes, elongations = np.empty((n, 2)), np.empty(n), np.empty(n), np.empty(n)
+    peaks, is_clipped = np.empty(n, np.int64), np.empty(n, np.bool_)
+    for c in range(n):
         first, last = offset[c], offset[c + 1]
         top, bottom = max(row[first] - margin, 0), min(row[last - 1] + 1 + margin, image.shape[0])
         left = max(start[first:last].min() - margin, 0)
@@ -237,7 +243,6 @@ def measure(image, row, start, stop, offset, threshold, model, floors, given_bac
             image, patch, top, left, threshold[c], model, levels, windowed, saturation
         )
         floor = floors[1] * np.sqrt(min(clipped, _PHASES_PX)) if clipped else floors[0]
-        sigma = np.sqrt(sigma * sigma + floor * floor)
-        table[c, 0], table[c, 1], table[c, 2], table[c, 3], table[c, 4] = u + left, v + top, sigma, flux, peak
-        table[c, 5], table[c, 6] = _elongation(patch), clipped
-    return table
+        centroids[c, 0], centroids[c, 1], sigmas[c] = u + left, v + top, np.sqrt(sigma * sigma + floor * floor)
+        fluxes[c], peaks[c], elongations[c], is_clipped[c] = flux, peak, _elongation(patch), clipped > 0
+    return centroids, sigmas, fluxes, peaks, elongations, is_clipped

@@ -19,11 +19,12 @@ from functools import lru_cache
 from typing import Literal
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from dockair.errors import DockairError
 from dockair.messages import Window
-from dockair.nav.image.binarise import Image, Mask, adaptive_threshold, check_image, frame_statistics
+from dockair.nav.image.binarise import Image, adaptive_threshold, check_image, frame_statistics
 from dockair.nav.image.centroid import BlobMeasurements, NoiseModel, measure_blobs
 from dockair.nav.image.labelling import Runs, foreground_runs
 from dockair.nav.image.morphology import Element, open_and_trace, structuring_element
@@ -149,7 +150,7 @@ def detect(
         local_background=settings.local_background,
         windowed=settings.centroid == "windowed",
     )
-    return _blobs(found, area_px, measured, _right_shape(found, measured, settings), window)
+    return _blobs(found, area_px, measured, settings, window)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -245,28 +246,47 @@ def _element(settings: DetectSettings) -> tuple[Element, int]:
     return element, settings.max_area_px + 1 if settings.element_size_px == 1 else settings.spare_below_px
 
 
-def _right_shape(found: _Components, measured: BlobMeasurements, settings: DetectSettings) -> Mask:
-    """Which are not too long, and, of the spots that are not clipped, not wider than a lens makes a point."""
-    keep = measured.elongation <= settings.max_elongation
-    if found.threshold_dn is None:
-        height = measured.peak - found.backgrounds_dn
-        keep &= measured.clipped | (measured.flux <= settings.max_equivalent_area_px * height)
-    return np.asarray(keep)
-
-
 def _blobs(
-    found: _Components, area_px: NDArray[np.int64], measured: BlobMeasurements, keep: Mask, window: Window | None
+    found: _Components,
+    area_px: NDArray[np.int64],
+    measured: BlobMeasurements,
+    settings: DetectSettings,
+    window: Window | None,
 ) -> Blobs:
-    origin = np.zeros(2) if window is None else np.array([window.column_start, window.row_start], dtype=float)
-    thresholds = found.thresholds_dn[keep]
-    lowest = int(thresholds.min()) if len(thresholds) else -1
+    """What has the right shape, in full-frame pixels."""
+    left, top = (0, 0) if window is None else (window.column_start, window.row_start)
+    centroids_px, area_px, peak, sigma_px, clipped, flux, thresholds_dn, lowest_dn = _of_right_shape(
+        measured.centroids_px, area_px, measured.peak, measured.sigma_px, measured.clipped, measured.flux,
+        found.thresholds_dn, measured.elongation, found.backgrounds_dn, found.threshold_dn is None,
+        settings.max_elongation, settings.max_equivalent_area_px, left, top,
+    )  # fmt: skip
     return Blobs(
-        centroids_px=measured.centroids_px[keep] + origin,
-        area_px=area_px[keep],
-        peak=measured.peak[keep],
-        sigma_px=measured.sigma_px[keep],
-        clipped=measured.clipped[keep],
-        flux=measured.flux[keep],
-        threshold_dn=lowest if found.threshold_dn is None else found.threshold_dn,
-        thresholds_dn=thresholds,
+        centroids_px=centroids_px,
+        area_px=area_px,
+        peak=peak,
+        sigma_px=sigma_px,
+        clipped=clipped,
+        flux=flux,
+        threshold_dn=lowest_dn if found.threshold_dn is None else found.threshold_dn,
+        thresholds_dn=thresholds_dn,
     )
+
+
+@njit(cache=True)
+def _of_right_shape(  # type: ignore[no-untyped-def]
+    centroids, area, peak, sigma, clipped, flux, threshold, elongation, background, spots, longest, widest, left, top
+):
+    """Of components those that are not too long and, of spots not clipped, not wider than a lens makes a point.
+
+    Their centroids (m, 2), moved by (left, top), and the next six of them (m,); the lowest threshold, -1 of none.
+    """
+    keep, lowest = np.zeros(len(area), np.bool_), -1
+    for k in range(len(area)):
+        narrow = not spots or clipped[k] or flux[k] <= widest * (peak[k] - background[k])
+        keep[k] = elongation[k] <= longest and narrow
+        if keep[k] and (lowest < 0 or threshold[k] < lowest):
+            lowest = threshold[k]
+    kept = centroids[keep]
+    kept[:, 0] += left
+    kept[:, 1] += top
+    return kept, area[keep], peak[keep], sigma[keep], clipped[keep], flux[keep], threshold[keep], lowest
