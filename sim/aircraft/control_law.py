@@ -4,9 +4,11 @@ The equations are those of `flight_control`, `rate_relief`, `reference` and `mod
 
 Loops where slices would do: numba makes twenty times as much code of a slice, which then has to be fetched every tick.
 
-Layouts: a trim of now is attitude, rates, surfaces, thrust per mass, slope of the path; the constants k are the step,
-then as named here, from `PROBE` on the place of the probe's tip; motions and wrenches are those of
-`airframe.Aerodynamics`, the aircraft's and the model's; the state x is that of `linear_model`.
+Each part hands over one record, its `memory`: numba takes as long to receive an array as to add up a hundred numbers.
+`own` is that of `flight_control`, `row` that of `gain_schedule.Row`.
+
+Layouts: a trim of now is attitude, rates, surfaces, thrust per mass, slope of the path; motions and wrenches are those
+of `airframe.Aerodynamics`, the aircraft's and the model's; the state x is that of `linear_model`.
 """
 
 import numpy as np
@@ -18,23 +20,21 @@ from dockair.sim.aircraft.linear_model import ATTITUDE
 
 SLOPE, TRIM = 10, 11
 _BANK = ATTITUDE.start
-AIRSPEED, MASS, GUST_SHARE, LAG_SHARE, LAG, PROBE = 1, 2, 3, 4, 5, 6
 
 
 @njit(cache=True)
 def write_states(  # type: ignore[no-untyped-def]
-    R_WB, velocity_W, w, surfaces, thrust, slope, level, R_WF, R_WM, velocity_m, w_m, actuators_m, k,
-    R_now, R_FB, trim, x, x_m, motions,
+    R_WB, velocity_W, w, surfaces, thrust, slope, R_WF, row, model, own, motions
 ):  # fmt: skip
     """Write attitude of now and against the path, trim, both states, and both motions in still air."""
-    R_FM = np.empty((3, 3))
-    _ahead(R_WB, w, k[LAG], R_now)
-    R_trim = _write_trim(slope, level, trim)
-    _beyond(R_WF, R_now, velocity_W, w, surfaces, thrust / k[MASS], trim, R_trim, k, R_FB, motions[0], x)
-    _beyond(R_WF, R_WM, velocity_m, w_m, actuators_m, actuators_m[3], trim, R_trim, k, R_FM, motions[1], x_m)
+    k, m, R_FM = own[()], model[()], np.empty((3, 3))
+    _ahead(R_WB, w, k.lag_s, k.R_now)
+    R_trim = _write_trim(slope, row[()].trim, k.trim)
+    _beyond(R_WF, k.R_now, velocity_W, w, surfaces, thrust / k.mass_kg, k, R_trim, k.R_FB, motions[0], k.x)
+    _beyond(R_WF, m.R_WB, m.velocity_W, m.w_WB_B, m.actuators, m.actuators[3], k, R_trim, R_FM, motions[1], k.x_m)
     for i in range(3):
         motions[0, 3 + i], motions[0, 6 + i] = w[i], surfaces[i]
-        motions[1, 3 + i], motions[1, 6 + i] = w_m[i], actuators_m[i]
+        motions[1, 3 + i], motions[1, 6 + i] = m.w_WB_B[i], m.actuators[i]
 
 
 @njit(cache=True)
@@ -50,12 +50,11 @@ def _ahead(R, w, late, now):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def write_state(  # type: ignore[no-untyped-def]
-    R_WF, R_WB, velocity_W, w, surfaces, thrust, slope, level, k, R_FB, v_B, trim, x
-):  # fmt: skip
+def write_state(R_WF, R_WB, velocity_W, w, surfaces, thrust, slope, row, own, v_B):  # type: ignore[no-untyped-def]
     """Write attitude against the path, velocity along the body, the path's trim, and x beyond it."""
-    R_trim = _write_trim(slope, level, trim)
-    _beyond(R_WF, R_WB, velocity_W, w, surfaces, thrust, trim, R_trim, k, R_FB, v_B, x)
+    k = own[()]
+    R_trim = _write_trim(slope, row[()].trim, k.trim)
+    _beyond(R_WF, R_WB, velocity_W, w, surfaces, thrust, k, R_trim, k.R_FB, v_B, k.x)
 
 
 @njit(cache=True)
@@ -69,12 +68,12 @@ def _write_trim(slope, level, trim):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _beyond(R_WF, R_WB, velocity_W, w, surfaces, thrust, trim, R_trim, k, R_FB, v_B, x):  # type: ignore[no-untyped-def]
+def _beyond(R_WF, R_WB, velocity_W, w, surfaces, thrust, k, R_trim, R_FB, v_B, x):  # type: ignore[no-untyped-def]
     """Write attitude against the path, velocity along the body, and x beyond trim.
 
     The velocity in x is the one with which C x is that of the tip however much the body is turned from trim.
     """
-    p = k[PROBE:]
+    p, trim = k.probe_B, k.trim
     of_tip = (w[1] * p[2] - w[2] * p[1], w[2] * p[0] - w[0] * p[2], w[0] * p[1] - w[1] * p[0])
     for i in range(3):
         v_B[i] = R_WB[0, i] * velocity_W[0] + R_WB[1, i] * velocity_W[1] + R_WB[2, i] * velocity_W[2]
@@ -82,7 +81,7 @@ def _beyond(R_WF, R_WB, velocity_W, w, surfaces, thrust, trim, R_trim, k, R_FB, 
         for j in range(3):
             R_FB[i, j] = R_WF[0, i] * R_WB[0, j] + R_WF[1, i] * R_WB[1, j] + R_WF[2, i] * R_WB[2, j]
             x[i] += (R_FB[i, j] - R_trim[3 * i + j]) * of_tip[j]
-    x[0] -= k[AIRSPEED]
+    x[0] -= k.airspeed_m_s
     _rotation_between(R_FB, R_trim, x[3:6])
     for i in range(3):
         x[6 + i], x[9 + i] = w[i] - trim[3 + i], surfaces[i] - trim[6 + i]
@@ -90,54 +89,57 @@ def _beyond(R_WF, R_WB, velocity_W, w, surfaces, thrust, trim, R_trim, k, R_FB, 
 
 
 @njit(cache=True)
-def _estimate(v_B, force, felt, airspeed, gust_from_residual, gust, force_m, engaged, k):  # type: ignore[no-untyped-def]
+def _estimate(v_B, force, felt, airspeed, gust_from_residual, engaged, k):  # type: ignore[no-untyped-def]
     """Advance the gust g."""
+    gust, force_m = k.gust, k.force_B
     residual = np.empty(3)  # airspeed and specific forces across the body beyond those of still air
     for i in range(3):
         if not engaged:
-            force_m[i] = force[i] / k[MASS]
-        force_m[i] += k[LAG_SHARE] * (force[i] / k[MASS] - force_m[i])  # as late as the accelerometers
+            force_m[i] = force[i] / k.mass_kg
+        force_m[i] += k.lag_share * (force[i] / k.mass_kg - force_m[i])  # as late as the accelerometers
         residual[i] = felt[i] - force_m[i]
     residual[0] = np.sqrt(v_B[0] * v_B[0] + v_B[1] * v_B[1] + v_B[2] * v_B[2]) - airspeed
     for i in range(3):
         now = 0.0
         for j in range(3):
             now += gust_from_residual[i, j] * residual[j]
-        gust[i] = gust[i] + k[GUST_SHARE] * (now - gust[i]) if engaged else now
+        gust[i] = gust[i] + k.gust_share * (now - gust[i]) if engaged else now
 
 
 @njit(cache=True)
 def write_commands(  # type: ignore[no-untyped-def]
-    felt, airspeed, surfaces_now, u_B, a_B, engaged, C, K, K_busy, K_m, K_c, gust_from_residual,
-    x, motions, wrenches, trim, R_FB, x_m, w_m, z, gust, force_m, limits, k, surfaces, commands_m,
-    chain, smooth, k_reference, limits_relief, k_relief, state_relief,
-    R_WM, velocity_m, w_now_m, actuators_m, J, J_inverse, lags_m, k_m,
+    felt, airspeed, surfaces_now, u_B, a_B, engaged, motions, wrenches, surfaces, row, own, reference, relief, model
 ):  # fmt: skip
     """Eqs. (1) and (2): write commands to surfaces and model, return thrust [N]; advance gust and integrals.
 
     All that these need goes a tick further with them: relief and reference before, the model's flight after.
     """
-    n, step, haste, shares = len(x), k[0], 0.0, (1.0, 1.0, 1.0)
+    gains, k = row[()], own[()]
+    x, x_m, w_m, z, trim, limits, chain = k.x, k.x_m, k.w_m, k.z, k.trim, k.limits, reference[()].chain
+    n, step, haste, shares = len(x), k.step_s, 0.0, (1.0, 1.0, 1.0)
     if engaged:
-        shares = relieve(surfaces, surfaces_now, actuators_m, limits_relief, k_relief, state_relief)
-        haste = state_relief[2]
-    advance_reference(chain, smooth, R_FB, u_B, a_B, x_m[_BANK], shares, k_reference, step)
-    _estimate(motions[0], wrenches[0], felt, airspeed, gust_from_residual, gust, force_m, engaged, k)
+        shares = relieve(surfaces, surfaces_now, model[()].actuators, relief)
+        haste = relief[()].haste
+    advance_reference(reference, k.R_FB, u_B, a_B, x_m[_BANK], shares)
+    _estimate(motions[0], wrenches[0], felt, airspeed, gains.gust_from_residual, engaged, k)
     error, u, off = np.empty(n + 6), np.zeros(4), np.zeros(3)
     for i in range(n):
         error[i] = x[i] - x_m[i]
     for i in range(3):
-        error[n + i], error[n + 3 + i] = z[i], gust[i]
-        w_m[i] += k[LAG_SHARE] * (x_m[6 + i] - w_m[i])
+        error[n + i], error[n + 3 + i] = z[i], k.gust[i]
+        w_m[i] += k.lag_share * (x_m[6 + i] - w_m[i])
         error[6 + i] = x[6 + i] - w_m[i]
-    _add(-1.0, K_m, x_m, u)
-    _add(-1.0, K_c, chain.ravel(), u)
+    _add(-1.0, gains.K_followed, x_m, u)
+    _add(-1.0, gains.K_command, chain.ravel(), u)
     free_m = free = True
     for i in range(4):
         wanted = trim[6 + i] + u[i]
-        commands_m[i] = min(max(wanted, limits[0, i]), limits[1, i])
-        free_m = free_m and commands_m[i] == wanted
-    _add(-1.0, K if haste == 0.0 else (1.0 - haste) * K + haste * K_busy, error, u)
+        k.commands_m[i] = min(max(wanted, limits[0, i]), limits[1, i])
+        free_m = free_m and k.commands_m[i] == wanted
+    if haste == 0.0:
+        _add(-1.0, gains.K, error, u)
+    else:
+        _add(-1.0, (1.0 - haste) * gains.K + haste * gains.K_busy, error, u)
     for i in range(4):
         wanted = trim[6 + i] + u[i]
         u[i] = min(max(wanted, limits[0, i]), limits[1, i])
@@ -145,13 +147,13 @@ def write_commands(  # type: ignore[no-untyped-def]
     for i in range(3):
         surfaces[i] = u[i]
     if free:
-        _add(step, C, error, z)
+        _add(step, gains.C, error, z)
     if free_m:
-        _add(1.0, C, x_m, off)
+        _add(1.0, gains.C, x_m, off)
         for i in range(3):
             x_m[n + i] += step * (off[i] - chain[0, i])
-    advance_model(wrenches[1], commands_m, R_WM, velocity_m, w_now_m, actuators_m, J, J_inverse, lags_m, k_m)
-    return u[3] * k[MASS]
+    advance_model(wrenches[1], k.commands_m, model)
+    return u[3] * k.mass_kg
 
 
 @njit(cache=True)
@@ -193,26 +195,27 @@ def _rotation_between(R, S, phi):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def relieve(commands, surfaces, modelled, limits, k, state):  # type: ignore[no-untyped-def]
+def relieve(commands, surfaces, modelled, relief):  # type: ignore[no-untyped-def]
     """Eqs. (1) to (3) of `rate_relief` over one tick: both b and the larger h in place; return the shares."""
-    keep, busy_share, least = k
-    up, left = keep * state[0], keep * state[1]
-    if _is_busy(commands, surfaces, modelled, limits, 0):
+    k = relief[()]
+    keep, least = k.keep, k.least
+    up, left = keep * k.busy[0], keep * k.busy[1]
+    if _is_busy(commands, surfaces, modelled, k, 0):
         up += 1.0 - keep
-    if _is_busy(commands, surfaces, modelled, limits, 1) or _is_busy(commands, surfaces, modelled, limits, 2):
+    if _is_busy(commands, surfaces, modelled, k, 1) or _is_busy(commands, surfaces, modelled, k, 2):
         left += 1.0 - keep
-    haste_up = min(up / busy_share, 1.0)
-    haste = max(min(left / busy_share, 1.0), haste_up)
-    state[0], state[1], state[2] = up, left, haste
+    haste_up = min(up / k.busy_share, 1.0)
+    haste = max(min(left / k.busy_share, 1.0), haste_up)
+    k.busy[0], k.busy[1], k.haste = up, left, haste
     share_up = 1.0 - (1.0 - least) * haste_up
     return share_up, 1.0 - (1.0 - least) * haste, share_up
 
 
 @njit(cache=True)
-def _is_busy(commands, surfaces, modelled, limits, i):  # type: ignore[no-untyped-def]
+def _is_busy(commands, surfaces, modelled, k, i):  # type: ignore[no-untyped-def]
     """Eq. (1)'s condition."""
-    near_stop = max(abs(commands[i]), abs(modelled[i])) > limits[1, i]
-    return near_stop or abs(commands[i] - surfaces[i]) > limits[0, i]
+    near_stop = max(abs(commands[i]), abs(modelled[i])) > k.stops_rad[i]
+    return near_stop or abs(commands[i] - surfaces[i]) > k.misses_rad[i]
 
 
 @njit(cache=True)
@@ -223,13 +226,15 @@ def shortening(u, longest):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def advance_reference(chain, smooth, R, u_B, a_B, bank, left, constants, step):  # type: ignore[no-untyped-def]
+def advance_reference(reference, R, u_B, a_B, bank, left):  # type: ignore[no-untyped-def]
     """Eqs. (1) and (2) of `reference` over one tick, in place."""
-    w, zeta, share = constants[3, 0], constants[3, 1], shortening(u_B, constants[3, 2])
+    m = reference[()]
+    chain, smooth, step, phi = m.chain, m.smooth, m.step_s, m.bank_rad
+    w, zeta, share = m.bandwidth_rad_s, m.damping, shortening(u_B, m.velocity_m_s)
     for i in range(3):
-        k, a_max, jerk_max = constants[0, i], left[i] * constants[1, i], constants[2, i]
+        k, a_max, jerk_max = m.gain_1_s[i], left[i] * m.acceleration_m_s2[i], m.jerk_m_s3[i]
         if i == 1:
-            a_max *= min(max((constants[4, 1] - abs(bank)) / (constants[4, 1] - constants[4, 0]), 0.0), 1.0)
+            a_max *= min(max((phi[1] - abs(bank)) / (phi[1] - phi[0]), 0.0), 1.0)
         u = share * (R[i, 0] * u_B[0] + R[i, 1] * u_B[1] + R[i, 2] * u_B[2])
         a = R[i, 0] * a_B[0] + R[i, 1] * a_B[1] + R[i, 2] * a_B[2]
         smooth[1, i] += step * (w * w * (u - smooth[0, i]) - 2.0 * zeta * w * smooth[1, i])
@@ -244,9 +249,11 @@ def advance_reference(chain, smooth, R, u_B, a_B, bank, left, constants, step): 
 
 
 @njit(cache=True)
-def advance_model(wrench, commands, R, v, w, actuators, J, J_inverse, lags, k):  # type: ignore[no-untyped-def]
+def advance_model(wrench, commands, model):  # type: ignore[no-untyped-def]
     """Eqs. (1) and (2) of `model_flight` over one tick, in place."""
-    step, mass, h, force, moment = k[0], k[1], k[2], wrench[:3], wrench[3:]
+    m = model[()]
+    R, v, w, actuators, J, J_inverse = m.R_WB, m.velocity_W, m.w_WB_B, m.actuators, m.inertia, m.inverse_inertia
+    step, mass, h, force, moment = m.step_s, m.mass_kg, m.rotor_momentum, wrench[:3], wrench[3:]
     L = (
         J[0, 0] * w[0] + J[0, 1] * w[1] + J[0, 2] * w[2],
         J[1, 0] * w[0] + J[1, 1] * w[1] + J[1, 2] * w[2],
@@ -264,7 +271,7 @@ def advance_model(wrench, commands, R, v, w, actuators, J, J_inverse, lags, k): 
     v[2] -= step * STANDARD_GRAVITY_M_S2
     _turn(R, step * w[0], step * w[1], step * w[2])
     for i in range(4):
-        actuators[i] += step * lags[i] * (commands[i] - actuators[i])
+        actuators[i] += step * m.lags_1_s[i] * (commands[i] - actuators[i])
 
 
 @njit(cache=True)

@@ -27,12 +27,13 @@ Not modelled: structural modes, quantisation, delay of computing beyond a tick; 
 """
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dockair.messages import ReceiverCommand
 from dockair.rotations import Array
 from dockair.sim.air.atmosphere import STANDARD_GRAVITY_M_S2, Air
 from dockair.sim.aircraft.airframe import AirframeData
-from dockair.sim.aircraft.control_law import AIRSPEED, TRIM, rotation_rows, write_commands, write_state, write_states
+from dockair.sim.aircraft.control_law import TRIM, rotation_rows, write_commands, write_state, write_states
 from dockair.sim.aircraft.flight_control_parameters import FlightControlParameters
 from dockair.sim.aircraft.flight_path import FlightPath
 from dockair.sim.aircraft.gain_schedule import RATE_0, SURFACES_0, THRUST_0, Design, GainSchedule
@@ -44,6 +45,29 @@ from dockair.sim.aircraft.regulator import FOLLOWED
 from dockair.sim.aircraft.trim import Trim
 
 __all__ = ["FlightControl", "FlightControlParameters"]
+
+_MEMORY = np.dtype(
+    [
+        ("step_s", float),
+        ("airspeed_m_s", float),
+        ("mass_kg", float),
+        ("gust_share", float),  # of g's low pass in a tick
+        ("lag_share", float),  # of the sensors' lag in a tick
+        ("lag_s", float),
+        ("probe_B", float, 3),
+        ("limits", float, (2, 4)),  # lowest and highest command: surfaces, thrust per mass
+        ("x_m", float, FOLLOWED),
+        ("z", float, 3),
+        ("gust", float, 3),
+        ("force_B", float, 3),  # specific force of the air on the aircraft, were it still, as late as measured
+        ("w_m", float, 3),  # the model's rates, as late as measured
+        ("R_now", float, (3, 3)),  # of one step from here on: attitude of now,
+        ("R_FB", float, (3, 3)),  # against the path
+        ("trim", float, TRIM),
+        ("x", float, STATES),
+        ("commands_m", float, 4),  # to the model
+    ]
+)
 
 
 class FlightControl:
@@ -82,50 +106,40 @@ class FlightControl:
         self._aerodynamics, self._mass_kg = trim.aerodynamics, airframe.mass_kg
         gust_share = -float(np.expm1(-parameters.gust_bandwidth_rad_s * step_s))
         lag_s = parameters.inertial_lag_s
-        shares = [gust_share, -float(np.expm1(-step_s / lag_s)) if lag_s else 1.0]
-        self._constants = np.array([step_s, trim.airspeed_m_s, airframe.mass_kg, *shares, lag_s, *probe_B])
         limits_rad, thrust = np.asarray(airframe.surface_limits_rad), trim.thrust_range
-        self._limits = np.vstack(
-            [
-                np.append(-limits_rad, thrust.idle_n / self._mass_kg),
-                np.append(limits_rad, thrust.military_n / self._mass_kg),
-            ]
-        )
+        self._memory: NDArray[np.void] = np.zeros((), _MEMORY)
+        m = self._memory
+        m["step_s"], m["airspeed_m_s"], m["mass_kg"], m["probe_B"] = step_s, trim.airspeed_m_s, self._mass_kg, probe_B
+        m["gust_share"], m["lag_s"] = gust_share, lag_s
+        m["lag_share"] = -float(np.expm1(-step_s / lag_s)) if lag_s else 1.0
+        m["limits"][0] = np.append(-limits_rad, thrust.idle_n / self._mass_kg)
+        m["limits"][1] = np.append(limits_rad, thrust.military_n / self._mass_kg)
         rates_rad_s = np.asarray(airframe.surface_rate_limits_rad_s)
         self._relief = RateRelief(parameters.relief, airframe.actuator_bandwidth_rad_s, rates_rad_s, limits_rad, step_s)
         self.model = ModelFlight(airframe, step_s)
-        self._x_m: Array = np.zeros(FOLLOWED)
-        self._z: Array = np.zeros(3)
-        self._gust: Array = np.zeros(3)
-        self._force_B: Array = np.zeros(3)
-        self._w_m: Array = np.zeros(3)  # the model's rates, as late as measured
-        # of one step: attitude of now and against the path, trim, x, commands to surfaces and model; motions of
-        # aircraft and model in still air, and what it does to them
-        self._seen = np.empty((3, 3)), np.empty((3, 3)), np.empty(TRIM), np.empty(STATES)
-        self._commands = np.empty(3), np.empty(4)
-        self._motions, self._wrenches = np.zeros((2, 12)), np.empty((2, 6))
-        self._sight, self._law = self._arguments()
+        # of one step: commands to the surfaces; motions of aircraft and model in still air, and what it does to them
+        self._surfaces, self._motions, self._wrenches = np.empty(3), np.zeros((2, 12)), np.empty((2, 6))
         self._engaged = False
 
     @property
     def gust_W(self) -> Array:
         """(3,) the gust it believes in [m/s]."""
-        return np.asarray(self.path.axes() @ self._gust)
+        return np.asarray(self.path.axes() @ self._memory["gust"])
 
     def start_in(self, trim: Trim) -> None:
         """Set z to what holds another trim of the same path: with the gust that it then believes in, Eq. (2) is it."""
-        row, x, R_FB, v_B = self.schedule.at(0.0), np.empty(STATES), np.empty((3, 3)), np.empty(3)
+        row, m, v_B = self.schedule.at(0.0), self._memory, np.empty(3)
         attitude, at = (np.eye(3), trim.R_WB, trim.velocity_W), (trim.w_WB_B, trim.surfaces_rad)
-        about = (trim.thrust_n / self._mass_kg, 0.0, row.trim, self._constants)
-        write_state(*attitude, *at, *about, R_FB, v_B, np.empty(TRIM), x)
+        write_state(*attitude, *at, trim.thrust_n / self._mass_kg, 0.0, row.memory, m, v_B)
         force_B, _ = self._aerodynamics.force_and_moment(v_B, *at)
         residual = trim.R_WB[2] * STANDARD_GRAVITY_M_S2 - force_B / self._mass_kg
         residual[0] = np.linalg.norm(v_B) - np.linalg.norm(trim.velocity_W - trim.air_velocity_W)
+        x: Array = m["x"]
         known = np.concatenate([x, np.zeros(3), row.gust_from_residual @ residual])
         missing = np.append(x[SURFACES], x[THRUST]) + row.K @ known
-        weights = np.append(self._limits[1, :3], STANDARD_GRAVITY_M_S2)  # radians and m/s^2, made comparable
+        weights = np.append(m["limits"][1, :3], STANDARD_GRAVITY_M_S2)  # radians and m/s^2, made comparable
         K_z = row.K[:, STATES : STATES + 3]
-        self._z[:] = -np.linalg.lstsq(K_z / weights[:, np.newaxis], missing / weights, rcond=None)[0]
+        m["z"] = -np.linalg.lstsq(K_z / weights[:, np.newaxis], missing / weights, rcond=None)[0]
 
     def step(
         self,
@@ -153,34 +167,24 @@ class FlightControl:
         """
         path = self.path
         path.step(command.turn_rate_rad_s, command.climb_rad)
-        row = self.schedule.at(path.turn_rate_rad_s)
-        flown = (R_WB, velocity_W, w_WB_B, surfaces_rad, thrust_n, path.climb_rad, row.trim, *self._sight)
+        row = self.schedule.at(path.turn_rate_rad_s).memory
+        own, model, motions, wrenches = self._memory, self.model.memory, self._motions, self._wrenches
+        flown = (R_WB, velocity_W, w_WB_B, surfaces_rad, thrust_n, path.climb_rad, path.axes())
         if not self._engaged:
-            write_states(*flown)
+            write_states(*flown, row, model, own, motions)
             self._start(command)
-        write_states(*flown)
-        self._aerodynamics.write_wrenches(self._motions, self._wrenches)
-        thrust_command_n = write_commands(
-            specific_force_B, airspeed_m_s, surfaces_rad, command.velocity_m_s, command.acceleration_m_s2,
-            self._engaged, row.C, row.K, row.K_busy, row.K_followed, row.K_command, row.gust_from_residual, *self._law
-        )  # fmt: skip
+        write_states(*flown, row, model, own, motions)
+        self._aerodynamics.write_wrenches(motions, wrenches)
+        felt = (specific_force_B, airspeed_m_s, surfaces_rad, command.velocity_m_s, command.acceleration_m_s2)
+        law = (row, own, self.reference.memory, self._relief.memory, model)
+        thrust_command_n = write_commands(*felt, self._engaged, motions, wrenches, self._surfaces, *law)
         self._engaged = True
-        return self._commands[0], thrust_command_n
-
-    def _arguments(self) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
-        """What `write_states` and `write_commands` take at every tick: arrays that are written in place."""
-        model, (R_now, R_FB, trim, x) = self.model, self._seen
-        modelled = (model.R_WB, model.velocity_W, model.w_WB_B, model.actuators)
-        sight = (self.path.axes(), *modelled, self._constants, R_now, R_FB, trim, x, self._x_m, self._motions)
-        known = (x, self._motions, self._wrenches, trim, R_FB)
-        memory = (self._x_m, self._w_m, self._z, self._gust, self._force_B)
-        about = (self._limits, self._constants, *self._commands)
-        return sight, (*known, *memory, *about, *self.reference.memory, *self._relief.memory, *model.memory)
+        return self._surfaces, thrust_command_n
 
     def _start(self, command: ReceiverCommand) -> None:
         """Let model and reference begin in the trim of now, with the aircraft's velocity beyond it."""
-        _, R_FB, trim, x = self._seen
+        m = self._memory
+        R_FB, trim, x, ahead = m["R_FB"], m["trim"], m["x"], np.array([m["airspeed_m_s"], 0.0, 0.0])
         R_WF, R_FM = self.path.axes(), np.array(rotation_rows(trim)).reshape(3, 3)
-        ahead = np.array([self._constants[AIRSPEED], 0.0, 0.0])
         self.model.start(R_WF @ R_FM, R_WF @ (x[:3] + ahead), trim[RATE_0], trim[SURFACES_0.start : THRUST_0 + 1])
         self.reference.start(x[:3], R_FB, command)

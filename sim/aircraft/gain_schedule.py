@@ -8,6 +8,7 @@ Slopes of the path turn the axes and add their part of the weight to the thrust;
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dockair.rotations import Array
 from dockair.sim.air.atmosphere import STANDARD_GRAVITY_M_S2, Air
@@ -18,17 +19,18 @@ from dockair.sim.aircraft.trim import Trim, steady_trim
 
 NODE_RAD = float(np.radians(5.0))
 
-_SHAPES = (
-    (10,),
-    (STATES, STATES),
-    (3, STATES),
-    (INPUTS, STATES + 6),
-    (INPUTS, STATES + 6),
-    (INPUTS, FOLLOWED),
-    (INPUTS, 9),
-    (3, 3),
+_MEMORY = np.dtype(
+    [
+        ("trim", float, 10),
+        ("A", float, (STATES, STATES)),
+        ("C", float, (3, STATES)),
+        ("K", float, (INPUTS, STATES + 6)),
+        ("K_busy", float, (INPUTS, STATES + 6)),
+        ("K_followed", float, (INPUTS, FOLLOWED)),
+        ("K_command", float, (INPUTS, 9)),
+        ("gust_from_residual", float, (3, 3)),
+    ]
 )
-_ENDS = np.cumsum([int(np.prod(shape)) for shape in _SHAPES])
 #: In `Row.trim`.
 ATTITUDE_0, RATE_0, SURFACES_0, THRUST_0 = slice(0, 3), slice(3, 6), slice(6, 9), 9
 
@@ -45,12 +47,13 @@ class Row:
     K_followed: Array  #: (4, 16)
     K_command: Array  #: (4, 9)
     gust_from_residual: Array  #: (3, 3)
+    memory: NDArray[np.void]  #: () all of these, for `control_law`
 
     @classmethod
     def of(cls, flat: Array) -> "Row":
         """Name the parts of one array."""
-        parts = np.split(flat, _ENDS[:-1])
-        return cls(*(part.reshape(shape) for part, shape in zip(parts, _SHAPES, strict=True)))
+        memory: NDArray[np.void] = flat.view(_MEMORY).reshape(())
+        return cls(*(memory[name] for name in _MEMORY.names or ()), memory)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

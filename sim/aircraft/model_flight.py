@@ -11,10 +11,26 @@ Not modelled: limits of actuators (whoever commands keeps inside them), the slow
 """
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dockair.rotations import Array
 from dockair.sim.aircraft.airframe import AirframeData
 from dockair.sim.aircraft.control_law import advance_model
+
+_MEMORY = np.dtype(
+    [
+        ("R_WB", float, (3, 3)),
+        ("velocity_W", float, 3),
+        ("w_WB_B", float, 3),
+        ("actuators", float, 4),
+        ("inertia", float, (3, 3)),
+        ("inverse_inertia", float, (3, 3)),
+        ("lags_1_s", float, 4),
+        ("step_s", float),
+        ("mass_kg", float),
+        ("rotor_momentum", float),
+    ]
+)
 
 
 class ModelFlight:
@@ -26,20 +42,37 @@ class ModelFlight:
     """
 
     def __init__(self, airframe: AirframeData, step_s: float) -> None:
-        inertia, lags = airframe.inertia_B, np.full(4, airframe.actuator_bandwidth_rad_s)
-        lags[3] = 1.0 / airframe.engine_time_constant_s
-        constants = np.array([step_s, airframe.mass_kg, airframe.rotor_momentum_kg_m2_s])
-        self.R_WB: Array = np.eye(3)  #: all moved in place
-        self.velocity_W: Array = np.zeros(3)  #: inertial [m/s]
-        self.w_WB_B: Array = np.zeros(3)
-        self.actuators: Array = np.zeros(4)  #: elevator, aileron, rudder [rad], thrust per mass [m/s^2]
-        state = (self.R_WB, self.velocity_W, self.w_WB_B, self.actuators)
-        #: all that `control_law` moves it with, in its order
-        self.memory = (*state, inertia, np.asarray(np.linalg.inv(inertia)), lags, constants)
+        self.memory: NDArray[np.void] = np.zeros((), _MEMORY)  #: state and constants, for `control_law`
+        m, inertia = self.memory, airframe.inertia_B
+        m["inertia"], m["inverse_inertia"] = inertia, np.linalg.inv(inertia)
+        m["lags_1_s"] = [*[airframe.actuator_bandwidth_rad_s] * 3, 1.0 / airframe.engine_time_constant_s]
+        m["step_s"], m["mass_kg"], m["rotor_momentum"] = step_s, airframe.mass_kg, airframe.rotor_momentum_kg_m2_s
+        m["R_WB"] = np.eye(3)
+
+    @property
+    def R_WB(self) -> Array:
+        """(3, 3) attitude; moved in place, as all of the state."""
+        return np.asarray(self.memory["R_WB"])
+
+    @property
+    def velocity_W(self) -> Array:
+        """(3,) inertial [m/s]."""
+        return np.asarray(self.memory["velocity_W"])
+
+    @property
+    def w_WB_B(self) -> Array:
+        """(3,) angular velocity [rad/s]."""
+        return np.asarray(self.memory["w_WB_B"])
+
+    @property
+    def actuators(self) -> Array:
+        """(4,) elevator, aileron, rudder [rad], thrust per mass [m/s^2]."""
+        return np.asarray(self.memory["actuators"])
 
     def start(self, R_WB: Array, velocity_W: Array, w_WB_B: Array, actuators: Array) -> None:
         """Begin in this state."""
-        self.R_WB[:], self.velocity_W[:], self.w_WB_B[:], self.actuators[:] = R_WB, velocity_W, w_WB_B, actuators
+        m = self.memory
+        m["R_WB"], m["velocity_W"], m["w_WB_B"], m["actuators"] = R_WB, velocity_W, w_WB_B, actuators
 
     def step(self, wrench_B: Array, commands: Array) -> None:
         """Advance by one tick.
@@ -48,4 +81,4 @@ class ModelFlight:
             wrench_B: (6,) force and moment of the air on it as it flies, body axes [N, N m].
             commands: (4,) to the actuators.
         """
-        advance_model(wrench_B, commands, *self.memory)
+        advance_model(wrench_B, commands, self.memory)

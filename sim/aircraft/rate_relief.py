@@ -22,9 +22,22 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dockair.rotations import Array
 from dockair.sim.aircraft.control_law import relieve
+
+_MEMORY = np.dtype(
+    [
+        ("busy", float, 2),  # b of the elevator, of ailerons and rudder
+        ("haste", float),  # the larger h of Eq. (3)
+        ("misses_rad", float, 3),  # of surfaces behind their commands, at the rate limit
+        ("stops_rad", float, 3),  # beyond which a surface counts as busy
+        ("keep", float),  # share of b that a tick leaves
+        ("busy_share", float),
+        ("least", float),
+    ]
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,16 +69,17 @@ class RateRelief:
         stops_rad: Array,
         step_s: float,
     ) -> None:
-        largest = [float(rate) / bandwidth_rad_s for rate in rate_limits_rad_s]
-        limits = np.array([largest, [parameters.stop_share * float(stop) for stop in stops_rad]])
-        constants = np.array([math.exp(-step_s / parameters.time_s), parameters.busy_share, parameters.least])
-        self._state = np.zeros(3)  # b of the elevator, of ailerons and rudder; the larger of Eq. (3)
-        self.memory = limits, constants, self._state  #: all that `control_law` advances it with, in its order
+        self.memory: NDArray[np.void] = np.zeros((), _MEMORY)  #: state and constants, for `control_law`
+        m = self.memory
+        m["misses_rad"] = [float(rate) / bandwidth_rad_s for rate in rate_limits_rad_s]
+        m["stops_rad"] = [parameters.stop_share * float(stop) for stop in stops_rad]
+        m["keep"], m["busy_share"] = math.exp(-step_s / parameters.time_s), parameters.busy_share
+        m["least"] = parameters.least
 
     @property
     def haste(self) -> float:
         """The larger of Eq. (3)."""
-        return float(self._state[2])
+        return float(self.memory["haste"])
 
     def step(self, commands_rad: Array, surfaces_rad: Array, modelled_rad: Array) -> Array:
         """Return the shares (3,) forward, left, up after a tick.
@@ -75,4 +89,4 @@ class RateRelief:
             surfaces_rad: (3,) where they were.
             modelled_rad: (3,) where the model's were.
         """
-        return np.array(relieve(commands_rad, surfaces_rad, modelled_rad, *self.memory))
+        return np.array(relieve(commands_rad, surfaces_rad, modelled_rad, self.memory))

@@ -13,15 +13,30 @@ A command whose a is the rate of its own u comes out as r = F(u), without oversh
 of bandwidth k. W stands for any level axes that the caller gives attitudes against.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dockair.messages import ReceiverCommand
 from dockair.rotations import Array
 from dockair.sim.aircraft.control_law import advance_reference, shortening
 
 _WHOLE = np.ones(3)
+_MEMORY = np.dtype(
+    [
+        ("chain", float, (4, 3)),
+        ("smooth", float, (2, 3)),  # F(u) and its rate
+        ("gain_1_s", float, 3),
+        ("acceleration_m_s2", float, 3),
+        ("jerk_m_s3", float, 3),
+        ("bandwidth_rad_s", float),
+        ("damping", float),
+        ("velocity_m_s", float),
+        ("bank_rad", float, 2),
+        ("step_s", float),
+    ]
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -41,20 +56,22 @@ class Reference:
     """Eqs. (1) and (2), one tick at a time."""
 
     def __init__(self, limits: ReferenceLimits, step_s: float) -> None:
-        shape = [limits.bandwidth_rad_s, limits.damping, limits.velocity_m_s]
-        bank = [*limits.bank_rad, 0.0]
-        self._constants = np.vstack([limits.gain_1_s, limits.acceleration_m_s2, limits.jerk_m_s3, shape, bank])
-        self._step_s = step_s
-        self._smooth = np.zeros((2, 3))  # F(u) and its rate
-        self.chain: Array = np.zeros((4, 3))  #: r and its first three derivatives (rows), W axes [m/s, m/s^2, ...]
-        self.memory = self.chain, self._smooth, self._constants  #: all that `control_law` advances it with
+        self.memory: NDArray[np.void] = np.zeros((), _MEMORY)  #: state and constants, for `control_law`
+        for field in fields(limits):
+            self.memory[field.name] = getattr(limits, field.name)
+        self.memory["step_s"] = step_s
+
+    @property
+    def chain(self) -> Array:
+        """(4, 3) r and its first three derivatives (rows), W axes [m/s, m/s^2, ...]; moved in place."""
+        return np.asarray(self.memory["chain"])
 
     def start(self, velocity_W: Array, R_WB: Array, command: ReceiverCommand) -> None:
         """Start from a velocity (3,) beyond trim, at rest with a command."""
-        self._smooth[:], self.chain[:] = 0.0, 0.0
-        u = command.velocity_m_s
-        self._smooth[0] = R_WB @ (u * shortening(u, self._constants[3, 2]))
-        self.chain[0] = velocity_W
+        m, u = self.memory, command.velocity_m_s
+        m["smooth"], m["chain"] = 0.0, 0.0
+        m["smooth"][0] = R_WB @ (u * shortening(u, float(m["velocity_m_s"])))
+        m["chain"][0] = velocity_W
 
     def step(self, R_WB: Array, command: ReceiverCommand, bank_rad: float = 0.0, shares: Array = _WHOLE) -> Array:
         """(4, 3) the chain, advanced by one tick.
@@ -66,5 +83,5 @@ class Reference:
             shares: (3,) what is left of the limits of acceleration, axes of W.
         """
         u, a = command.velocity_m_s, command.acceleration_m_s2
-        advance_reference(self.chain, self._smooth, R_WB, u, a, bank_rad, shares, self._constants, self._step_s)
+        advance_reference(self.memory, R_WB, u, a, bank_rad, shares)
         return self.chain

@@ -100,4 +100,4 @@ def test_integral_is_held_while_an_actuator_is_at_its_limit() -> None:
     for _ in range(50):
         u = commands(design, np.array([140.0, 0.0, 0.0]))
     assert u[3] == pytest.approx(level_trim(AIRFRAME, 180.0, AIR).thrust_range.military_n)
-    np.testing.assert_array_equal(design._z, 0.0)
+    np.testing.assert_array_equal(design._memory["z"], 0.0)
