@@ -20,11 +20,11 @@ class Reach:
     """Eq. (1) for one model.
 
     Args:
-        model: the world's.
+        model, data: the world's.
         receiver: number of the receiver's body.
     """
 
-    def __init__(self, model: mujoco.MjModel, receiver: int) -> None:
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, receiver: int) -> None:
         balls = np.linalg.norm(model.geom_pos, axis=1) + model.geom_rbound
         solid = (model.geom_contype | model.geom_conaffinity) != 0
         own, radii = model.geom_bodyid == receiver, np.full(model.nbody, -np.inf)
@@ -32,10 +32,11 @@ class Reach:
         foremost_m = float((model.geom_pos[:, 0] + model.geom_rbound)[solid & own].max(initial=0.0))
         self._others = np.flatnonzero(radii > 0.0)
         self._from_m, self._receiver = radii[self._others] + (foremost_m + _MARGIN_M), receiver
+        self._xpos, self._xmat = data.xpos, data.xmat
 
-    def is_clear(self, data: mujoco.MjData) -> bool:
+    def is_clear(self) -> bool:
         """Return whether nothing touches the receiver now nor a tick later."""
-        return bool(_all_ahead(data.xpos, data.xmat, self._receiver, self._others, self._from_m))
+        return bool(_all_ahead(self._xpos, self._xmat, self._receiver, self._others, self._from_m))
 
 
 @njit(cache=True)

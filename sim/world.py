@@ -107,7 +107,7 @@ class World:
         self.model = build_scene(scene_of(parameters, receiver, clock.step_s))
         self.data = mujoco.MjData(self.model)
         self._at = Addresses.of(self.model)
-        self._reach, self._looks = Reach(self.model, self._at.receiver), True
+        self._reach, self._looks = Reach(self.model, self.data, self._at.receiver), True
         self._keep_views(self._at, self.data)
         self._wind_W = np.array([-parameters.airspeed_m_s, 0.0, 0.0])
         p = parameters
@@ -129,14 +129,14 @@ class World:
 
     def step(self, command: ReceiverCommand) -> Truth:
         """Advance by one physics tick under a command; return the new truth."""
-        x, air = self._seen, self._air_state
+        air = self._air_state
         self._wrench_W[:] = self._receiver.step(
             R_WB=self._R_WB,
-            v_WB=x[layout.V_WB],
-            w_WB_B=x[layout.W_WB_B],
+            v_WB=self._v_WB,
+            w_WB_B=self._w_WB_B,
             air_velocity_W=self._wind_W + air.receiver_W,
             air_rotation_B=air.receiver_rotation_B,
-            specific_force_B=x[layout.SPECIFIC_FORCE_B],
+            specific_force_B=self._seen[layout.SPECIFIC_FORCE_B],
             command=command,
         )
         self._advance(self._tick + 1)
@@ -162,7 +162,7 @@ class World:
         self._tow.reel, self._receiver, self._air, self._fuel = copy.deepcopy(state.parts)
         self._coupling, self.truth, self._seen, self._air_state = state.coupling, state.truth, state.seen, state.air
         now, self._tick = self.truth, state.truth.tick
-        self._R_WB, self._tensions = now.R_WB, (now.root_tension_n, now.drogue_tension_n, now.coupling_force_n)
+        self._tensions = (now.root_tension_n, now.drogue_tension_n, now.coupling_force_n)
         self._tanker.put(now.time_s)
 
     def _keep_views(self, at: Addresses, d: mujoco.MjData) -> None:
@@ -171,6 +171,8 @@ class World:
         self._tow_places = d.xipos[at.tow], R, d.cvel[at.tow], d.subtree_com[at.tanker]
         self._tow_wrenches, self._reel_force = d.xfrc_applied[at.tow], d.qfrc_applied[at.reel_dof : at.reel_dof + 1]
         self._wrench_W = d.xfrc_applied[at.receiver].reshape(2, 3)
+        self._R_WB, self._p_WB = d.xmat[at.receiver].reshape(3, 3), d.xpos[at.receiver]
+        self._v_WB, self._w_WB_B = np.split(d.qvel[at.receiver_dof], 2)
         self._reactions = d.cfrc_int, d.xmat, d.qacc
         drogue = self.parameters.drogue
         canopy, gravity = drogue.drag_centre_x_m - drogue.centre_of_mass_x_m, [0.0, 0.0, -STANDARD_GRAVITY_M_S2]
@@ -229,7 +231,7 @@ class World:
         if self._air is not None:
             self._air.step()
         self._tanker.arrive()
-        self._renew(may_touch=not self._reach.is_clear(self.data))
+        self._renew(may_touch=not self._reach.is_clear())
         self._observe(tick)
 
     def _renew(self, *, may_touch: bool = True) -> None:
@@ -270,11 +272,11 @@ class World:
         data, tanker, bodies = self.data, self._tanker, len(self._tow_wrenches)
         x, hose = np.empty(layout.OBSERVED), np.empty((2, bodies, 3))
         observe(x, hose, *self._sight)
-        self._tick, self._seen, self._R_WB = tick, x, x[layout.R_WB].reshape(3, 3)
+        self._tick, self._seen = tick, x
         if self._air is None:
             air = still_air(bodies)
         else:
-            air = self._air.at(hose[1], self._R_WB, x[layout.P_WB], tanker.R_WT, tanker.p_WT)
+            air = self._air.at(hose[1], self._R_WB, self._p_WB, tanker.R_WT, tanker.p_WT)
         touches = self._at.contacts(data.contact.geom) if data.ncon else (False, "")
         own, self._air_state = self._receiver, air
         flow = own.airspeed_m_s, own.angle_of_attack_rad, own.sideslip_rad, own.throttle

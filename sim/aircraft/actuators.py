@@ -26,8 +26,8 @@ class Actuators:
     """
 
     def __init__(self, parameters: AirframeData, trim: Trim, step_s: float) -> None:
-        self._limits_rad = np.array(parameters.surface_limits_rad)
-        self._largest_step_rad = np.array(parameters.surface_rate_limits_rad_s) * step_s
+        largest_step_rad = np.array(parameters.surface_rate_limits_rad_s) * step_s
+        self._limits_rad = np.vstack([parameters.surface_limits_rad, largest_step_rad])  # of position, of a tick's move
         self._surface_share = -float(np.expm1(-parameters.actuator_bandwidth_rad_s * step_s))
         self._quick_share = -float(np.expm1(-step_s / parameters.engine_time_constant_s))
         self._engine, self._step_s = parameters, step_s
@@ -38,7 +38,7 @@ class Actuators:
 
     def step(self, surfaces_command_rad: Array, thrust_command_n: float) -> None:
         """Advance by one tick toward the commands (3,) [rad] and [N]."""
-        _follow(self.surfaces_rad, surfaces_command_rad, self._limits_rad, self._largest_step_rad, self._surface_share)
+        _follow(self.surfaces_rad, surfaces_command_rad, self._limits_rad, self._surface_share)
         span = self._range
         command_n = min(max(thrust_command_n, span.idle_n), span.military_n)
         self.throttle = span.throttle(command_n)
@@ -50,8 +50,8 @@ class Actuators:
 
 
 @njit(cache=True)
-def _follow(surfaces, commands, limits, largest_step, share):  # type: ignore[no-untyped-def]
+def _follow(surfaces, commands, limits, share):  # type: ignore[no-untyped-def]
     for i in range(3):
-        command = min(max(commands[i], -limits[i]), limits[i])
+        command = min(max(commands[i], -limits[0, i]), limits[0, i])
         move = share * (command - surfaces[i])
-        surfaces[i] += min(max(move, -largest_step[i]), largest_step[i])
+        surfaces[i] += min(max(move, -limits[1, i]), limits[1, i])

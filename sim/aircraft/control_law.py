@@ -108,7 +108,7 @@ def _estimate(v_B, force, felt, airspeed, gust_from_residual, engaged, k):  # ty
 
 @njit(cache=True)
 def write_commands(  # type: ignore[no-untyped-def]
-    felt, airspeed, surfaces_now, u_B, a_B, engaged, motions, wrenches, surfaces, row, own, reference, relief, model
+    felt, airspeed, u_B, a_B, engaged, motions, wrenches, surfaces, row, own, reference, relief, model
 ):  # fmt: skip
     """Eqs. (1) and (2): write commands to surfaces and model, return thrust [N]; advance gust and integrals.
 
@@ -118,7 +118,7 @@ def write_commands(  # type: ignore[no-untyped-def]
     x, x_m, w_m, z, trim, limits, chain = k.x, k.x_m, k.w_m, k.z, k.trim, k.limits, reference[()].chain
     n, step, haste, shares = len(x), k.step_s, 0.0, (1.0, 1.0, 1.0)
     if engaged:
-        shares = relieve(surfaces, surfaces_now, model[()].actuators, relief)
+        shares = relieve(surfaces, motions[0, 6:9], model[()].actuators, relief)
         haste = relief[()].haste
     advance_reference(reference, k.R_FB, u_B, a_B, x_m[_BANK], shares)
     _estimate(motions[0], wrenches[0], felt, airspeed, gains.gust_from_residual, engaged, k)

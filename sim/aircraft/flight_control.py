@@ -169,15 +169,18 @@ class FlightControl:
         path.step(command.turn_rate_rad_s, command.climb_rad)
         row = self.schedule.at(path.turn_rate_rad_s).memory
         own, model, motions, wrenches = self._memory, self.model.memory, self._motions, self._wrenches
-        flown = (R_WB, velocity_W, w_WB_B, surfaces_rad, thrust_n, path.climb_rad, path.axes())
+        flown = (
+            R_WB, velocity_W, w_WB_B, surfaces_rad, thrust_n, path.climb_rad, path.axes(), row, model, own, motions
+        )  # fmt: skip
         if not self._engaged:
-            write_states(*flown, row, model, own, motions)
+            write_states(*flown)
             self._start(command)
-        write_states(*flown, row, model, own, motions)
+        write_states(*flown)
         self._aerodynamics.write_wrenches(motions, wrenches)
-        felt = (specific_force_B, airspeed_m_s, surfaces_rad, command.velocity_m_s, command.acceleration_m_s2)
-        law = (row, own, self.reference.memory, self._relief.memory, model)
-        thrust_command_n = write_commands(*felt, self._engaged, motions, wrenches, self._surfaces, *law)
+        thrust_command_n = write_commands(
+            specific_force_B, airspeed_m_s, command.velocity_m_s, command.acceleration_m_s2, self._engaged,
+            motions, wrenches, self._surfaces, row, own, self.reference.memory, self._relief.memory, model
+        )  # fmt: skip
         self._engaged = True
         return self._surfaces, thrust_command_n
 

@@ -12,10 +12,20 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from dockair.rotations import Array
 
 SAMPLE_S = 0.01
+
+_MEMORY = np.dtype(
+    [
+        ("lag_s", float),  # of the inertial unit
+        ("shares", float, 7),  # of a tick, in tau: rates, specific force, airspeed
+        ("lagged", float, 7),  # y, likewise; not a number until the first sample
+        ("noise", float, 13),  # sigma n: attitude, rates, specific force, velocity, airspeed
+    ]
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,11 +58,12 @@ class OwnSensors:
 
     def __init__(self, parameters: OwnSensorsParameters, step_s: float, rng: np.random.Generator) -> None:
         self._rng, self._sigmas, self._step_s = rng, parameters.sigmas, step_s
-        self._lag_s = parameters.inertial_lag_s
-        shares = [_share(self._lag_s, step_s)] * 6 + [_share(parameters.air_data_lag_s, step_s)]
-        self._lagged = np.array([shares, [np.nan] * 7])  # share of a tick, y: of rates, specific force, airspeed
+        self._memory: NDArray[np.void] = np.zeros((), _MEMORY)
+        m, lag_s = self._memory, parameters.inertial_lag_s
+        m["lag_s"], m["lagged"] = lag_s, np.nan
+        m["shares"] = [_share(lag_s, step_s)] * 6 + [_share(parameters.air_data_lag_s, step_s)]
         self._measured = np.empty((3, 3)), np.empty(3), np.empty(3), np.empty(3)
-        self._noise, self._ticks, self._drawn = np.zeros(13), 0, -1
+        self._ticks, self._drawn = 0, -1
 
     def step(
         self, R_WB: Array, w_WB_B: Array, specific_force_B: Array, velocity_W: Array, airspeed_m_s: float
@@ -63,11 +74,11 @@ class OwnSensors:
         """
         sample = int(self._ticks * self._step_s / SAMPLE_S + 1e-6)
         if sample > self._drawn:
-            self._noise, self._drawn = self._sigmas * self._rng.standard_normal(13), sample
+            self._memory["noise"], self._drawn = self._sigmas * self._rng.standard_normal(13), sample
         self._ticks += 1
         R, w, f, v = self._measured
-        memory, true = (self._lagged, self._noise, self._lag_s), (R_WB, w_WB_B, specific_force_B, velocity_W)
-        return R, w, f, v, _measure(*memory, *true, airspeed_m_s, R, w, f, v)
+        airspeed = _measure(self._memory, R_WB, w_WB_B, specific_force_B, velocity_W, airspeed_m_s, R, w, f, v)
+        return R, w, f, v, airspeed
 
 
 def _share(lag_s: float, step_s: float) -> float:
@@ -75,9 +86,10 @@ def _share(lag_s: float, step_s: float) -> float:
 
 
 @njit(cache=True)
-def _measure(lags, noise, lag, R_WB, w, f, v, airspeed, R_out, w_out, f_out, v_out):  # type: ignore[no-untyped-def]
+def _measure(memory, R_WB, w, f, v, airspeed, R_out, w_out, f_out, v_out):  # type: ignore[no-untyped-def]
     """Write what is measured; return the airspeed."""
-    shares, lagged = lags[0], lags[1]
+    m = memory[()]
+    lag, shares, lagged, noise = m.lag_s, m.shares, m.lagged, m.noise
     settled = not np.isnan(lagged[6])
     for i in range(7):
         now = w[i] if i < 3 else f[i - 3] if i < 6 else airspeed

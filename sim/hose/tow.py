@@ -57,6 +57,7 @@ class Tow:
         self._link_length_m, self._links = hose.link_length_m, hose.links
         self._wind_W = np.array(wind_W, dtype=float)
         self._rates = np.empty((3, hose.links + 1, 3))  # room for velocities; written anew whenever they are asked for
+        self._v, self._w = self._rates[0], self._rates[1]  # of the bodies
         self._loads = load_coefficients(hose, drogue, rho, nu)
         self._guide = guide_coefficients(hose, reel, self.rest.root_tension_n)
 
@@ -81,14 +82,15 @@ class Tow:
             drawn_in_m: length of hose inside the pod.
             pod: where the pod is; None for an exit at rest in the origin of W, without turn.
         """
-        rates, wrench = self._rates, np.empty(spatial.shape)
-        moving = (spatial, reference, self._wind_W, gusts_W)
-        write_tow_loads(position, R, *moving, drawn_in_m, self._loads, rates, wrench)
+        wrench = np.empty(spatial.shape)
+        write_tow_loads(
+            position, R, spatial, reference, self._wind_W, gusts_W, drawn_in_m, self._loads, self._rates, wrench
+        )
         if drawn_in_m > 0.0:
             if pod is None:
-                add_guide_loads(position, R, rates[0], rates[1], drawn_in_m, self._guide, wrench[:-1])
+                add_guide_loads(position, R, self._v, self._w, drawn_in_m, self._guide, wrench[:-1])
             else:
-                links = (position[:-1], R[:-1], rates[0, :-1], rates[1, :-1])
+                links = (position[:-1], R[:-1], self._v[:-1], self._w[:-1])
                 wrench[:-1] += self._guided(*links, drawn_in_m, pod)
         return wrench
 

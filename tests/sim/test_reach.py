@@ -12,31 +12,31 @@ FORWARD = ReceiverCommand(velocity_m_s=np.array([1.0, 0.0, 0.0]))
 
 
 def _reach(world: Any) -> Reach:
-    return Reach(world.model, world.model.body("receiver").id)
+    return Reach(world.model, world.data, world.model.body("receiver").id)
 
 
 @pytest.mark.parametrize("ahead_m", [2.5, 4.0])
 def test_what_lies_well_ahead_of_the_probe_is_out_of_reach(make_world: Any, ahead_m: float) -> None:
     world = make_world(p_PD_B=(ahead_m, 0.0, 0.0))
-    assert _reach(world).is_clear(world.data)
+    assert _reach(world).is_clear()
 
 
 @pytest.mark.parametrize("place", [(0.6, 0.0, 0.0), (1.0, 3.0, 0.0), (-5.0, 0.0, 8.0)])
 def test_what_is_near_the_probe_or_beside_the_receiver_is_not(make_world: Any, place: tuple[float, ...]) -> None:
     world = make_world(p_PD_B=place)
-    assert not _reach(world).is_clear(world.data)
+    assert not _reach(world).is_clear()
 
 
 def test_a_receiver_that_faces_away_may_touch_what_is_behind_it(make_world: Any) -> None:
     world = make_world(p_PD_B=(4.0, 0.0, 0.0))
     world.data.xmat[world.model.body("receiver").id] = np.diag([-1.0, -1.0, 1.0]).ravel()
-    assert not _reach(world).is_clear(world.data)
+    assert not _reach(world).is_clear()
 
 
 def test_a_place_that_is_no_number_is_not_out_of_reach(make_world: Any) -> None:
     world = make_world(p_PD_B=(4.0, 0.0, 0.0))
     world.data.xpos[world.model.body("receiver").id, 0] = np.nan
-    assert not _reach(world).is_clear(world.data)
+    assert not _reach(world).is_clear()
 
 
 def test_not_to_look_for_contacts_where_there_are_none_changes_no_bit_on_the_way_to_the_first(
@@ -46,10 +46,10 @@ def test_not_to_look_for_contacts_where_there_are_none_changes_no_bit_on_the_way
     for always in (False, True):
         world = make_world(p_PD_B=(2.3, 0.0, 0.0))
         if always:
-            monkeypatch.setattr(Reach, "is_clear", lambda reach, data: False)
+            monkeypatch.setattr(Reach, "is_clear", lambda reach: False)
         touched, truths = False, []
         for _ in range(4000):
-            skipped += not always and _reach(world).is_clear(world.data)
+            skipped += not always and _reach(world).is_clear()
             truth = world.step(FORWARD)
             truths.append(np.concatenate([truth.p_WB, truth.v_WB, truth.p_WH.ravel(), truth.w_WB_B]))
             touched |= truth.probe_touches_drogue
