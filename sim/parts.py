@@ -68,7 +68,10 @@ class Airframe(Protocol):
         specific_force_B: Array,
         command: ReceiverCommand,
     ) -> Array:
-        """(2, 3) force and moment about the centre of gravity in W, without gravity."""
+        """(2, 3) force and moment about the centre of gravity in W, without gravity.
+
+        The arrays handed in are the world's own and move on with it: whoever keeps one copies it.
+        """
         ...
 
 

@@ -117,8 +117,7 @@ class AirMotion:
         if len(self._room[0]) != n:
             self._make_room(n)
         tow_B, bow_B, places_T, wake_T, gust_F, x_F = self._room
-        scene = (R_WB, p_WB, R_WT, p_WT)
-        x = _places(tow_places_W, self._points_B, *scene, self._exit_T, x_F, places_T, tow_B)
+        x = _places(tow_places_W, self._points_B, R_WB, p_WB, R_WT, p_WT, self._exit_T, x_F, places_T, tow_B)
         rolling = 0.0 if self._gusts is None else self._gusts.write_gusts(x_F, x, gust_F)
         if self._discrete is not None:
             gust_F = gust_F + self._discrete.velocity(x_F)

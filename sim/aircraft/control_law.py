@@ -4,7 +4,7 @@ The equations are those of `flight_control`, `rate_relief`, `reference` and `mod
 
 Loops where slices would do: numba makes twenty times as much code of a slice, which then has to be fetched every tick.
 
-Each part hands over one record, its `memory`: numba takes as long to receive an array as to add up a hundred numbers.
+Each part hands over one record, its `memory`, of state and constants by name: to receive an array takes numba 0.1 us.
 `own` is that of `flight_control`, `row` that of `gain_schedule.Row`.
 
 Layouts: a trim of now is attitude, rates, surfaces, thrust per mass, slope of the path; motions and wrenches are those

@@ -1,5 +1,7 @@
 """The flight control by itself; flown on a rigid body it is in test_receiver.py, its gains are in test_regulator.py."""
 
+import copy
+
 import numpy as np
 import pytest
 
@@ -101,3 +103,14 @@ def test_integral_is_held_while_an_actuator_is_at_its_limit() -> None:
         u = commands(design, np.array([140.0, 0.0, 0.0]))
     assert u[3] == pytest.approx(level_trim(AIRFRAME, 180.0, AIR).thrust_range.military_n)
     np.testing.assert_array_equal(design._memory["z"], 0.0)
+
+
+def test_a_copy_goes_on_as_the_original_would_have_and_leaves_it_alone() -> None:
+    one, off_path = control(1e-2), np.array([180.3, 0.2, -0.1])
+    for _ in range(20):
+        commands(one, off_path, turn_rate_rad_s=0.01)
+    two = copy.deepcopy(one)
+    ahead = [commands(two, off_path, velocity_m_s=np.ones(3)) for _ in range(20)]
+    np.testing.assert_array_equal([commands(one, off_path, velocity_m_s=np.ones(3)) for _ in range(20)], ahead)
+    assert not np.shares_memory(one._memory["x_m"], two._memory["x_m"])
+    assert not np.shares_memory(one.model.R_WB, two.model.R_WB)

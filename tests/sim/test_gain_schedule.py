@@ -43,6 +43,13 @@ def test_straight_flight_has_the_trim_and_the_gains_it_was_designed_with(schedul
     np.testing.assert_allclose(row.trim[:3], [0.0, -trim.pitch_rad, 0.0], atol=1e-12)
 
 
+def test_the_record_that_the_control_law_reads_is_the_row_itself(schedule: GainSchedule) -> None:
+    row = schedule.at(0.013)
+    for name in row.memory.dtype.names or ():
+        assert np.shares_memory(row.memory[name], getattr(row, name))
+        np.testing.assert_array_equal(row.memory[name], getattr(row, name))
+
+
 @pytest.mark.parametrize("bank_deg", [7.5, 12.5, -22.5])
 def test_between_the_nodes_the_trim_is_that_of_a_steady_turn(schedule: GainSchedule, bank_deg: float) -> None:
     """Half-way, where the line is farthest off: bank within 0.1, surfaces within 0.15 degrees, thrust within 1 %."""
