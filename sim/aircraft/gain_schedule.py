@@ -53,7 +53,7 @@ class Row:
     def of(cls, flat: Array) -> "Row":
         """Name the parts of one array."""
         memory: NDArray[np.void] = flat.view(_MEMORY).reshape(())
-        return cls(*(memory[name] for name in _MEMORY.names or ()), memory)
+        return cls(**{name: memory[name] for name in _MEMORY.names or ()}, memory=memory)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
