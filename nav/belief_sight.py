@@ -124,9 +124,8 @@ class Sight:
             (8, 2) pixels, NaN behind the camera; (8,) standard deviation of each in its worst direction [px], without
             the centroid's noise, the lens's distortion neglected.
         """
-        ab, sigma = _leds_seen(
-            self.points_D, belief.ring, seen.R_CD, seen.p_CD, seen.M, belief.P, CALIBRATION.start, RING.start
-        )
+        places_D = self.led_points_D(belief)
+        ab, sigma = _leds_seen(places_D, seen.R_CD, seen.p_CD, seen.M, belief.P, CALIBRATION.start, RING.start)
         return camera.pixels_from_slopes(ab), camera.focal_length_px * sigma
 
 
@@ -242,18 +241,11 @@ def _led_variances(a: Array, R_CD: Array, p_CD: Array, M: Array, P: Array, turn:
 
 @njit(cache=True, error_model="numpy")
 def _leds_seen(
-    points_D: Array, off: Array, R_CD: Array, p_CD: Array, M: Array, P: Array, turn: int, ring: int
+    places_D: Array, R_CD: Array, p_CD: Array, M: Array, P: Array, turn: int, ring: int
 ) -> tuple[Array, Array]:
-    """(n, 2) images (-y/x, -z/x) of LEDs, NaN behind the camera, and (n,) the roots of `_led_variances`.
-
-    Their places points_D (n, 3) are off by `off` (2n,) in the ring's plane; the product is the library's.
-    """
-    places, ab = points_D.copy(), np.full((len(points_D), 2), np.nan)
-    for k in range(len(places)):
-        places[k, 1] += off[2 * k]
-        places[k, 2] += off[2 * k + 1]
-    a = np.dot(places, R_CD.T)
-    for k in range(len(places)):
+    """(n, 2) images (-y/x, -z/x) of LEDs at (n, 3), NaN behind the camera, and (n,) the roots of `_led_variances`."""
+    a, ab = np.dot(places_D, R_CD.T), np.full((len(places_D), 2), np.nan)
+    for k in range(len(a)):
         x = a[k, 0] + p_CD[0]
         if x > 0.0:
             ab[k, 0], ab[k, 1] = -(a[k, 1] + p_CD[1]) / x, -(a[k, 2] + p_CD[2]) / x
