@@ -79,7 +79,8 @@ class ImuRecord:
             return False
         if self._end == len(self._times):
             self._make_room()
-        rate_I, force_I = (np.asarray(x, dtype=float) for x in (sample.angular_rate_rad_s, sample.specific_force_m_s2))
+        rate_I = np.asarray(sample.angular_rate_rad_s, dtype=float)
+        force_I = np.asarray(sample.specific_force_m_s2, dtype=float)
         if not _put(self._rates, self._forces, self._end, rate_I, force_I, self._R_BI, self._limit_rad_s):
             return False
         self._times[self._end] = self.newest_s = sample.time_stamp_s

@@ -35,7 +35,7 @@ from dockair.nav.ring_finder import FewSettings, RingFinder
 from dockair.nav.tip_motion import TipMotion
 from dockair.nav.track import TrackSettings
 from dockair.rotations import Array
-from dockair.vectors import is_finite
+from dockair.vectors import is_finite, largest_sigma
 
 _EVEN_LEDS = 5  # four are seldom more than an accident
 _POSE_LEDS = 4  # fewer are no pose without a belief ...
@@ -277,7 +277,7 @@ class Navigator:
 
     def _solution(self) -> NavSolution:
         state = self._filter.state(self._time_s)
-        sigma_lateral_m = float(np.sqrt(np.linalg.eigvalsh(state.covariance[4:6, 4:6])[-1]))
+        sigma_lateral_m = largest_sigma(state.covariance[4:6, 4:6])
         aged_s = self._time_s - self._used_time_s
         known = is_finite(state.p_PD_B) and is_finite(state.rate_PD_B) and is_finite(state.covariance)
         valid = known and sigma_lateral_m <= self._settings.usable_sigma_m and aged_s <= self._settings.usable_age_s

@@ -17,11 +17,13 @@ A gyro's bias b that has changed and is not known yet turns c away by b g t, unt
 """
 
 import numpy as np
+from numba import njit
 
-from dockair.rotations import Array, exp
+from dockair.rotations import Array
 from dockair.vectors import cross, is_finite
 
 _LEVEL_S = 10.0  # of gravity felt: the mean over a shorter time is as much the gust's
+_SMALL2 = 1e-8  # squared angle [rad^2] below which the series' next term is rounding
 _GAP_S = 0.1  # without samples the body turns unfelt; after longer ones c is found anew
 
 
@@ -53,16 +55,35 @@ class TipMotion:
             return np.full(3, np.nan)
         unfelt_s, self._unfelt_s = self._unfelt_s, 0.0
         if self._c is None or unfelt_s > _GAP_S:
-            self._c, self._time_s = -force_B, 0.0
+            self._c, self._time_s = -np.asarray(force_B), 0.0
             return np.full(3, np.nan)
         if unfelt_s > 0.0:
-            self._c = exp(-0.5 * (unfelt_s + step_s) * (before + w_B)) @ self._c
+            _turn(self._c, -0.5 * (unfelt_s + step_s), before, w_B)
             return np.full(3, np.nan)
         self._time_s += step_s
-        self._c = exp(-0.5 * step_s * (before + w_B)) @ self._c
-        felt = force_B + self._c
-        self._c = self._c - step_s / min(self._time_s, self._levelling_s) * felt
-        if self._time_s < _LEVEL_S:
-            return np.full(3, np.nan)
-        turned = cross(w_B - before, self._p_IP) + step_s * cross(w_B, cross(w_B, self._p_IP))
-        return np.asarray(felt * step_s + turned)
+        time_s = min(self._time_s, self._levelling_s)
+        change = _felt(self._c, force_B, before, w_B, self._p_IP, step_s, time_s)
+        return change if self._time_s >= _LEVEL_S else np.full(3, np.nan)
+
+
+@njit(cache=True)
+def _felt(c: Array, f: Array, before: Array, w: Array, r: Array, step: float, time: float) -> Array:
+    """(3,) Eq. (1) over a step, from one rate to the next; c (3,) moves on in place by Eq. (2), T being `time`."""
+    _turn(c, -0.5 * step, before, w)
+    felt = f + c
+    c -= step / time * felt
+    return felt * step + cross(w - before, r) + step * cross(w, cross(w, r))
+
+
+@njit(cache=True)
+def _turn(c: Array, seconds: float, before: Array, w: Array) -> None:
+    """Turn a vector (3,) in place by the sum of two rates for a time: [rotations, eq 2] times it."""
+    phi = seconds * (before + w)
+    angle2 = np.dot(phi, phi)
+    if angle2 < _SMALL2:
+        a, b = 1.0 - angle2 / 6.0, 0.5 - angle2 / 24.0
+    else:
+        angle = np.sqrt(angle2)
+        a, b = np.sin(angle) / angle, (1.0 - np.cos(angle)) / angle2
+    once = cross(phi, c)
+    c += a * once + b * cross(phi, once)

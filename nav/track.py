@@ -42,6 +42,7 @@ from dockair.nav.identify.perspective import SLOTS
 from dockair.nav.identify.ring import Identification, IdentificationStatus
 from dockair.nav.track_kernels import ahead, innovation_squared, process_noise, turn
 from dockair.rotations import Array
+from dockair.vectors import largest_sigma
 
 if TYPE_CHECKING:
     from filterpy.kalman import KalmanFilter
@@ -171,7 +172,7 @@ class RingTracker:
     @property
     def expected_sigma_px(self) -> float:
         """Standard deviation of the expected centre, the larger axis; NaN when there is none."""
-        return float(np.sqrt(np.linalg.eigvalsh(self.covariance[:2, :2])[-1])) if self.tracking else float("nan")
+        return largest_sigma(self.covariance[:2, :2]) if self.tracking else float("nan")
 
     def predict(self, turn_C: Array | None = None, interval_s: float | None = None) -> None:
         """Advance to the next frame.

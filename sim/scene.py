@@ -98,6 +98,7 @@ def _set_options(spec: Any, step_s: float) -> None:
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.gravity = [0.0, 0.0, -STANDARD_GRAVITY_M_S2]
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET  # the world says so when a step diverges
+    spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_ISLAND  # one at most: to look for it takes time, no bit
     spec.compiler.degree = False
     spec.compiler.autolimits = False
     sensor = Camera()

@@ -72,8 +72,8 @@ class PathPlan:
         acts = np.tril(np.ones((n, n)))
         self._place = acts * (late * late * h / 2.0 + late * h * h / 2.0 + h**3 / 6.0) * jerk_limit_m_s3
         self._free = np.column_stack([np.ones(n), self._times, 0.5 * self._times**2])
-        acceleration = acts * h * jerk_limit_m_s3 / acceleration_limit_m_s2
-        self._C = np.vstack([np.eye(n), acceleration])
+        self._rise = h * jerk_limit_m_s3 / acceleration_limit_m_s2  # of acceleration, in shares of its limit, by a jerk
+        self._C = np.vstack([np.eye(n), self._rise * acts])
         kept = settings.kept_back * np.minimum(h * (k - 1) / settings.kept_back_s, 1.0)
         self._all, self._left = np.ones(2 * n), np.tile(1.0 - kept, 2)
         self._a_max = acceleration_limit_m_s2
@@ -96,7 +96,7 @@ class PathPlan:
             limits, system = self._all, self._following[calm]
         else:
             limits, system = self._left, self._system(self._weights(to_contact_s), self._prices[calm])
-        ways = self._C, self._place, *system, off, x[2] / self._a_max, limits
+        ways = self._rise, self._place, *system, off, x[2] / self._a_max, limits
         return float(_first(*ways, self._v, self._p, s.iterations)) * self._jerk
 
     def _system(self, weights: Array, price: float) -> tuple[Array, Array, float]:
@@ -123,21 +123,33 @@ def _inverse(G, C, w, price):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _first(C, G, w, M, q, off, a_0, limits, v, p, iterations):  # type: ignore[no-untyped-def]
-    """First z of Eq. (1) by Eq. (3); v and p (2N,) go on in place."""
+def _first(rise, G, w, M, q, off, a_0, limits, v, p, iterations):  # type: ignore[no-untyped-def]
+    """First z of Eq. (1) by Eq. (3); v and p (2N,) go on in place.
+
+    C z is z itself and, below it, `rise` times its running sum; M is symmetric, and goes column by column.
+    """
     n = len(M)
     f = G.T @ (w * off)
-    z, Cz, u, g = np.zeros(n), np.empty(2 * n), np.empty(2 * n), np.empty(n)
+    z, g = np.zeros(n), np.empty(n)
     for _ in range(iterations):
-        for i in range(2 * n):
-            u[i] = q * v[i] - p[i]
-        np.dot(C.T, u, g)
+        later = 0.0
+        for i in range(n - 1, -1, -1):
+            later += q * v[n + i] - p[n + i]
+            g[i] = q * v[i] - p[i] + rise * later - f[i]
+        z[:] = 0.0
+        for j in range(n):
+            for i in range(n):
+                z[i] += M[j, i] * g[j]
+        so_far = 0.0
         for i in range(n):
-            g[i] -= f[i]
-        np.dot(M, g, z)
-        np.dot(C, z, Cz)
-        for i in range(2 * n):
-            free = a_0 if i >= n else 0.0  # the acceleration that is there already, as a share of its limit
-            v[i] = min(max(Cz[i] + p[i] / q, -limits[i] - free), limits[i] - free)
-            p[i] += q * (Cz[i] - v[i])
+            so_far += z[i]
+            _clip(z[i], i, 0.0, q, limits, v, p)
+            _clip(rise * so_far, n + i, a_0, q, limits, v, p)
     return min(max(z[0], -1.0), 1.0)
+
+
+@njit(cache=True)
+def _clip(Cz, i, there, q, limits, v, p):  # type: ignore[no-untyped-def]
+    """Row i of the last two of Eq. (3), `there` being what is there already, as a share of its limit."""
+    v[i] = min(max(Cz + p[i] / q, -limits[i] - there), limits[i] - there)
+    p[i] += q * (Cz - v[i])

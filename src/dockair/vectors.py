@@ -1,4 +1,4 @@
-"""Kernels on single vectors; apart from `rotations`, which commands that must be quick load without numba."""
+"""Kernels on vectors and small matrices; apart from `rotations`, which quick commands load without numba."""
 
 import numpy as np
 from numba import njit
@@ -19,3 +19,9 @@ def is_finite(a: Array) -> bool:
         if not np.isfinite(value):
             return False
     return True
+
+
+@njit(cache=True)
+def largest_sigma(P: Array) -> float:
+    """Standard deviation in its worst direction of a pair of covariance P (2, 2); NaN where P has one."""
+    return float(np.sqrt(0.5 * (P[0, 0] + P[1, 1]) + np.hypot(0.5 * (P[0, 0] - P[1, 1]), P[0, 1])))
