@@ -1,13 +1,18 @@
 """How fast flights go on this machine, from the loop's own second core to two flights at once.
 
-Each line is a process of its own that flies a whole flight; its first second, in which kernels are loaded or compiled,
-is not counted. `x_real_time` is simulated over wall time. `x_of_own_time` is simulated over the processor's time of the
-flight or of the camera's process, whichever is longer: what it could be at most with nothing else on the machine.
-`load` is the mean number of processes that wanted a core in the minute before the end, this one's among them. Where it
-is above the number of cores, wall time says how busy the machine was; the processor's time is longer then, too, because
-caches and cores are shared.
+Each line is a whole flight in a process of its own; its first second, in which kernels are loaded or compiled, is not
+counted. All are flown by turns, and of each the fastest stands in its line: what else wants the machine, or the machine
+under a virtual one, only makes a flight slower. `median` and `slowest`, of all its turns, say how much it did.
+
+`x_real_time` is simulated over wall time. `x_of_own_time` is simulated over the processor's time of the flight or of
+the camera's process, whichever is longer: what it could be at most with nothing else on the machine. `load` is the mean
+number of processes that wanted a core in the minute before the end, this one's among them. Where it is above the number
+of cores, wall time says how busy the machine was; the processor's time is longer then, too, because caches and cores
+are shared.
 
     two at once over one = sum of the two speeds / speed of one alone, no flight with a second process
+
+is of flights one after the other, too: the median of the turns.
 
 Beside it stands what others run: steps a second (of the processor's time) of `DockFast-v0`, 0.01 s each, beside
 gymnasium's `Humanoid-v5`, 0.015 s each, by turns, if gymnasium's MuJoCo extra is installed. Speeds are benchmarks,
@@ -24,6 +29,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from statistics import median
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -46,6 +52,7 @@ _ALONE = "windowed, 50 Hz, one process"
 _WARM_UP_S = 1.0
 _ENVIRONMENTS = ("dockair/DockFast-v0", "Humanoid-v5")
 _STEPS, _TURNS = 50, 20  # of each environment in a turn; turns
+_FLIGHTS = 5  # of each case
 _SCRIPT = """
 import json, sys
 from dockair.scenarios.bench_loop import fly_timed
@@ -56,15 +63,23 @@ _ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")  #
 
 def bench_loop() -> dict[str, Any]:
     """Return {"flights": {what: {column: value}}, "steps_per_second": {environment: number}, "ratios": {...}}."""
-    flights = {what: _in_a_process(what) for what in CASES}
-    together = _at_once(_ALONE, 2)
-    alone = flights[_ALONE]["x_real_time"]
+    turns: dict[str, list[dict[str, float]]] = {what: [] for what in CASES}
+    together = []
+    for _ in range(_FLIGHTS):
+        for what, flown in turns.items():
+            flown += _at_once(what, 1)
+        pair = _at_once(_ALONE, 2)
+        together.append(sum(each["x_real_time"] for each in pair) / turns[_ALONE][-1]["x_real_time"])
     steps = environment_speeds()
-    ratios = {"two flights at once over one": sum(each["x_real_time"] for each in together) / alone}
+    ratios = {"two flights at once over one": median(together)}
     if all(name in steps for name in _ENVIRONMENTS):
         ours, theirs = (steps[name] for name in _ENVIRONMENTS)
         ratios["steps a second, DockFast-v0 over Humanoid-v5"] = ours / theirs
-    return {"flights": flights, "steps_per_second": steps, "ratios": ratios}
+    return {
+        "flights": {what: _fastest(flown) for what, flown in turns.items()},
+        "steps_per_second": steps,
+        "ratios": ratios,
+    }
 
 
 def fly_timed(what: str, seconds: float = 1e9) -> dict[str, float]:
@@ -175,8 +190,11 @@ def _children_s() -> float:
     return ticks / os.sysconf("SC_CLK_TCK")
 
 
-def _in_a_process(what: str) -> dict[str, float]:
-    return _at_once(what, 1)[0]
+def _fastest(flown: list[dict[str, float]]) -> dict[str, float]:
+    """The fastest flight's figures, and how fast the others were."""
+    speeds = [flight["x_real_time"] for flight in flown]
+    best = flown[speeds.index(max(speeds))]
+    return {"x_real_time": max(speeds), "median": median(speeds), "slowest": min(speeds)} | best
 
 
 def _at_once(what: str, count: int) -> list[dict[str, float]]:

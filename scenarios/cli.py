@@ -195,9 +195,9 @@ def bench(
 ) -> None:
     """Say how fast the closed loop runs here and where its time goes; or how fast the stages of one part are.
 
-    The loop's ways: windowed, recorded, with full frames, at 180 Hz, two flights at once and others. The parts are the
-    sensors, the image stages and the pose solvers, these two beside OpenCV's, and the world beside a bare step of
-    MuJoCo; only flight and sensors depend on the scenario.
+    The loop's ways: windowed, recorded, with full frames, at 180 Hz, two flights at once and others, the fastest of
+    five flights each: minutes. The parts are the sensors, the image stages and the pose solvers, these two beside
+    OpenCV's, and the world beside a bare step of MuJoCo; only flight and sensors depend on the scenario.
     """
     from dockair.scenarios.bench import bench as bench_scenario
     from dockair.scenarios.bench import bench_stages

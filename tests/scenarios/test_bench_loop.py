@@ -5,20 +5,38 @@ import pytest
 from dockair.scenarios import bench_loop as loop
 
 
-def test_two_flights_at_once_are_compared_with_one_alone_of_the_same_kind(monkeypatch):
-    asked = []
+def test_of_every_case_the_fastest_turn_stands_beside_median_and_slowest(monkeypatch):
+    asked, speeds = [], iter([5.0, 6.0, 3.0])
 
     def at_once(what, count):
         asked.append((what, count))
-        return [{"x_real_time": 5.0 if count == 1 else speed} for speed in (4.0, 4.5)[:count]]
+        speed = next(speeds) if what == "windowed, 50 Hz" else 4.0
+        return [{"x_real_time": speed, "wall_s": 20.0 / speed}] * count
 
+    monkeypatch.setattr(loop, "_FLIGHTS", 3)
+    monkeypatch.setattr(loop, "_at_once", at_once)
+    monkeypatch.setattr(loop, "environment_speeds", dict)
+    flights = loop.bench_loop()["flights"]
+    assert asked == 3 * ([(what, 1) for what in loop.CASES] + [("windowed, 50 Hz, one process", 2)])
+    assert list(flights) == list(loop.CASES)
+    found = {"x_real_time": 6.0, "median": 5.0, "slowest": 3.0, "wall_s": pytest.approx(20.0 / 6.0)}
+    assert flights["windowed, 50 Hz"] == found
+    assert flights["perfect navigation"]["slowest"] == 4.0
+
+
+def test_two_flights_at_once_are_compared_with_one_alone_of_the_same_turn(monkeypatch):
+    alone, pairs = iter([5.0, 2.0, 4.0]), iter([(4.0, 4.5), (2.0, 2.0), (2.0, 2.0)])
+
+    def at_once(what, count):
+        if what != "windowed, 50 Hz, one process":
+            return [{"x_real_time": 1.0}]
+        return [{"x_real_time": speed} for speed in ((next(alone),) if count == 1 else next(pairs))]
+
+    monkeypatch.setattr(loop, "_FLIGHTS", 3)
     monkeypatch.setattr(loop, "_at_once", at_once)
     monkeypatch.setattr(loop, "environment_speeds", lambda: {"dockair/DockFast-v0": 300.0, "Humanoid-v5": 200.0})
-    figures = loop.bench_loop()
-    assert asked == [(what, 1) for what in loop.CASES] + [("windowed, 50 Hz, one process", 2)]
-    assert list(figures["flights"]) == list(loop.CASES)
-    assert figures["ratios"] == {
-        "two flights at once over one": pytest.approx(8.5 / 5.0),
+    assert loop.bench_loop()["ratios"] == {
+        "two flights at once over one": pytest.approx(8.5 / 5.0),  # of 1.7, 2 and 1
         "steps a second, DockFast-v0 over Humanoid-v5": pytest.approx(1.5),
     }
 
