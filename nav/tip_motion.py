@@ -20,7 +20,7 @@ import numpy as np
 from numba import njit
 
 from dockair.rotations import Array
-from dockair.vectors import cross, is_finite
+from dockair.vectors import is_finite
 
 _LEVEL_S = 10.0  # of gravity felt: the mean over a shorter time is as much the gust's
 _SMALL2 = 1e-8  # squared angle [rad^2] below which the series' next term is rounding
@@ -70,20 +70,31 @@ class TipMotion:
 def _felt(c: Array, f: Array, before: Array, w: Array, r: Array, step: float, time: float) -> Array:
     """(3,) Eq. (1) over a step, from one rate to the next; c (3,) moves on in place by Eq. (2), T being `time`."""
     _turn(c, -0.5 * step, before, w)
-    felt = f + c
-    c -= step / time * felt
-    return felt * step + cross(w - before, r) + step * cross(w, cross(w, r))
+    out, whirl = np.empty(3), _cross(w, _cross(w, r))
+    lever = _cross((w[0] - before[0], w[1] - before[1], w[2] - before[2]), r)
+    for i in range(3):
+        felt = f[i] + c[i]
+        c[i] -= step / time * felt
+        out[i] = felt * step + lever[i] + step * whirl[i]
+    return out
 
 
 @njit(cache=True)
 def _turn(c: Array, seconds: float, before: Array, w: Array) -> None:
     """Turn a vector (3,) in place by the sum of two rates for a time: [rotations, eq 2] times it."""
-    phi = seconds * (before + w)
-    angle2 = np.dot(phi, phi)
+    phi = (seconds * (before[0] + w[0]), seconds * (before[1] + w[1]), seconds * (before[2] + w[2]))
+    angle2 = phi[0] * phi[0] + phi[1] * phi[1] + phi[2] * phi[2]
     if angle2 < _SMALL2:
         a, b = 1.0 - angle2 / 6.0, 0.5 - angle2 / 24.0
     else:
         angle = np.sqrt(angle2)
         a, b = np.sin(angle) / angle, (1.0 - np.cos(angle)) / angle2
-    once = cross(phi, c)
-    c += a * once + b * cross(phi, once)
+    once = _cross(phi, c)
+    twice = _cross(phi, once)
+    for i in range(3):
+        c[i] += a * once[i] + b * twice[i]
+
+
+@njit(cache=True)
+def _cross(a, b):  # type: ignore[no-untyped-def]
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]

@@ -6,14 +6,11 @@ and some pixels about it. Where it is not, the numbers are made as the frame is 
 """
 
 import numpy as np
-from numba import njit
-from numpy.typing import NDArray
 
-from dockair.sim.camera.pixel_noise import LANES, Reals, fill_normals, padded_columns, row_bits
+from dockair.sim.camera.pixel_noise import LANES, Place, Reals, fill_normals, padded_columns
 
 _ABOUT_PX = 16  # by which a window may move or grow from frame to frame
 
-Place = tuple[int, int]  #: row and column on the sensor, or rows and columns
 #: Numbers, and the place of the first; none.
 NOTHING_AHEAD: tuple[Reals, Place] = (np.empty((0, 0), dtype=np.float32), (0, 0))
 
@@ -56,13 +53,6 @@ class NormalsAhead:
         if self._memory.size < count:
             self._memory = np.empty(count, dtype=np.float32)
         made = self._memory[:count].reshape(shape)
-        _fill(made, self._key, number + 1, first)
+        fill_normals(made, self._key, number + 1, first)
         self._made_for, self._made = number + 1, (made, first)
         return True
-
-
-@njit(cache=True)
-def _fill(out: NDArray[np.float32], key: np.uint64, frame_number: int, start: Place) -> None:
-    for r in range(out.shape[0]):
-        seed, step = row_bits(key, frame_number, start[0] + r, start[1])
-        fill_normals(out[r], seed, step)

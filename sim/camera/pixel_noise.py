@@ -26,6 +26,7 @@ Reals = NDArray[np.float32]
 Bytes = NDArray[np.int8]
 Levels = NDArray[np.unsignedinteger]
 Real = float | np.float32
+Place = tuple[int, int]  #: row and column on the sensor, or rows and columns
 
 EXACT_BELOW_E = 4.0  #: read noise [e-] under which shot noise is drawn from the exact law
 POISSON_LIMIT = 30.0  #: electrons above which the exact law gives way to a normal number with the right skew
@@ -162,14 +163,22 @@ def _level(m: np.float32, o: np.int8, c: np.float32, chain: Chain) -> np.int32:
 
 
 @njit(cache=True)
-def fill_normals(out: Reals, seed: np.uint32, step: np.uint32) -> None:
-    """Fill a row with z of its pixels, Eq. (2); seed and step are `row_bits`'."""
+def fill_normals(out: Reals, key: np.uint64, frame_number: int, start: Place) -> None:
+    """Fill (rows, columns) from a place of the sensor on with z of a frame's pixels, Eq. (2)."""
+    for r in range(out.shape[0]):
+        seed, step = _row_bits(key, frame_number, start[0] + r, start[1])
+        _fill_row(out[r], seed, step)
+
+
+@njit(cache=True)
+def _fill_row(out: Reals, seed: np.uint32, step: np.uint32) -> None:
+    """Fill a row; seed and step are `_row_bits`'."""
     for i in range(out.size):
         out[i] = normal_from_bits(mix(np.uint32(seed + np.uint32(i) * step)))
 
 
 @njit(cache=True)
-def row_bits(key: np.uint64, frame_number: int, row: int, first: int) -> tuple[np.uint32, np.uint32]:
+def _row_bits(key: np.uint64, frame_number: int, row: int, first: int) -> tuple[np.uint32, np.uint32]:
     """Return what the bits of a row's pixels from column `first` on begin at, and their step, Eq. (1)."""
     bits = row_key(key, frame_number, row)
     step = np.uint32(bits >> np.uint64(32)) | np.uint32(1)  # odd: no two columns alike
@@ -273,14 +282,14 @@ def digitise_rows(
     out: Levels,
     key: np.uint64,
     frame_number: int,
-    start: tuple[int, int],
+    start: Place,
     parasitic: tuple[float, float, float, float],
     in_double: Chain,
     exact: bool,
     cdf: Array,
     guide: NDArray[np.int16],
     ahead: Reals,
-    ahead_start: tuple[int, int],
+    ahead_start: Place,
 ) -> None:
     """Fill `out` with the levels of a window that starts at `start`; gain, offset and column are the sensor's.
 
@@ -298,7 +307,7 @@ def digitise_rows(
     for r in range(rows):
         waits_s = overhead_s + (start[0] + r) * row_s
         row_gain = np.float32(1.0 + sensitivity * waits_s / exposure_s)
-        seed, step = row_bits(key, frame_number, r + start[0], first)
+        seed, step = _row_bits(key, frame_number, r + start[0], first)
         begin, end = r * columns, min(r * columns + padded, flat.size)
         last = first + end - begin
         g, o, c = gain[r + start[0], first:last], offset[r + start[0], first:last], column[first:last]
@@ -309,7 +318,7 @@ def digitise_rows(
         if ahead.size > 0:
             z = ahead[r + down, right : right + end - begin]
         else:
-            fill_normals(z, seed, step)
+            _fill_row(z, seed, step)
         highest = _row(flat[begin:end], z, g, o, c, levels[begin:end], row_gain, chain)
         if highest >= near:
             _row_near_full_well(x[r], g, o, c, out[r], seed, step, row_gain, chain)
