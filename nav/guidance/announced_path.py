@@ -24,7 +24,7 @@ tanker's turn that was not announced.
 """
 
 import math
-from collections import deque
+from bisect import insort
 from dataclasses import dataclass
 
 from dockair.messages import TankerAnnouncement
@@ -60,7 +60,7 @@ class AnnouncedPath:
 
     def __init__(self, settings: AnnouncedPathSettings | None = None) -> None:
         self._settings = settings or AnnouncedPathSettings()
-        self._ahead: deque[_Ahead] = deque()
+        self._ahead: list[_Ahead] = []  # in the order in which they begin
         self._before = (0.0, 0.0)
         self._after = (0.0, 0.0)
         self._entry_s, self._since_s, self._clock_s = 0.0, 0.0, 0.0
@@ -94,7 +94,7 @@ class AnnouncedPath:
         self.is_announced = True
         starts_s = self._clock_s + announcement.starts_s - announcement.time_stamp_s
         change = _Ahead(starts_s, announcement.entry_s, announcement.turn_rate_rad_s, announcement.climb_rad)
-        self._ahead.append(change)
+        insort(self._ahead, change, key=lambda ahead: ahead.starts_s)
 
     def step(self, step_s: float, left_m_s: float | None = None) -> None:
         """Advance by a control period.
@@ -108,7 +108,7 @@ class AnnouncedPath:
         self._clock_s += step_s
         self._since_s += step_s
         if self._ahead and self._clock_s >= self._ahead[0].starts_s:
-            self._begin(self._ahead.popleft())
+            self._begin(self._ahead.pop(0))
         u = min(self._since_s / self._entry_s, 1.0) if self._entry_s > 0.0 else 1.0
         s = u**3 * (10.0 - 15.0 * u + 6.0 * u * u)  # Eq. (1)
         self.turn_rate_rad_s, self.climb_rad = (

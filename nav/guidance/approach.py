@@ -163,10 +163,11 @@ class Guidance:
         if self.phase is Phase.APPROACH:
             self._close(state, float(ring[0]), -float(rate[0]))
             self._inside_s = self._inside_s + self._dt if ring[0] <= 0.0 else 0.0
+        aside_m = float(np.hypot(ring[1], ring[2]))
         if ring[0] > 0.0:
             self._entered_m = 0.0
-        elif self._entered_m == 0.0:
-            self._entered_m = float(np.hypot(ring[1], ring[2]))
+        elif self._entered_m == 0.0 and math.isfinite(aside_m):
+            self._entered_m = aside_m
         if self.phase in _TOUCHING:
             self._pushed_in_m += (self._u[0] - self._controller.steady_drift_m_s[0]) * self._dt
 
@@ -204,6 +205,7 @@ class Guidance:
             doubtful_s=self._doubtful_s,
             station_m=_length(ring - self._station),
             ahead_m=float(coupling[0]),
+            beside_m=float(np.hypot(coupling[1], coupling[2])),
             ring_ahead_m=float(ring[0]),
             lateral_m=float(np.hypot(ring[1], ring[2])),
             entered_m=self._entered_m,

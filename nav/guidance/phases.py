@@ -8,6 +8,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 
+from dockair.errors import check_integer
+
 
 class Phase(Enum):
     """What the receiver is doing."""
@@ -39,21 +41,25 @@ class PhaseLimits:
     waiting_s: float = 120.0  # assumed: gusts that pass by have passed; a retry would wait as long
     inside_s: float = 1.0  # assumed: the way from the ring to the coupling takes 0.2 s
     coupling_reached_m: float = 0.05  # assumed: the coupling takes the tip within 0.03 m, the range errs by 0.02 m
-    come_along_m: float = 0.2  # assumed: a drogue farther from the tip than this is not held by it
+    come_along_m: float = 0.2  # assumed: a drogue farther ahead of the tip than this, or behind it, is not held by it
     take_in_m: float = 1.5  # inside the refuelling range 0.5-6 m (KDC-10 procedures)
     taken_in: float = 0.9  # of that way when holding begins: the receiver comes to rest on the remaining tenth
     hold_s: float = 5.0  # assumed: long enough to see that the drogue stays on the probe
     clear_m: float = 3.0  # procedures: pre-contact is 3-5 m behind the drogue
     lost_s: float = 0.5  # breakaway practice: track lost for 0.5 s ...
-    lost_range_m: float = 2.0  # ... within 2 m
+    lost_range_m: float = 2.0  # ... within 2 m of the ring
     lost_for_good_s: float = 20.0  # assumed: what is not in view again after falling back so long will not be found
     off_axis_m: float = 1.0  # breakaway practice: 1 m off ...
     off_axis_range_m: float = 1.0  # ... within 1 m
-    rim_m: float = 0.25  # radius of the ring: a tip that came past its plane farther out is beside the basket
+    rim_m: float = 0.25  # radius of the ring: a tip that came past its plane farther out is beside the basket, and so
+    # is one in contact with the coupling farther off its line
     clear_range_m: float = 0.6  # assumed: who is not committed and comes nearer than this ...
     beside_m: float = 0.6  # ... outside the rim keeps so far from the axis: rim, probe and what a gust may do
     closure_limit_m_s: float = 2.6  # 5 kt, service limit
     breakaway_s: float = 10.0  # assumed: backing off at 1 m/s clears any attempt in this time
+
+    def __post_init__(self) -> None:
+        check_integer("guidance.limits.attempts_max", self.attempts_max, 1)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,6 +79,7 @@ class Situation:
     doubtful_s: float  #: time for which the integrity monitor has not claimed that contact may be flown
     station_m: float  #: probe's tip from the stand-off point
     ahead_m: float  #: coupling ahead of the probe's tip
+    beside_m: float  #: the same off the probe's line
     ring_ahead_m: float  #: ring centre ahead of the probe's tip
     lateral_m: float  #: ring centre off the probe's line
     entered_m: float  #: the same where the tip came past the ring's plane, 0 before it
@@ -88,7 +95,7 @@ _Condition = Callable[[PhaseLimits, Situation], bool]
 
 def _is_close(limits: PhaseLimits, s: Situation) -> bool:
     """Within the range by what is believed; also where that runs away from a receiver that is committed, or is NaN."""
-    return s.committed or not s.ahead_m >= limits.lost_range_m
+    return s.committed or not s.ring_ahead_m >= limits.lost_range_m
 
 
 def _lost(limits: PhaseLimits, s: Situation) -> bool:
@@ -109,12 +116,16 @@ def _beside(limits: PhaseLimits, s: Situation) -> bool:
 
 
 def _left(limits: PhaseLimits, s: Situation) -> bool:
-    return abs(s.ahead_m) > limits.come_along_m or s.track_lost_s > limits.lost_s
+    off = abs(s.ahead_m) > limits.come_along_m or s.beside_m > limits.rim_m
+    return off or s.track_lost_s > limits.lost_s
 
 
 def _far_enough(limits: PhaseLimits, s: Situation) -> bool:
-    seen_clear = s.unusable_s == 0.0 and s.ring_ahead_m >= limits.clear_m and s.closing_m_s <= 0.0
-    return seen_clear or s.in_phase_s >= limits.breakaway_s
+    """Seen clear, or not for long; never with the drogue seen on the probe, where nobody may wait astern of it."""
+    seen = s.unusable_s == 0.0
+    seen_clear = seen and s.ring_ahead_m >= limits.clear_m and s.closing_m_s <= 0.0
+    about_it = seen and s.ring_ahead_m <= 0.0
+    return seen_clear or (s.in_phase_s >= limits.breakaway_s and not about_it)
 
 
 @dataclass(frozen=True, slots=True)

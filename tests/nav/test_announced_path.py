@@ -68,6 +68,17 @@ def test_change_announced_while_the_last_one_comes_in_waits_for_its_own_start():
     np.testing.assert_allclose(later[-1], [0.0, -0.05], atol=1e-12)
 
 
+def test_changes_come_in_the_order_in_which_they_begin_whatever_was_said_first():
+    told, other = AnnouncedPath(), AnnouncedPath()
+    early, late = _said(starts_s=2.0), _said(starts_s=20.0, turn=0.0)
+    for path, said in ((told, (early, late)), (other, (late, early))):
+        for announcement in said:
+            path.announce(announcement)
+    flown = _flown(told, 35.0)
+    np.testing.assert_array_equal(_flown(other, 35.0), flown)
+    assert flown[1500, 0] == pytest.approx(TURN) and flown[-1, 0] == pytest.approx(0.0)
+
+
 def test_bank_of_a_turn_is_that_of_coordinated_flight():
     path = AnnouncedPath()
     path.announce(_said(starts_s=0.0, entry_s=0.1, turn=GRAVITY * np.tan(np.radians(25.0)) / AIRSPEED))

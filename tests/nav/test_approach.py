@@ -316,6 +316,39 @@ def test_a_track_is_lost_half_a_second_after_its_last_frame(aged):
     assert k / RATE_HZ == pytest.approx(SETTINGS.limits.lost_s, abs=2.1 / RATE_HZ)
 
 
+@pytest.mark.parametrize("unknown_ticks", [0, 1, 3])
+def test_a_tip_that_comes_past_beside_the_basket_breaks_away_though_a_tick_there_is_unknown(unknown_ticks):
+    guidance = Guidance(SETTINGS, RATE_HZ)
+    guidance.phase = Phase.APPROACH
+    past = 0
+    for ahead_m in np.linspace(0.3, -0.2, RATE_HZ):
+        past += ahead_m <= 0.0
+        unknown = 0 < past <= unknown_ticks
+        p = np.full(3, np.nan) if unknown else [ahead_m, 0.6, 0.0]
+        guidance.step(state(p, [-0.5, 0.0, 0.0], usable=not unknown))
+    assert guidance.phase is Phase.BREAKAWAY and guidance.phase_reason == "beside the basket"
+
+
+@pytest.mark.parametrize("phase", [Phase.CONTACT, Phase.HOLD])
+def test_a_drogue_that_lies_beside_the_probe_has_not_been_refuelled_from(phase):
+    guidance = Guidance(SETTINGS, RATE_HZ)
+    guidance.step(state([-DEPTH_M, 0.01, 0.0]))  # it came in inside the ring
+    guidance.phase = phase
+    guidance.step(state([-DEPTH_M, 0.8, 0.0]))
+    assert guidance.phase is (Phase.BACK_OFF if phase is Phase.CONTACT else Phase.BREAKAWAY)
+
+
+@pytest.mark.parametrize("phase", [Phase.DISCONNECT, Phase.BACK_OFF, Phase.BREAKAWAY])
+def test_who_sees_the_drogue_stay_on_the_probe_goes_on_backing_off_as_slowly_as_before(phase):
+    guidance = Guidance(SETTINGS, RATE_HZ)
+    guidance.step(state([-DEPTH_M, 0.0, 0.0]))
+    guidance.phase = phase
+    for _ in range(40 * RATE_HZ):
+        command = guidance.step(state([-DEPTH_M, 0.0, 0.0]))
+    assert guidance.phase is phase
+    assert command.velocity_m_s[0] == pytest.approx(-SETTINGS.back_off_speed_m_s, abs=0.05)
+
+
 def test_a_basket_that_was_passed_on_purpose_teaches_nothing():
     guidance = Guidance(SETTINGS, RATE_HZ)
     guidance.phase = Phase.APPROACH

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from dockair.errors import DockairError
 from dockair.nav.guidance.phases import TRANSITIONS, Phase, PhaseLimits, Situation, next_phase
 
 DOCS = Path(__file__).parents[2] / "docs" / "guidance.md"
@@ -25,6 +26,7 @@ CALM = Situation(
     doubtful_s=0.0,
     station_m=3.0,
     ahead_m=1.5,
+    beside_m=0.0,
     ring_ahead_m=1.2,
     lateral_m=0.0,
     entered_m=0.0,
@@ -52,13 +54,13 @@ OPENING = {"closing_m_s": -1.0}
         ("pre_contact", {"steady_s": 3.0, "spread_m": math.inf}, None),
         ("approach", {}, None),
         ("approach", {"track_lost_s": 0.6}, "breakaway"),
-        ("approach", {"track_lost_s": 0.6, "ahead_m": 2.5}, None),
-        ("approach", {"track_lost_s": 0.6, "ahead_m": 2.5, "committed": True}, "breakaway"),
-        ("approach", {"track_lost_s": 0.4, "ahead_m": 2.5, "committed": True}, None),
-        ("approach", {"track_lost_s": 0.6, "ahead_m": math.nan}, "breakaway"),
+        ("approach", {"track_lost_s": 0.6, "ring_ahead_m": 2.1}, None),
+        ("approach", {"track_lost_s": 0.6, "ring_ahead_m": 2.1, "committed": True}, "breakaway"),
+        ("approach", {"track_lost_s": 0.4, "ring_ahead_m": 2.1, "committed": True}, None),
+        ("approach", {"track_lost_s": 0.6, "ring_ahead_m": math.nan}, "breakaway"),
         ("approach", {"doubtful_s": 0.6}, "breakaway"),
-        ("approach", {"doubtful_s": 0.6, "ahead_m": 2.5, "committed": True}, "breakaway"),
-        ("approach", {"doubtful_s": 0.6, "ahead_m": 2.5}, None),
+        ("approach", {"doubtful_s": 0.6, "ring_ahead_m": 2.1, "committed": True}, "breakaway"),
+        ("approach", {"doubtful_s": 0.6, "ring_ahead_m": 2.1}, None),
         ("approach", {"lateral_m": 1.1}, None),
         ("approach", {"lateral_m": 1.1, "ring_ahead_m": 0.9}, "breakaway"),
         ("approach", {"entered_m": 0.3, "ring_ahead_m": -0.01}, "breakaway"),
@@ -76,17 +78,22 @@ OPENING = {"closing_m_s": -1.0}
         ("contact", HELD, None),
         ("contact", HELD | {"ahead_m": -0.3}, "back_off"),
         ("contact", HELD | {"ahead_m": -0.3, "entered_m": 0.3}, "breakaway"),
+        ("contact", HELD | {"beside_m": 0.24}, None),
+        ("contact", HELD | {"beside_m": 0.26}, "back_off"),
         ("contact", HELD | {"track_lost_s": 0.6}, "back_off"),
         ("contact", HELD | {"pushed_in_m": 1.36}, "hold"),
         ("hold", HELD | {"in_phase_s": 4.9}, None),
         ("hold", HELD | {"in_phase_s": 5.0}, "disconnect"),
         ("hold", HELD | {"ahead_m": 0.5}, "breakaway"),
+        ("hold", HELD | {"beside_m": 0.26}, "breakaway"),
         ("hold", HELD | {"track_lost_s": 0.6}, "breakaway"),
         ("hold", HELD | {"track_lost_s": 0.4}, None),
         ("disconnect", HELD, None),
         ("disconnect", HELD | {"ring_ahead_m": 3.1, "closing_m_s": -0.9}, "clear"),
-        ("disconnect", HELD | {"in_phase_s": 9.9}, None),
-        ("disconnect", HELD | {"in_phase_s": 10.0}, "clear"),
+        ("disconnect", HELD | {"in_phase_s": 9.9, "unusable_s": 0.1}, None),
+        ("disconnect", HELD | {"in_phase_s": 10.0, "unusable_s": 0.1}, "clear"),
+        ("disconnect", HELD | {"in_phase_s": 10.0, "ring_ahead_m": 0.1}, "clear"),
+        ("disconnect", HELD | {"in_phase_s": 10.0}, None),
         ("back_off", OPENING | {"ring_ahead_m": 2.9}, None),
         ("back_off", OPENING | {"ring_ahead_m": 3.1}, "pre_contact"),
         ("back_off", OPENING | {"ring_ahead_m": 3.1, "unusable_s": 0.1}, None),
@@ -95,6 +102,7 @@ OPENING = {"closing_m_s": -1.0}
         ("breakaway", {"ring_ahead_m": 3.1, "closing_m_s": 0.1, "attempts": 3}, None),
         ("breakaway", {"in_phase_s": 10.0}, "pre_contact"),
         ("breakaway", {"in_phase_s": 10.0, "attempts": 3}, "clear"),
+        ("breakaway", HELD | {"in_phase_s": 10.0}, None),
     ],
 )
 def test_each_row_of_the_table(phase, changes, following):
@@ -131,3 +139,9 @@ def test_every_phase_has_its_row_and_all_but_the_first_can_be_reached():
     assert set(TRANSITIONS) == set(Phase)
     reached = {row.to for table in TRANSITIONS.values() for row in table}
     assert reached == set(Phase) - {Phase.JOIN_UP}
+
+
+@pytest.mark.parametrize("attempts", [0, -1, 1.5, True])
+def test_a_number_of_attempts_that_is_none_is_refused(attempts):
+    with pytest.raises(DockairError, match="attempts_max: expected an integer from 1 on"):
+        PhaseLimits(attempts_max=attempts)
