@@ -42,6 +42,7 @@ _FOLLOWING = (Phase.JOIN_UP, Phase.PRE_CONTACT, Phase.APPROACH, Phase.CLEAR)
 _WAITING = (Phase.JOIN_UP, Phase.PRE_CONTACT)
 _TOUCHING = (Phase.CONTACT, Phase.HOLD, Phase.DISCONNECT)
 _RETREATING = (Phase.DISCONNECT, Phase.BACK_OFF, Phase.BREAKAWAY)
+_EVADE_GAIN_1_S = 4.0  # as quickly as the limits allow
 
 
 class Guidance:
@@ -72,6 +73,7 @@ class Guidance:
         self._time_s = self._in_phase_s = self._steady_s = self._patient_s = 0.0
         self._unusable_s = self._track_lost_s = self._blind_s = self._doubtful_s = 0.0
         self._inside_s = self._pushed_in_m = 0.0
+        self._evades = False
 
     def announce(self, announcement: TankerAnnouncement) -> None:
         """Take note of what the tanker is about to do."""
@@ -221,7 +223,9 @@ class Guidance:
         transition = next_phase(self.phase, self._settings.limits, situation)
         if transition is None:
             return
+        held = self.phase in (Phase.CONTACT, Phase.HOLD)
         self.phase, self.phase_reason, self._in_phase_s = transition.to, transition.reason, 0.0
+        self._evades = False
         if self.phase is Phase.APPROACH:
             self._attempts, self._passed, self._inside_s = self._attempts + 1, None, 0.0
             self._closure.begin()
@@ -230,6 +234,7 @@ class Guidance:
         elif self.phase in (Phase.BACK_OFF, Phase.BREAKAWAY):
             if self._passed is not None and self._closure.committed:  # else it did not mean to meet the drogue
                 self._aim = self._settings.bow_wave.learnt(self._aim, self._passed)
+            self._evades = held and situation.beside_m > self._settings.limits.rim_m
             self._closure.begin()
             self._miss.forget()
 
@@ -237,7 +242,12 @@ class Guidance:
         """Whether the drogue is followed; not while it is on the probe or about it, or out of view."""
         clear = self.phase in (Phase.BACK_OFF, Phase.BREAKAWAY) and ring[0] > self._settings.limits.off_axis_range_m
         past = self.phase is Phase.APPROACH and self._inside_s > self._settings.funnel_s
-        return state.usable and not past and (self.phase in _FOLLOWING or clear)
+        return state.usable and not past and not self._is_evading and (self.phase in _FOLLOWING or clear)
+
+    @property
+    def _is_evading(self) -> bool:
+        """Whether it goes down now, out of the way of a hose that may whip."""
+        return self._evades and self._in_phase_s < self._settings.evade_s
 
     def _aim_now(self) -> Array:
         """(2,) off the drogue's predicted place, left and up: what is learnt applies to contact."""
@@ -306,7 +316,10 @@ class Guidance:
             target[0] += self._closure.speed_m_s
         elif self.phase is Phase.APPROACH:  # out of view at the last, or in the basket: on as before
             target[0] = self._u[0]
-        return np.asarray(s.course_gain_1_s * (target - self._u))
+        u_dot = np.asarray(s.course_gain_1_s * (target - self._u))
+        if self._is_evading:
+            u_dot[2] = _EVADE_GAIN_1_S * (-s.evade_speed_m_s - self._u[2])
+        return u_dot
 
     def _command(self, u_dot: Array) -> ReceiverCommand:
         """Eq. (1) and its rate in body axes, and what the path does."""

@@ -338,6 +338,25 @@ def test_a_drogue_that_lies_beside_the_probe_has_not_been_refuelled_from(phase):
     assert guidance.phase is (Phase.BACK_OFF if phase is Phase.CONTACT else Phase.BREAKAWAY)
 
 
+@pytest.mark.parametrize("phase", [Phase.CONTACT, Phase.HOLD])
+@pytest.mark.parametrize("usable", [True, False])
+@pytest.mark.parametrize(("where", "evades"), [([-DEPTH_M, 0.4, 0.3], True), ([0.2, 0.1, 0.0], False)])
+def test_from_a_drogue_that_came_off_the_probe_sideways_it_goes_down_for_a_moment(phase, usable, where, evades):
+    """Back and down, out of the way of a hose that may whip; from one that is ahead it goes straight back."""
+    guidance = Guidance(SETTINGS, RATE_HZ)
+    guidance.step(state([-DEPTH_M, 0.01, 0.0]))
+    guidance.phase = phase
+    down = np.array([guidance.step(state(where, usable=usable)).velocity_m_s[2] for _ in range(6 * RATE_HZ)])
+    assert guidance.phase in (Phase.BACK_OFF, Phase.BREAKAWAY)
+    if not evades:
+        assert down.min() > -0.5
+        return
+    soon = round(SETTINGS.evade_s * RATE_HZ)
+    assert down[soon - 2] < -0.9 * SETTINGS.evade_speed_m_s
+    assert (np.diff(down[: soon - 1]) <= 0.0).all()
+    assert abs(down[-1]) < 1.0
+
+
 @pytest.mark.parametrize("phase", [Phase.DISCONNECT, Phase.BACK_OFF, Phase.BREAKAWAY])
 def test_who_sees_the_drogue_stay_on_the_probe_goes_on_backing_off_as_slowly_as_before(phase):
     guidance = Guidance(SETTINGS, RATE_HZ)
