@@ -1,6 +1,7 @@
 """`dockair/Dock-v0`, `dockair/DockFast-v0`, `dockair/DockPixels-v0`: fly the receiver (docs/environments.md)."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -8,7 +9,7 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
-from dockair.errors import check_choice
+from dockair.errors import DockairError, check_choice
 from dockair.messages import CameraFrame
 from dockair.rotations import Array
 from dockair.scenarios.build_measured import require_measurable
@@ -24,13 +25,14 @@ from dockair.scenarios.envs_tables import (
     clipped,
     observation_from,
 )
-from dockair.scenarios.loop import Tick
+from dockair.scenarios.loop import Flight, Tick
 from dockair.scenarios.schema import Scenario
 
 __all__ = ["ACTION", "OBSERVATION", "OUTCOME_REWARD", "PIXEL_STATE", "DockEnv", "DockFastEnv", "DockPixelsEnv"]
 
 VIEWS = tuple(PICTURE)
 Pixels = dict[str, NDArray[Any]]
+_BY_CAMERA = "dockair/Dock-v0 in place of dockair/DockFast-v0"
 
 
 class DockEnv(Episodes[NDArray[np.float64]]):
@@ -45,16 +47,37 @@ class DockEnv(Episodes[NDArray[np.float64]]):
         return clipped(observation_from(self.tick.solution, self.imu), self.observation_space)
 
 
+@contextmanager
+def _by_camera_instead() -> Iterator[None]:
+    """Say which environment flies what cannot be measured: its user has set no `camera.sensing`."""
+    try:
+        yield
+    except DockairError as error:
+        if error.where != "camera.sensing":
+            raise
+        reason = error.expected.partition(": ")[2]
+        raise DockairError("scenario", expected=f"{_BY_CAMERA}: {reason}") from None
+
+
 class DockFastEnv(DockEnv):
     """The same without a picture: each LED's place is drawn from the camera's error model."""
 
     sensing = "measurements"
 
-    def chosen_scenario(self, options: Mapping[str, Any]) -> Scenario:
-        """As of `Episodes`, and one in which nothing acts through the picture alone."""
-        scenario = super().chosen_scenario(options)
-        require_measurable(scenario)
-        return scenario
+    def with_sensing(self, scenario: Scenario) -> Scenario:
+        """As of `Episodes`; what acts through the picture alone is refused."""
+        if scenario.navigation.heading:
+            expected = f"false, or {_BY_CAMERA}: a heading is kept by pictures"
+            raise DockairError("navigation.heading", expected=expected, got=True)
+        changed = super().with_sensing(scenario)
+        with _by_camera_instead():
+            require_measurable(changed)
+        return changed
+
+    def new_flight(self, scenario: Scenario, seed: int) -> Flight:
+        """As of `Episodes`; the Sun may be in the field of the camera as it was built, and not of the nominal one."""
+        with _by_camera_instead():
+            return super().new_flight(scenario, seed)
 
 
 class DockPixelsEnv(Episodes[Pixels]):
@@ -82,10 +105,9 @@ class DockPixelsEnv(Episodes[Pixels]):
         self._shape = PICTURE[view]
         self._frame: CameraFrame | None = None
 
-    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Pixels, dict[str, Any]]:
-        """As of `DockEnv`; the picture is black until the first frame has arrived."""
+    def forget(self) -> None:
+        """Forget the frame: the picture is black until the first of a flight has arrived."""
         self._frame = None
-        return super().reset(seed=seed, options=options)
 
     def note(self, tick: Tick) -> None:
         """Keep the newest frame."""

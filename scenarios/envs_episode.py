@@ -6,6 +6,7 @@ One step is one control tick (or `ticks_per_step` of them). The world, the senso
 """
 
 from collections.abc import Mapping
+from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Generic, Literal, SupportsFloat, TypeVar
@@ -18,11 +19,12 @@ from dockair.errors import DockairError, check_choice, check_integer
 from dockair.messages import ImuSample, ReceiverCommand
 from dockair.scenarios.attempts import succeeded
 from dockair.scenarios.envs_judge import AttemptJudge
+from dockair.scenarios.envs_options import command_from, scenario_from
 from dockair.scenarios.envs_tables import ACTION, OUTCOME_REWARD, RETRY_REWARD, action_cost, box, truth_info
 from dockair.scenarios.envs_viewer import LiveViewer
 from dockair.scenarios.loop import Flight, Tick
 from dockair.scenarios.referee import Outcome
-from dockair.scenarios.schema import Scenario, load_scenario
+from dockair.scenarios.schema import Scenario
 from dockair.sim.truth import Truth
 from dockair.sim.view import ThirdPersonView
 
@@ -30,6 +32,7 @@ RENDER_MODES = ("human", "rgb_array")
 REWARDS = ("dense", "sparse")
 PICTURE_PX = (640, 480)  # width, height of `render`
 _TRUNCATED = (Outcome.TIMEOUT, Outcome.DIVERGED)
+_SEEDS = 2**63  # from which the environment draws
 
 Obs = TypeVar("Obs")
 
@@ -76,25 +79,35 @@ class Episodes(gymnasium.Env[Obs, NDArray[np.float32]], Generic[Obs]):
         self._outcome: Outcome | None = None
         self._judge = AttemptJudge(attempts)
         self.imu: ImuSample | None = None  #: the newest sample; None until the first
-        chosen = self.chosen_scenario({})
-        self.metadata = self.metadata | {"render_fps": chosen.rates.control_hz / ticks_per_step}
+        self.metadata = self._metadata_of(self.chosen_scenario({}))
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Obs, dict[str, Any]]:
         """Begin a flight; its first control tick is flown on the trimmed path.
 
+        A reset that is refused changes nothing: the flight before it goes on.
+
         Args:
             seed: flies what `dockair fly --seed` flies; None draws one from the environment's own generator.
             options: "scenario" (name, path or Scenario), "set" (dotted key -> value) and "seed" for this flight.
+
+        Raises:
+            DockairError: a wrong seed or option, or a flight that cannot be begun or is over with this tick.
         """
-        super().reset(seed=seed)
-        options = options or {}
+        options = {} if options is None else options
         scenario = self.chosen_scenario(options)
-        chosen = options.get("seed", seed)
-        flight_seed = self.np_random.integers(2**63) if chosen is None else check_integer("options.seed", chosen, 0)
+        seed = None if seed is None else check_integer("seed", seed, 0)
+        chosen = seed if options.get("seed") is None else check_integer("options.seed", options["seed"], 0)
+        # a look ahead: only a reset that succeeds draws
+        flight_seed = int(deepcopy(self.np_random).integers(_SEEDS)) if chosen is None else chosen
+        flight, judge, tick = self._begun(scenario, flight_seed)
+        super().reset(seed=seed)
+        if chosen is None:
+            self.np_random.integers(_SEEDS)
         self.close()
-        self._flight = Flight(scenario, int(flight_seed), full_frames=self.full_frames)
-        self._judge, self._outcome, self.imu = AttemptJudge(self._attempts), None, None
-        self._fly(ReceiverCommand())
+        self._flight, self._judge, self._outcome, self.imu = flight, judge, None, None
+        self.metadata = self._metadata_of(scenario)
+        self.forget()
+        self._take(tick)
         return self.observation(), self._info()
 
     def step(self, action: NDArray[np.float32]) -> tuple[Obs, SupportsFloat, bool, bool, dict[str, Any]]:
@@ -102,11 +115,11 @@ class Episodes(gymnasium.Env[Obs, NDArray[np.float32]], Generic[Obs]):
 
         Raises:
             gymnasium.error.ResetNeeded: there is no flight, or it is over.
-            DockairError: the action has a wrong shape or is not finite.
+            DockairError: the action is not six finite real numbers; nothing is flown.
         """
         if self._flight is None or self._tick is None or self._outcome is not None:
             raise gymnasium.error.ResetNeeded("call reset() before step(): there is no flight going on")
-        command = self._command(action)
+        command = command_from(action, self.action_space)
         before_m, failed = self._distance_m(self._tick.truth), 0
         for _ in range(self._ticks_per_step):
             failed += self._fly(self._on_the_path(command))
@@ -153,6 +166,13 @@ class Episodes(gymnasium.Env[Obs, NDArray[np.float32]], Generic[Obs]):
         """Return what is observed now; new arrays."""
         raise NotImplementedError
 
+    def new_flight(self, scenario: Scenario, seed: int) -> Flight:
+        """Build a flight of a scenario that `chosen_scenario` has returned."""
+        return Flight(scenario, seed, full_frames=self.full_frames)
+
+    def forget(self) -> None:
+        """Forget what `note` took of the flight before."""
+
     def note(self, tick: Tick) -> None:
         """Take what a control tick brought that the observation needs."""
 
@@ -162,43 +182,64 @@ class Episodes(gymnasium.Env[Obs, NDArray[np.float32]], Generic[Obs]):
         assert self._tick is not None
         return self._tick
 
+    def _begun(self, scenario: Scenario, seed: int) -> tuple[Flight, AttemptJudge, Tick]:
+        """Return a new flight, its judge and its first control tick; one that is refused is closed."""
+        flight, judge = self.new_flight(scenario, seed), AttemptJudge(self._attempts)
+        try:
+            tick, _, outcome = self._flown(flight, judge, ReceiverCommand())
+            if outcome is not None:
+                expected = "a flight that goes on after its first control tick"
+                raise DockairError("reset", expected=expected, got=outcome.value)
+        except BaseException:
+            flight.close()
+            raise
+        return flight, judge, tick
+
     def _fly(self, command: ReceiverCommand) -> int:
         """Fly one control tick; return how many attempts failed in it that are not the last."""
         assert self._flight is not None
-        attempt = self._flight.referee.attempt
-        self._tick = tick = self._flight.step(command)
+        tick, failed, self._outcome = self._flown(self._flight, self._judge, command)
+        self._take(tick)
+        return failed
+
+    def _flown(self, flight: Flight, judge: AttemptJudge, command: ReceiverCommand) -> tuple[Tick, int, Outcome | None]:
+        """Fly one control tick; return it, how many attempts failed in it that are not the last, and the outcome."""
+        attempt = flight.referee.attempt
+        tick = flight.step(command)
+        if self._until_clear:  # that another attempt begins says that the last one failed
+            return tick, flight.referee.attempt - attempt, tick.outcome
+        failed, outcome = judge.watch(tick.truth, tick.touched)
+        if tick.outcome in (Outcome.COLLISION, Outcome.DIVERGED):
+            outcome = tick.outcome
+        elif outcome is None and tick.truth.time_s >= flight.scenario.flight.duration_s:
+            outcome = judge.unfinished or Outcome.TIMEOUT
+        return tick, int(failed and outcome is None), outcome
+
+    def _take(self, tick: Tick) -> None:
+        """Make a control tick the newest."""
+        self._tick = tick
         self.imu = tick.imu[-1] if tick.imu else self.imu
         self.note(tick)
         if self.render_mode == "human":
+            assert self._flight is not None
             self._viewer = self._viewer or LiveViewer()
             self._viewer.show(self._flight, tick)
-        if self._until_clear:
-            self._outcome = tick.outcome
-            return self._flight.referee.attempt - attempt  # that another begins says that the last one failed
-        failed, self._outcome = self._judge.watch(tick.truth, tick.touched)
-        if tick.outcome in (Outcome.COLLISION, Outcome.DIVERGED):
-            self._outcome = tick.outcome
-        elif self._outcome is None and tick.truth.time_s >= self._flight.scenario.flight.duration_s:
-            self._outcome = self._judge.unfinished or Outcome.TIMEOUT
-        return int(failed and self._outcome is None)
 
     def chosen_scenario(self, options: Mapping[str, Any]) -> Scenario:
-        """Return the scenario that reset's options ask for, checked."""
-        exists = ("scenario", "seed", "set")
-        unknown = sorted(set(options) - set(exists))
-        if unknown:
-            raise DockairError("options", expected="a known key", got=unknown[0], exists=exists)
-        source, settings = options.get("scenario", self._source), options.get("set", {})
-        if not isinstance(settings, Mapping):
-            raise DockairError("options.set", expected="a dictionary of dotted key -> value", got=settings)
-        if not isinstance(source, (str, Path, Scenario)):
-            raise DockairError("scenario", expected="a name, a path or a Scenario", got=source)
-        if not isinstance(source, Scenario):
-            scenario = load_scenario(source, settings)
-        elif settings:
-            raise DockairError("options.set", expected="a scenario's name or path beside it", got="a Scenario")
-        else:
-            scenario = source
+        """Return the scenario that reset's options ask for, with the environment's own sensing, checked."""
+        scenario = scenario_from(options, self._source)
+        tick_s = 1.0 / scenario.rates.control_hz
+        if scenario.flight.duration_s <= tick_s:
+            expected = f"more than the one control tick that reset flies, {tick_s:g} s"
+            raise DockairError("flight.duration_s", expected=expected, got=scenario.flight.duration_s)
+        return self.with_sensing(scenario)
+
+    def with_sensing(self, scenario: Scenario) -> Scenario:
+        """Return a scenario with the environment's own sensing.
+
+        Raises:
+            DockairError: it cannot be flown so.
+        """
         if self.sensing is None:
             return scenario
         if scenario.navigation.is_truth:
@@ -208,12 +249,9 @@ class Episodes(gymnasium.Env[Obs, NDArray[np.float32]], Generic[Obs]):
         changed = scenario.model_copy(update={"camera": camera})
         return Scenario.model_validate(changed.model_dump(exclude_unset=True))  # a copy alone is not checked
 
-    def _command(self, action: NDArray[np.float32]) -> ReceiverCommand:
-        values = np.asarray(action, dtype=np.float64)
-        if values.shape != self.action_space.shape or not np.isfinite(values).all():
-            raise DockairError("action", expected=f"{len(ACTION)} finite numbers", got=action)
-        values = np.clip(values, self.action_space.low, self.action_space.high)
-        return ReceiverCommand(velocity_m_s=values[:3], acceleration_m_s2=values[3:])
+    def _metadata_of(self, scenario: Scenario) -> dict[str, Any]:
+        """Return the class's metadata, a copy, with the steps a second of a scenario."""
+        return type(self).metadata | {"render_fps": scenario.rates.control_hz / self._ticks_per_step}
 
     def _on_the_path(self, command: ReceiverCommand) -> ReceiverCommand:
         """What is flown: the command as an increment on the path that the tanker has announced."""
@@ -233,6 +271,7 @@ class Episodes(gymnasium.Env[Obs, NDArray[np.float32]], Generic[Obs]):
             "outcome": outcome.value if outcome is not None else "",
             "attempt": self._flight.referee.attempt if self._until_clear else self._judge.number,
             "phase": tick.solution.phase,
+            "sensing": self._flight.scenario.sensing,
             "truth": truth_info(tick.truth, self._distance_m(tick.truth), self._flight.referee.contact),
         }
 

@@ -35,7 +35,8 @@ def _vector(name: str, unit: str, limit: float, low: float | None = None) -> lis
 _FRAME_AGE = Entry("frame_age", "s", 0.0, FRAME_AGE_LIMIT_S)
 _TIME = Entry("time", "s", 0.0, 600.0)
 
-#: The observation, in order: what the navigation believes and wants, and the newest gyro sample. Never the truth.
+#: The observation, in order: what the navigation believes and wants, and the newest gyro sample. The belief is the
+#: truth where a scenario has perfect navigation, and nowhere else; `info["sensing"]` is then "truth".
 OBSERVATION = (
     Entry("valid", "0 or 1", 0.0, 1.0),
     *_vector("p_PD_B", "m", 100.0),

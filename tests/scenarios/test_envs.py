@@ -197,15 +197,6 @@ def test_a_full_deflection_costs_what_is_written(env):
     assert action_cost(high[:3], np.zeros(3), 0.05) == pytest.approx(0.5 * 0.02 * 0.05)
 
 
-def test_commands_beyond_the_limits_are_clipped_and_nonsense_is_refused(env):
-    command = env._command(np.full(6, 100.0, np.float32))
-    np.testing.assert_array_equal(command.velocity_m_s, 3.5)
-    np.testing.assert_array_equal(command.acceleration_m_s2, 6.0)
-    for wrong in (np.full(6, np.nan, np.float32), np.zeros(5, np.float32)):
-        with pytest.raises(DockairError, match="6 finite numbers"):
-            env._command(wrong)
-
-
 def test_the_receiver_goes_along_where_the_tanker_has_announced_to_turn():
     """Two seconds after the start into 25 degrees of bank: without it the drogue is 15 m aside 8 s later."""
     env = gymnasium.make("dockair/DockFast-v0", scenario="racetrack", disable_env_checker=True).unwrapped
@@ -310,32 +301,6 @@ def test_wrong_arguments_say_what_exists():
         DockEnv("no_such_scenario")
     with pytest.raises(DockairError, match="options: .*'scenari'.*exists: scenario, seed, set"):
         DockEnv(QUICK).reset(options={"scenari": "default"})
-
-
-@pytest.mark.parametrize(
-    ("options", "line"),
-    [
-        ({"set": "turbulence.sigma_m_s=1"}, "options.set: expected a dictionary"),
-        ({"seed": -1}, "options.seed: expected an integer from 0 on, got -1"),
-        ({"seed": 2.9}, "options.seed: expected an integer from 0 on, got 2.9"),
-        ({"seed": "x"}, "options.seed: expected an integer"),
-    ],
-)
-def test_a_wrong_option_is_refused_and_the_flight_goes_on(env, options, line):
-    env.reset(seed=0)
-    with pytest.raises(DockairError, match=line):
-        env.reset(options=options)
-    assert env.step(np.zeros(6, np.float32))[4]["outcome"] == ""
-
-
-def test_the_fast_environment_refuses_what_needs_pictures():
-    with pytest.raises(DockairError, match=r"navigation\.heading: expected false"):
-        DockFastEnv(load_scenario("default", {"navigation.heading": True}))
-    for name, reason in (("low_sun_clouds", "clouds"), ("sun_in_view", "the Sun in the camera's field")):
-        with pytest.raises(DockairError, match=f"has what acts through the picture, {reason}"):
-            DockFastEnv(name)
-    with pytest.raises(DockairError, match="acts through the picture, clouds"):
-        DockFastEnv().reset(seed=0, options={"set": {"weather.cloud_cover": 0.3}})
 
 
 @pytest.mark.parametrize("made", [DockFastEnv, DockPixelsEnv])
@@ -446,3 +411,33 @@ def test_the_page_tables_what_the_code_has():
     assert set(OUTCOME_REWARD) == set(Outcome)
     for name in IDS:
         assert f"`{name}`" in page
+
+
+def test_the_page_tables_every_key_of_info(env):
+    page = PAGE.read_text(encoding="utf-8").partition("## Info")[2].partition("\n## ")[0]
+    _, info = env.reset(seed=0)
+    assert set(re.findall(r"^\| `(\w+)` \|", page, re.MULTILINE)) == set(info)
+    for key in info["truth"]:
+        assert f"`{key}`" in page, key
+
+
+@pytest.mark.parametrize(
+    ("set_keys", "sensing"),
+    [({}, "truth"), ({"navigation.navigator": "dockair.nav.navigator:Navigator"}, "measurements")],
+)
+def test_info_says_what_the_navigation_sees_in_the_words_of_a_result(env, set_keys, sensing):
+    assert env.reset(seed=0, options={"set": {"camera.sensing": "measurements"} | set_keys})[1]["sensing"] == sensing
+    assert env.step(np.zeros(6, np.float32))[4]["sensing"] == sensing
+
+
+def test_the_speed_of_a_video_follows_the_flight_and_not_the_other_environments():
+    shared, other = DockEnv.metadata | {}, DockEnv(QUICK)
+    made = DockEnv(QUICK, ticks_per_step=2)
+    before = made.metadata["render_fps"]
+    made.reset(seed=0, options={"set": {"rates.control_hz": 50, "rates.camera_hz": 50}})
+    slow = made.metadata["render_fps"]
+    made.reset(seed=0)
+    made.close()
+    assert (before, slow, made.metadata["render_fps"]) == (50.0, 25.0, 50.0)
+    assert DockEnv.metadata == shared
+    assert other.metadata["render_fps"] == 100.0
