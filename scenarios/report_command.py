@@ -1,5 +1,6 @@
 """The command `dockair report`."""
 
+import os
 from pathlib import Path
 from typing import Annotated
 
@@ -19,13 +20,17 @@ def report(
     as_json: Json = False,
 ) -> None:
     """Make one self-contained HTML page of campaigns: rates with intervals, scatter, errors, causes of failure."""
+    from dockair.scenarios.campaign.folder import is_own_file
     from dockair.scenarios.report import evidence as table
     from dockair.scenarios.report.folders import read_campaigns
     from dockair.scenarios.report.page import page, write_text
 
     out = out or folders[0] / "report.html"
-    if evidence is not None and evidence.resolve() == out.resolve():
+    if evidence is not None and os.path.realpath(evidence) == os.path.realpath(out):
         raise DockairError(f"--evidence {evidence}", expected="a file of its own", got="the page's")
+    for option, path in (("--out", out), ("--evidence", evidence)):
+        if path is not None and is_own_file(path):
+            raise DockairError(f"{option} {path}", expected="a file of its own", got="a campaign's")
     campaigns = read_campaigns(folders)
     title = title or ", ".join(campaign.name for campaign in campaigns)
     path = write_text(page(title, campaigns), out)

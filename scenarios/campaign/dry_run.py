@@ -1,10 +1,12 @@
 """What a campaign would fly, group by group, without flying or writing anything."""
 
+import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from dockair.scenarios.campaign import journal
+from dockair.scenarios.campaign.folder import entries_of
 from dockair.scenarios.campaign.plan_file import PlanFile
 from dockair.scenarios.campaign.row import flight_of, unflown
 from dockair.scenarios.campaign.run import checked_jobs
@@ -33,8 +35,8 @@ def dry_run(source: PlanFile, folder: Path) -> DryRun:
     Raises:
         DockairError: the plan cannot be flown; the folder's journal is damaged.
     """
-    jobs, path = checked_jobs(source), folder / journal.FILE_NAME
-    entries = journal.read(path)[0] if path.is_file() else {}
+    jobs = checked_jobs(source)
+    entries = entries_of(folder) if os.path.isfile(folder / journal.FILE_NAME) else {}
     done = {flight_of(entry["row"]) for entry in entries.values()}
     groups = [
         {**group.kind, "flights": len(group.rows), "done": sum(flight_of(row) in done for row in group.rows)}

@@ -1,5 +1,6 @@
 """A campaign's folder: new, empty, or an earlier campaign's; somebody else's files are never touched."""
 
+import os
 from pathlib import Path
 
 from dockair.errors import DockairError
@@ -8,6 +9,7 @@ from dockair.scenarios.campaign.whole_file import PART
 
 SUMMARY, TIMING = "summary.json", "timing.json"
 RESULTS = (table.FILE_NAME, SUMMARY, TIMING)  #: written at the end
+_OWN = (journal.FILE_NAME, manifest.FILE_NAME, *RESULTS)
 
 
 def default_folder(plan_name: str) -> Path:
@@ -15,28 +17,48 @@ def default_folder(plan_name: str) -> Path:
     return Path("out") / "campaigns" / plan_name
 
 
-def make(folder: Path) -> None:
+def make(folder: Path, *, fresh: bool = False) -> None:
     """Make the folder, or refuse it; what is in it stays as it is.
 
     Other programs, too, write a manifest.json or a summary.json. A campaign's folder is known by its journal, which is
     there before any other file.
+
+    Args:
+        folder: to be written to.
+        fresh: what was flown there is forgotten, so that a journal damaged in its first line, which its manifest says
+            is one, is no matter.
 
     Raises:
         DockairError: a file, a folder with other files and no campaign, or one that cannot be made.
     """
     where = f"--out {folder}"
     expected = f"a new or empty folder, or one with the {journal.FILE_NAME} of an earlier campaign"
-    if folder.exists() and not folder.is_dir():
-        raise DockairError(where, expected=expected, got="a file")
     try:
+        if folder.exists() and not folder.is_dir():
+            raise DockairError(where, expected=expected, got="a file")
         folder.mkdir(parents=True, exist_ok=True)
         present = sorted(path.name for path in folder.iterdir())
         if present and journal.FILE_NAME not in present:
             raise DockairError(where, expected=expected, got=f"a folder with {present[0]}")
-        if present and not journal.begins_like_one(folder / journal.FILE_NAME):
+        damaged = bool(present) and not journal.begins_like_one(folder / journal.FILE_NAME)
+        if damaged and not (fresh and _has_manifest(folder)):
             raise DockairError(where, expected=expected, got=f"a folder with another {journal.FILE_NAME}")
     except OSError as error:
         raise DockairError(where, expected="a folder that can be written", got=error.strerror) from None
+
+
+def _has_manifest(folder: Path) -> bool:
+    try:
+        return "scenarios" in manifest.read_manifest(folder)["plan"]
+    except DockairError:
+        return False
+
+
+def is_own_file(path: Path) -> bool:
+    """Whether a path is a campaign's own file, which nobody else may write: by its name, beside rows."""
+    path = Path(os.path.realpath(path))
+    rows = (path.with_name(name) for name in (journal.FILE_NAME, table.FILE_NAME))
+    return path.name.removesuffix(PART) in _OWN and any(map(os.path.lexists, rows))
 
 
 def remove_parts(folder: Path) -> None:
@@ -64,12 +86,21 @@ def rows_of(folder: str | Path) -> list[dict[str, object]]:
     """Return the rows of a campaign, of one that is not over those that are done, in the order in which they were.
 
     Raises:
-        DockairError: there is no campaign.
+        DockairError: there is no campaign, or its files are damaged.
     """
     folder = Path(folder)
-    if (folder / table.FILE_NAME).is_file():
+    if os.path.isfile(folder / table.FILE_NAME):
         return table.read_table(folder)
+    return [entry["row"] for entry in entries_of(folder).values()]
+
+
+def entries_of(folder: Path) -> dict[str, journal.Entry]:
+    """Return what a folder's journal holds.
+
+    Raises:
+        DockairError: there is none, it cannot be read, or it is damaged.
+    """
     path = folder / journal.FILE_NAME
-    if not path.is_file():
+    if not os.path.isfile(path):  # Path.is_file raises where a name is too long
         raise DockairError(str(folder), expected="the folder of a campaign", got="no journal in it")
-    return [entry["row"] for entry in journal.read(path)[0].values()]
+    return journal.read(path)[0]

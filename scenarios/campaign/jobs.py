@@ -5,9 +5,11 @@ that is done is known again when the plan has grown.
 """
 
 import json
+import math
 import os
 import re
 import shlex
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from hashlib import blake2b
@@ -16,12 +18,15 @@ from typing import Any
 
 from dockair.errors import DockairError
 from dockair.scenarios.campaign.draws import Point, grid, samples
-from dockair.scenarios.campaign.plan import Entry, Plan
+from dockair.scenarios.campaign.plan import Entry
 from dockair.scenarios.campaign.plan_file import PlanFile
+from dockair.scenarios.scenario_file import ScenarioFile
 from dockair.scenarios.schema import Scenario, load_scenario
 
 MOST_JOBS = 200_000
+MOST_SEED = 2**63 - 1  # of a scenario's `seed`, and of the table's column
 _SAYS_NOTHING_OF_THE_FLIGHT = {"seed", "claim", "accept"}  # of a scenario's keys; the seed is the job's
+_SHEETS = ("camera", "ring")  # of the keys of [hardware]: paths
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 
 #: Where the keys were written ("{key}" stands for each), and what they are set to; the later hold.
@@ -39,6 +44,7 @@ class Job:
     drawn: Point
     file: str  #: name in the library, or path, of the scenario
     settings: Mapping[str, Any]  #: dotted key -> value that the plan sets over the file
+    file_hash: str  #: what the file says of the flight; see `file_hash`
 
     @property
     def as_written(self) -> bool:
@@ -68,24 +74,27 @@ def jobs_of(source: PlanFile) -> list[Job]:
     """Return the plan's jobs in the order of the table.
 
     Raises:
-        DockairError: a scenario that cannot be flown as the plan says; a drawn key that is not flown as drawn; a
-            navigator that cannot be imported; two jobs that are the same flight; too many.
+        DockairError: a scenario that cannot be flown as the plan says; a key that decides nothing, or is not flown as
+            drawn; two scenarios of one name; a navigator that cannot be imported; two jobs that are the same flight;
+            too many; a seed that is too large.
     """
+    _refuse_too_many(source)
     jobs: list[Job] = []
     for index, entry in enumerate(source.plan.scenarios):
-        seeds = [source.plan.first_seed + seed for seed in entry.seeds or source.plan.seeds]
-        for point, seeds_there in _points(source.plan, seeds):
+        content = ""
+        for point, seeds in _points(source, _seeds(source, entry)):
             layers = _layers(source, index, entry, point)
+            _require_decisive(layers)
             settings = _merged(layers)
             file, scenario = _scenario(source, index, entry, layers, settings)
             _require_as_drawn(source, scenario, point)
-            digest = scenario_hash(scenario)
+            digest, content = scenario_hash(scenario), content or file_hash(file)
             jobs += [
-                Job(len(jobs) + k, scenario, digest, seed, point, file, settings) for k, seed in enumerate(seeds_there)
+                Job(len(jobs) + k, scenario, digest, seed, point, file, settings, content)
+                for k, seed in enumerate(seeds)
             ]
-            if len(jobs) > MOST_JOBS:
-                raise DockairError(source.place("seeds"), expected=f"up to {MOST_JOBS} flights", got=len(jobs))
     _refuse_twins(source, jobs)
+    _refuse_namesakes(source, jobs)
     names = sorted({job.scenario.name for job in jobs})
     for name in source.plan.gate.scenarios:
         if name not in names:
@@ -117,17 +126,72 @@ def scenario_hash(scenario: Scenario) -> str:
     return digest.hexdigest()
 
 
-def _points(plan: Plan, seeds: Sequence[int]) -> list[tuple[Point, list[int]]]:
+def file_hash(file: str) -> str:
+    """Return a digest of what a scenario's file says of the flight, the sheets that it names by what they hold."""
+    table = {
+        key: value for key, value in ScenarioFile(file, {}).table.items() if key not in _SAYS_NOTHING_OF_THE_FLIGHT
+    }
+    hardware = table.get("hardware")
+    if isinstance(hardware, dict):  # a path is written otherwise from another folder
+        table["hardware"] = {
+            key: blake2b(Path(value).read_bytes(), digest_size=8).hexdigest()
+            if key in _SHEETS and isinstance(value, str) and Path(value).is_file()
+            else value
+            for key, value in hardware.items()
+        }
+    return blake2b(json.dumps(table, sort_keys=True, default=str).encode(), digest_size=8).hexdigest()
+
+
+def _seeds(source: PlanFile, entry: Entry) -> list[int]:
+    """Return an entry's seeds.
+
+    Raises:
+        DockairError: one that no scenario and no table takes.
+    """
+    seeds = [source.plan.first_seed + seed for seed in entry.seeds or source.plan.seeds]
+    if max(seeds) > MOST_SEED:
+        expected = f"seeds up to {MOST_SEED}, first_seed added"
+        raise DockairError(source.place("first_seed"), expected=expected, got=max(seeds))
+    return seeds
+
+
+def _refuse_too_many(source: PlanFile) -> None:
+    """Count the flights before any of them is made: they may be more than the memory holds."""
+    plan = source.plan
+    seeds = sum(len(entry.seeds or plan.seeds) for entry in plan.scenarios)
+    points, key = plan.draws or 1, "seeds" if plan.draws is None else "draws"
+    if plan.sampler == "grid" and plan.draw:
+        key = "draw"
+        points = math.prod(len(draw.values or ()) or draw.points or 1 for draw in plan.drawn.values())
+    if points * seeds > MOST_JOBS:
+        raise DockairError(source.place(key), expected=f"up to {MOST_JOBS} flights", got=points * seeds)
+
+
+def _points(source: PlanFile, seeds: Sequence[int]) -> list[tuple[Point, Sequence[int]]]:
     """Return the points, each with the seeds that are flown there."""
+    plan = source.plan
     draws = plan.drawn
     if not draws:
-        return [({}, list(seeds))]
+        return [({}, seeds)]
+    if plan.sampler != "grid" and plan.draws is None:
+        points = samples(draws, plan.sampler, len(seeds), plan.draw_seed)
+        return [(point, [seed]) for point, seed in zip(points, seeds, strict=True)]
     if plan.sampler == "grid":
-        return [(point, list(seeds)) for point in grid(draws, MOST_JOBS)]
-    if plan.draws is not None:
-        return [(point, list(seeds)) for point in samples(draws, plan.sampler, plan.draws, plan.draw_seed)]
-    points = samples(draws, plan.sampler, len(seeds), plan.draw_seed)
-    return [(point, [seed]) for point, seed in zip(points, seeds, strict=True)]
+        points = grid(draws, MOST_JOBS)
+        _refuse_twin_points(points, source.place("draw"), "values that differ")
+    else:
+        points = samples(draws, plan.sampler, plan.draws or 1, plan.draw_seed)
+        expected = 'points that differ; of listed values fewer draws make them, or sampler = "grid" without draws'
+        _refuse_twin_points(points, source.place("draws"), expected)
+    return [(point, seeds) for point in points]
+
+
+def _refuse_twin_points(points: Sequence[Point], where: str, expected: str) -> None:
+    """Refuse points that would be flown with every seed more than once."""
+    point, times = Counter(tuple(point.items()) for point in points).most_common(1)[0]
+    if times > 1:
+        got = f"{', '.join(f'{key} = {as_toml(value, key)}' for key, value in point)} {times} times"
+        raise DockairError(where, expected=expected, got=got)
 
 
 def _layers(source: PlanFile, index: int, entry: Entry, point: Point) -> Layers:
@@ -161,14 +225,20 @@ def _scenario(
         raise DockairError(where, expected=error.expected, got=error.got, exists=error.exists) from None
 
 
+def _require_decisive(layers: Layers) -> None:
+    """Refuse a key that decides nothing: a plan has seeds of its own, and claims hold of scenarios as they are."""
+    for place, layer in layers:
+        for key in layer:
+            if key.partition(".")[0] in _SAYS_NOTHING_OF_THE_FLIGHT:
+                raise DockairError(place.replace("{key}", key), expected="a key that decides the flight", got=key)
+
+
 def _require_as_drawn(source: PlanFile, scenario: Scenario, point: Point) -> None:
-    """Refuse a drawn key that decides nothing or that another setting replaces: its column would be of no flight."""
+    """Refuse a drawn key that another setting replaces: its column would be of no flight."""
     for key, drawn in point.items():
-        where, flown = source.place(f'draw."{key}"'), _value_at(scenario, key)
-        if key.partition(".")[0] in _SAYS_NOTHING_OF_THE_FLIGHT:
-            raise DockairError(where, expected="a key that decides the flight", got=key)
+        flown = _value_at(scenario, key)
         if flown != drawn:
-            expected = "a key in whose place nothing else is set or drawn"
+            where, expected = source.place(f'draw."{key}"'), "a key in whose place nothing else is set or drawn"
             raise DockairError(where, expected=expected, got=f"{flown} flown, {drawn} drawn")
 
 
@@ -226,6 +296,17 @@ def _refuse_twins(source: PlanFile, jobs: Sequence[Job]) -> None:
             got = f"{job.scenario.name}, seed {job.seed}, twice"
             raise DockairError(source.place("scenarios"), expected="every flight once", got=got)
         seen.add(job.key)
+
+
+def _refuse_namesakes(source: PlanFile, jobs: Sequence[Job]) -> None:
+    """Refuse two scenarios of one name: gate, summary and report pool flights by it."""
+    first: dict[str, Job] = {}
+    for job in jobs:
+        earlier = first.setdefault(job.scenario.name, job)
+        if job.file_hash != earlier.file_hash:
+            expected = "a name for each scenario, for flights are pooled by it"
+            got = f"{job.scenario.name} in {earlier.file}, another in {job.file}"
+            raise DockairError(source.place("scenarios"), expected=expected, got=got)
 
 
 def _require_navigator(source: PlanFile, name: str) -> None:

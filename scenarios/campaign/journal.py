@@ -12,6 +12,7 @@ from types import TracebackType
 from typing import Any, Self
 
 from dockair.errors import DockairError, MachineError
+from dockair.scenarios.campaign.row import is_row
 from dockair.scenarios.campaign.whole_file import NO_ROOM
 
 FILE_NAME = "journal.jsonl"
@@ -25,21 +26,25 @@ class Journal:
 
     Args:
         folder: that holds it, or will.
+        unread: there is no looking into it, for it will be cleared: damage is no matter then.
 
     Raises:
         DockairError: another process writes it; a line other than the last is no entry; it cannot be opened.
     """
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, *, unread: bool = False) -> None:
         self.path = folder / FILE_NAME
+        self.entries: dict[str, Entry] = {}
+        self._size = 0
         try:
             self._file = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
         except OSError as error:
             raise DockairError(str(self.path), expected="a file that can be written", got=error.strerror) from None
         try:
             self._lock()
-            self.entries, self._size = read(self.path)
-            os.ftruncate(self._file, self._size)
+            if not unread:
+                self.entries, self._size = read(self.path)
+                os.ftruncate(self._file, self._size)
         except BaseException:
             os.close(self._file)
             raise
@@ -102,7 +107,8 @@ def read(path: Path) -> tuple[dict[str, Entry], int]:
     for number, line in enumerate(lines, start=1):
         entry = _entry(line)
         if entry is None and number < len(lines):
-            raise DockairError(f"{path}:{number}", expected="an entry of a campaign", got=line[:40])
+            expected = "an entry of a campaign (`dockair campaign --fresh` begins it anew)"
+            raise DockairError(f"{path}:{number}", expected=expected, got=line[:40])
         if entry is not None:
             entries[entry["key"]] = entry
             size += len(line)
@@ -112,7 +118,9 @@ def read(path: Path) -> tuple[dict[str, Entry], int]:
 def _entry(line: bytes) -> Entry | None:
     try:
         entry = json.loads(line)
-    except ValueError:
+    except (ValueError, RecursionError):
         return None
-    whole = line.endswith(b"\n") and isinstance(entry, dict) and {"key", "row"} <= entry.keys()
-    return entry if whole else None
+    if not (line.endswith(b"\n") and isinstance(entry, dict) and is_row(row := entry.get("row"))):
+        return None
+    timed = isinstance(entry.get("wall_time_s"), int | float)
+    return entry if timed and entry.get("key") == f"{row['scenario_hash']}:{row['seed']}" else None

@@ -24,6 +24,7 @@ from dockair.scenarios.result import versions
 FILE_NAME = "manifest.json"
 SCHEMA_VERSION = 1
 
+_TABLES = ("plug_ins", "versions", "files")
 _SAME = ("code", "versions", "background")
 
 
@@ -47,6 +48,7 @@ def manifest_of(plan: Plan, jobs: Sequence[Job], flight: str, code: Code) -> dic
         "flights": len(jobs),
         "seeds": _in_runs(sorted({job.seed for job in jobs})),
         "scenarios": _hashes(jobs),
+        "files": {job.scenario.name: job.file_hash for job in jobs},
         "flight": flight,
         "background": _background(jobs),
         "code": code.digest,
@@ -75,7 +77,7 @@ def require_same(earlier: dict[str, Any], now: dict[str, Any], done: set[str], j
     """
     expected = "the campaign that was begun there (--fresh begins it anew, another --out keeps both)"
     for name in _SAME:
-        if earlier.get(name) != now[name] and (name != "background" or earlier["background"] and now["background"]):
+        if earlier.get(name) != now[name] and (name != "background" or earlier.get("background") and now["background"]):
             raise DockairError(where, expected=expected, got=_difference(name, earlier, now))
     for module in sorted({job.plug_in for job in jobs if job.plug_in and job.key in done}):
         if earlier.get("plug_ins", {}).get(module) != now["plug_ins"][module]:
@@ -113,6 +115,9 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     plan = table.get("plan") if isinstance(table, dict) else None
     if not isinstance(plan, dict) or "name" not in plan:
         raise DockairError(str(path), expected="the manifest of a campaign", got="no plan with a name in it")
+    for key in _TABLES:
+        if not isinstance(table.get(key, {}), dict):
+            raise DockairError(str(path), expected=f"a table {key} in the manifest of a campaign", got=table[key])
     return dict(table)
 
 

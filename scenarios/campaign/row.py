@@ -6,7 +6,7 @@ A flight that could not be flown to its end is a row too: outcome "error", `erro
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
-from typing import Any
+from typing import Any, TypeGuard
 
 from dockair.scenarios.campaign.jobs import Job
 from dockair.scenarios.campaign.worker import Answer
@@ -36,6 +36,10 @@ COLUMNS: dict[str, str] = (
     | dict.fromkeys(_LISTS, "text")
     | {"scenario_hash": "text", "command": "text"}
 )
+
+_NEVER_EMPTY = {"scenario", "seed", "sensing", "scenario_hash", "command", "attempt_log"}
+_ALWAYS = COLUMNS.keys() - {"nav_by_range", "timeline", "background"}  # these came later
+_TYPES = {"text": (str,), "bool": (bool,), "int": (int,), "float": (float, int)}
 
 
 def columns_of(result: Result) -> Row:
@@ -72,6 +76,17 @@ def _asked(job: Job) -> Row:
     row |= {"sensing": scenario.sensing, "navigator": scenario.navigation.navigator}
     row["controller"] = scenario.guidance.controller
     return row | {f"{SET}{key}": value for key, value in job.drawn.items()}
+
+
+def is_row(value: Any) -> TypeGuard[Row]:
+    """Whether this may be a row: what everything reads is there, and every column holds its kind or nothing."""
+    if not isinstance(value, dict) or not _ALWAYS <= value.keys():
+        return False
+    return all(_holds(value[name], kind, name in _NEVER_EMPTY) for name, kind in COLUMNS.items() if name in value)
+
+
+def _holds(value: Any, kind: str, filled: bool) -> bool:
+    return not filled if value is None else type(value) in _TYPES[kind]
 
 
 def column_names(rows: Sequence[Mapping[str, Any]]) -> list[str]:

@@ -76,8 +76,8 @@ def run(
     code = code_of(jobs)
     check = partial(code.require_unchanged, f"--out {out}")
     now = manifest_of(source.plan, jobs, flight, code)
-    campaign_folder.make(out)
-    with Journal(out) as journal:  # from here on the folder is ours alone
+    campaign_folder.make(out, fresh=fresh)
+    with Journal(out, unread=fresh) as journal:  # from here on the folder is ours alone
         campaign_folder.remove_parts(out)
         if fresh:
             campaign_folder.remove_results(out)  # first: they must never be of other flights than the journal's
@@ -123,7 +123,7 @@ def _begun_once(journal: Journal, out: Path, now: dict[str, Any], jobs: Sequence
         raise DockairError(f"--out {out}", expected=f"{FILE_NAME} beside {journal.path.name}", got="none (or --fresh)")
     earlier = read_manifest(out)
     require_same(earlier, now, set(journal.entries), jobs, f"--out {out}")
-    return now | {"begun": earlier["begun"]}
+    return now | {"begun": earlier.get("begun")}
 
 
 def _seed_by_seed(jobs: list[Job]) -> list[Job]:

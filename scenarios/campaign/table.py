@@ -5,7 +5,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from dockair.scenarios.campaign.row import COLUMNS, column_names
+from dockair.errors import DockairError
+from dockair.scenarios.campaign.row import COLUMNS, column_names, is_row
 from dockair.scenarios.campaign.whole_file import write_whole
 
 FILE_NAME = "flights.parquet"
@@ -31,10 +32,22 @@ def write_table(rows: Sequence[Mapping[str, Any]], folder: Path) -> Path:
 
 
 def read_table(folder: Path) -> list[dict[str, Any]]:
-    """Return the rows of a folder's `flights.parquet`."""
+    """Return the rows of a folder's `flights.parquet`.
+
+    Raises:
+        DockairError: it is damaged, or somebody else's.
+    """
+    import pyarrow as pa
     import pyarrow.parquet as pq
 
-    rows: list[dict[str, Any]] = pq.read_table(folder / FILE_NAME).to_pylist()
+    path = folder / FILE_NAME
+    expected = "the table of a campaign (removed, it is made again by the command that flew it)"
+    try:
+        rows: list[dict[str, Any]] = pq.read_table(path).to_pylist()
+    except (pa.ArrowException, OSError, ValueError) as error:
+        raise DockairError(str(path), expected=expected, got=" ".join(str(error).split())) from None
+    if not all(map(is_row, rows)):
+        raise DockairError(str(path), expected=expected, got="rows of something else")
     return rows
 
 

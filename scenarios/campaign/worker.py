@@ -78,8 +78,9 @@ def work(connection: Connection, flight: str) -> None:
 
 
 def one_line(error: BaseException) -> str:
-    """Return the kind of an error and what it says, in one line."""
-    return " ".join(f"{type(error).__name__}: {error}".split())
+    """Return the kind of an error and what it says, in one line; what no page and no terminal shows is escaped."""
+    line = " ".join(f"{type(error).__name__}: {error}".split())
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in line)
 
 
 def _answer(fly: Callable[[Order], dict[str, Any]], order: Order) -> Answer:

@@ -3,6 +3,7 @@
 import io
 import json
 import math
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -33,9 +34,12 @@ _PHASE_COLOURS = {
     "breakaway": "#de2d26",
     "clear": "#636363",
 }
+_TAG = re.compile(r"<[^<>]+>")  # in texts and values both are escaped
+_ID = re.compile(r' id="|href="#|url\(#')
 _STYLE: dict[Any, Any] = {
     "svg.hashsalt": "dockair",
     "svg.fonttype": "none",
+    "text.parse_math": False,  # a label may hold anything, dollars too
     "font.size": 8.5,
     "axes.spines.top": False,
     "axes.spines.right": False,
@@ -58,7 +62,7 @@ def overview(groups: Sequence[Group]) -> str:
         ax.set_xlabel("contact inside the limits [%], 95 % interval")
         ax.grid(axis="x", alpha=0.3)
         ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, frameon=False)  # rates may be anywhere inside
-        return _svg(figure)
+        return _svg(figure, "overview")
 
 
 def panels(group: Group) -> str:
@@ -72,7 +76,7 @@ def panels(group: Group) -> str:
         _navigation(axes[1, 0], group)
         _causes(axes[1, 1], group)
         _timelines(axes[1, 2], group)
-        return _svg(figure)
+        return _svg(figure, group.anchor)
 
 
 def _share(ax: Axes, y: float, share: Share, colour: str, marker: str, label: str | None) -> None:
@@ -212,8 +216,9 @@ def _number(value: Any) -> float:
     return math.nan if value is None else float(value)
 
 
-def _svg(figure: Figure) -> str:
+def _svg(figure: Figure, name: str) -> str:
+    """Return the picture with its name before every id: one page has many, and ids are the page's."""
     buffer = io.StringIO()
-    figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
+    figure.savefig(buffer, format="svg", metadata=dict.fromkeys(("Date", "Creator", "Format", "Type")))
     text = buffer.getvalue()
-    return text[text.index("<svg") :]
+    return _TAG.sub(lambda tag: _ID.sub(rf"\g<0>{name}-", tag[0]), text[text.index("<svg") :])

@@ -8,7 +8,7 @@ from typing import Any
 from dockair.errors import DockairError
 from dockair.scenarios.campaign.folder import rows_of
 from dockair.scenarios.campaign.manifest import read_manifest
-from dockair.scenarios.report.groups import Row
+from dockair.scenarios.report.groups import Row, drawn_of, groups_of
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -24,8 +24,8 @@ def read_campaigns(folders: Sequence[Path]) -> list[Campaign]:
     """Return the campaigns in the folders' order.
 
     Raises:
-        DockairError: no campaign there, no flight done yet, two that were not flown by the same code, or the same
-            flight in two of them.
+        DockairError: no campaign there, no flight done yet, two that were not flown by the same code, another scenario
+            under the same name, or the same flight in two of them.
     """
     campaigns = []
     for folder in folders:
@@ -35,6 +35,7 @@ def read_campaigns(folders: Sequence[Path]) -> list[Campaign]:
             raise DockairError(str(folder), expected="a campaign with at least one flight done", got="none")
         campaigns.append(Campaign(name=str(manifest["plan"]["name"]), manifest=manifest, rows=rows))
     _require_one_code(folders, campaigns)
+    _refuse_namesakes(folders, campaigns)
     _refuse_twins(campaigns)
     return campaigns
 
@@ -52,10 +53,33 @@ def _require_one_code(folders: Sequence[Path], campaigns: Sequence[Campaign]) ->
 
 
 def _flown_by(manifest: Mapping[str, Any]) -> dict[str, str]:
-    """Return what must not differ; a background only where the scenarios left it to the machine."""
+    """Return what must not differ, as of one campaign; a background only where scenarios left it to the machine."""
     plug_ins = {f"navigator {module}": digest for module, digest in manifest.get("plug_ins", {}).items()}
-    found = {"code": manifest.get("code"), "background": manifest.get("background")} | plug_ins
+    versions = ", ".join(f"{name} {version}" for name, version in sorted(manifest.get("versions", {}).items()))
+    found = {"code": manifest.get("code"), "background": manifest.get("background"), "versions": versions} | plug_ins
     return {what: value for what, value in found.items() if value}
+
+
+def _refuse_namesakes(folders: Sequence[Path], campaigns: Sequence[Campaign]) -> None:
+    """Flights are pooled by the scenario's name; a file that was edited between two campaigns is another scenario.
+
+    Manifests say what the files held. Older ones do not; there the digest of a flight tells, but where keys are drawn.
+    """
+    expected = "one content of a scenario's name; of others a report each, or another name"
+    seen: dict[str, tuple[str, Path]] = {}
+    for folder, campaign in zip(folders, campaigns, strict=True):
+        for name, digest in campaign.manifest.get("files", {}).items():
+            earlier, where = seen.setdefault(name, (digest, folder))
+            if digest != earlier:
+                raise DockairError("FOLDER...", expected=expected, got=f"{name} in {where}, another in {folder}")
+    first: dict[tuple[str, ...], tuple[str, str]] = {}
+    for folder, campaign in zip(folders, campaigns, strict=True):
+        for group in groups_of(campaign.rows):
+            for row in (row for row in group.rows if not drawn_of(row)):
+                flown = f"{row['command']} in {folder}"
+                digest, before = first.setdefault(tuple(group.kind.values()), (row["scenario_hash"], flown))
+                if row["scenario_hash"] != digest:
+                    raise DockairError("FOLDER...", expected=expected, got=f"{before}, another scenario by {flown}")
 
 
 def _refuse_twins(campaigns: Sequence[Campaign]) -> None:

@@ -8,11 +8,13 @@ until both stand side by side. Where a group on the truth has flown the same fli
 
 import json
 import math
+import re
 import shlex
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from hashlib import blake2b
 from os.path import normpath
 from typing import Any
 
@@ -28,6 +30,8 @@ Row = Mapping[str, Any]
 CLOSING_BAND_M_S = (1.0, 1.5)  # service practice
 CAPTURE_M = 0.15  # of the tip from the ring's centre, inside which a contact is asked for
 SENSING_IN_WORDS = {"camera": "camera", "measurements": "measurement model", "truth": "perfect navigation"}
+NOT_SAID = "not said"  # in place of a cause
+_NO_WORD = re.compile(r"[^\w.]+")
 _SEES = ("navigation.navigator", "camera.sensing")  # keys that say what the navigation sees, and nothing of the world
 _IN_COLUMNS = (*_SEES, "guidance.controller")  # keys whose values have a column, whoever sets them
 
@@ -74,8 +78,9 @@ class Group:
 
     @property
     def anchor(self) -> str:
-        """Its id on the page."""
-        return "-".join([self.scenario, self.sensing, self.controller, self.navigator, self.settings]).replace(" ", "")
+        """Its id on the page: in words as far as a link takes them, and a digest of the whole."""
+        whole = "-".join([self.scenario, self.sensing, self.controller, self.navigator, self.settings])
+        return f"{_NO_WORD.sub('-', whole)[:80]}-{blake2b(whole.encode(), digest_size=4).hexdigest()}"
 
     @property
     def kind(self) -> dict[str, str]:
@@ -193,13 +198,12 @@ class Group:
     @cached_property
     def causes(self) -> list[tuple[str, int]]:
         """Causes of the attempts that failed, a contact outside the limits among them; the most frequent first."""
-        return _counted(attempt["cause"] for attempt in self.attempts if not _is_good(attempt))
+        return _most_frequent(cause for row in self.flown for cause in causes_of(row))
 
     @cached_property
     def causes_without_attempt(self) -> list[tuple[str, int]]:
         """Causes of the flights that began no attempt, "error" of those that were not flown to their end."""
-        idle = [row["cause"] for row in self.flown if not row["attempts"]]
-        return _counted([*idle, *("error" for _ in self.failed_to_fly)])
+        return _most_frequent(cause for row in self.rows if (cause := cause_without_attempt(row)))
 
     @cached_property
     def by_range(self) -> list[dict[str, float]]:
@@ -298,8 +302,22 @@ def _is_good(attempt: Mapping[str, Any]) -> bool:
     return attempt["outcome"] == "contact" and not attempt["cause"]
 
 
-def _counted(causes: Iterable[str]) -> list[tuple[str, int]]:
-    return Counter(cause or "not said" for cause in causes).most_common()
+def causes_of(row: Row) -> list[str]:
+    """Return the cause of each attempt that failed, of a flight that was flown to its end."""
+    failed = [] if row["error"] else [a for a in json.loads(row["attempt_log"]) if not _is_good(a)]
+    return [attempt["cause"] or NOT_SAID for attempt in failed]
+
+
+def cause_without_attempt(row: Row) -> str:
+    """Return why a flight began no attempt, "error" of one that was not flown to its end; "" of one with attempts."""
+    if row["error"]:
+        return "error"
+    return "" if row["attempts"] else row["cause"] or NOT_SAID
+
+
+def _most_frequent(causes: Iterable[str]) -> list[tuple[str, int]]:
+    """Return each cause with its number; of those as frequent the one that was met first."""
+    return Counter(causes).most_common()
 
 
 def _numbers(rows: Sequence[Row], name: str) -> Array:
@@ -308,16 +326,23 @@ def _numbers(rows: Sequence[Row], name: str) -> Array:
 
 
 def _pooled(entries: Sequence[Mapping[str, Any]]) -> list[dict[str, float]]:
+    """Return each bin with its frames; a figure is of those frames alone that have it, NaN where none has."""
     pooled = []
     for low, high in sorted({(entry["low_m"], entry["high_m"]) for entry in entries}):
-        mine = [entry for entry in entries if entry["low_m"] == low]
+        mine = [entry for entry in entries if (entry["low_m"], entry["high_m"]) == (low, high)]
         counts = np.array([entry["count"] for entry in mine], dtype=float)
         row = {"low_m": low, "high_m": high, "count": float(counts.sum())}
         for name in mine[0]:
             values = np.array([math.nan if e[name] is None else e[name] for e in mine], dtype=float)
             if name.endswith(("_rmse_m", "_rmse_deg", "_sigma_m", "_sigma_deg")):
-                row[name] = float(np.sqrt(np.nansum(counts * values**2) / counts.sum()))
+                row[name] = math.sqrt(_mean(values**2, counts))
             elif name.endswith("_bias_m"):
-                row[name] = float(np.nansum(counts * values) / counts.sum())
+                row[name] = _mean(values, counts)
         pooled.append(row)
     return pooled
+
+
+def _mean(values: Array, counts: Array) -> float:
+    """Return the mean of the values that there are, weighted; NaN of none."""
+    there = np.isfinite(values) & (counts > 0)
+    return float(np.average(values[there], weights=counts[there])) if there.any() else math.nan

@@ -3,6 +3,7 @@
 import json
 import math
 import os
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -17,9 +18,11 @@ from dockair.scenarios.campaign.whole_file import NO_ROOM, write_whole
 from dockair.scenarios.report import figures
 from dockair.scenarios.report.acceptance import claim_of, shortfalls_of
 from dockair.scenarios.report.folders import Campaign
-from dockair.scenarios.report.groups import Group, Row, groups_of, paired
+from dockair.scenarios.report.groups import Group, Row, cause_without_attempt, causes_of, groups_of, paired
 
 LIMITS = "0.15 m, 10 degrees, 2.6 m/s"
+#: What no page may hold: control characters, half of a pair of UTF-16.
+_NO_TEXT = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]")
 
 
 def page(title: str, campaigns: Sequence[Campaign]) -> str:
@@ -35,9 +38,9 @@ def page(title: str, campaigns: Sequence[Campaign]) -> str:
         loader=PackageLoader("dockair.scenarios.report", ""), autoescape=True, undefined=StrictUndefined,
         trim_blocks=True, lstrip_blocks=True,
     )  # fmt: skip
-    environment.filters["quantile"] = _quantile
+    environment.filters |= {"quantile": _quantile, "figure": _figure}
     pairs = [(group, pair) for group in groups if (pair := paired(group, groups)) is not None]
-    return environment.get_template("page.html.jinja").render(
+    text = environment.get_template("page.html.jinja").render(
         title=title,
         flights=len(rows),
         crashed=sum(len(group.failed_to_fly) for group in groups),
@@ -49,8 +52,10 @@ def page(title: str, campaigns: Sequence[Campaign]) -> str:
         shortfalls={group.anchor: shortfalls_of(group) for group in groups},
         claims={group.anchor: claim_of(group) for group in groups},
         failures={group.anchor: _failures(group) for group in groups},
+        causes={group.anchor: _causes(group) for group in groups},
         manifests=[_manifest(campaign) for campaign in campaigns],
     )
+    return _NO_TEXT.sub("\N{REPLACEMENT CHARACTER}", text)
 
 
 def _manifest(campaign: Campaign) -> dict[str, Any]:
@@ -62,9 +67,10 @@ def _manifest(campaign: Campaign) -> dict[str, Any]:
 
 
 def _failures(group: Group) -> list[dict[str, Any]]:
-    """Flights that did not succeed at the first attempt, or did something unsafe."""
+    """Flights that failed at some attempt or began none, or did something unsafe."""
     return [
         {
+            "id": _id(group, number),
             "seed": row["seed"],
             "outcome": row["outcome"] or "error",
             "attempts": row["attempts"],
@@ -72,9 +78,33 @@ def _failures(group: Group) -> list[dict[str, Any]]:
             "story": row["error"] or "; ".join(filter(None, [_story(row), row["unsafe"]])),
             "command": row["command"],
         }
-        for row in group.rows
-        if row["error"] or row["unsafe"] or not row["first_attempt"]
+        for number, row in enumerate(group.rows)
+        if row["unsafe"] or not row["first_attempt"] or _causes_of_flight(row)
     ]
+
+
+def _causes(group: Group) -> list[dict[str, Any]]:
+    """Return why attempts failed and why flights began none, each with the flights of which that is true."""
+    flights: dict[str, list[dict[str, Any]]] = {}
+    for number, row in enumerate(group.rows):
+        for cause in _causes_of_flight(row):
+            flights.setdefault(cause, []).append({"id": _id(group, number), "seed": row["seed"]})
+    attempts, idle = dict(group.causes), dict(group.causes_without_attempt)
+    return [
+        {"name": name.replace("_", " "), "attempts": attempts.get(name, 0), "idle": idle.get(name, 0)}
+        | {"flights": flights[name]}
+        for name in [*attempts, *(name for name in idle if name not in attempts)]
+    ]
+
+
+def _causes_of_flight(row: Row) -> list[str]:
+    """Return each of its causes once."""
+    return list(dict.fromkeys(filter(None, [*causes_of(row), cause_without_attempt(row)])))
+
+
+def _id(group: Group, number: int) -> str:
+    """Return the id of a flight on the page."""
+    return f"{group.anchor}-flight-{number}"
 
 
 def _story(row: Row) -> str:
@@ -91,6 +121,11 @@ def _story(row: Row) -> str:
 
 def _quantile(values: Array, share: float) -> str:
     return f"{float(np.quantile(values, share)):.3f} m" if len(values) else "–"
+
+
+def _figure(value: float, form: str) -> str:
+    """Return a figure as the form writes it, a dash where there is none."""
+    return form.format(value) if math.isfinite(value) else "–"
 
 
 def write_text(text: str, path: Path) -> Path:

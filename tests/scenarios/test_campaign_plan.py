@@ -94,14 +94,16 @@ def flown_again(job):
     return load_scenario(file, dict(option.split("=", 1) for option in options[1::2]))
 
 
-def test_lists_of_tables_and_whatever_toml_knows_can_be_set(plan):
-    text = """
+def test_lists_of_tables_and_whatever_toml_knows_can_be_set(plan, tmp_path):
+    sheet = tmp_path / 'a "quoted" path, ä.toml'
+    sheet.write_text("")
+    text = f"""
 scenarios = ["default"]
 [set]
-faults = [{ kind = "dead_reel", start_s = 1.5 }, { kind = "led_dim", leds = [1, 2], factor = 0.25 }]
-gusts = [{ at_s = 1e-3, length_m = 1e3, velocity_m_s = [0.0, -1.0, 2.0] }]
-claim = 'a "quoted" path, ä'
-"turbulence" = { sigma_m_s = 0.3, model = "dryden" }
+faults = [{{ kind = "dead_reel", start_s = 1.5 }}, {{ kind = "led_dim", leds = [1, 2], factor = 0.25 }}]
+gusts = [{{ at_s = 1e-3, length_m = 1e3, velocity_m_s = [0.0, -1.0, 2.0] }}]
+"hardware.ring" = '{sheet}'
+"turbulence" = {{ sigma_m_s = 0.3, model = "dryden" }}
 "wake.present" = false
 """
     (job,) = jobs_of(plan(text))
@@ -121,8 +123,8 @@ def test_a_value_comes_back_from_its_toml(value):
 
 
 def test_a_text_of_the_plan_stays_a_text(plan):
-    scenario = jobs_of(plan('scenarios = ["default"]\n[set]\nclaim = "true"'))[0].scenario
-    assert scenario.claim == "true"
+    scenario = jobs_of(plan('scenarios = ["default"]\n[set]\nname = "true"'))[0].scenario
+    assert scenario.name == "true"
 
 
 @pytest.mark.parametrize(
@@ -274,6 +276,24 @@ def test_every_packaged_plan_can_be_flown_and_says_what_for(name):
             'scenarios = ["default"]\nseeds = 2\n[draw.seed]\nvalues = [5, 6]',
             'p.toml: draw."seed": expected a key that decides the flight',
         ),
+        ('scenarios = ["default"]\n[set]\nseed = 5', "p.toml: set.seed: expected a key that decides the flight"),
+        ('scenarios = ["default"]\n[set]\nclaim = "x"', "p.toml: set.claim: expected a key that decides the flight"),
+        (
+            'scenarios = ["still_air", { scenario = "default", set = { accept = { outcome = "miss" } } }]',
+            "p.toml: scenarios[1].set.accept.outcome: expected a key that decides the flight",
+        ),
+        (
+            'scenarios = ["default"]\nseeds = [4611686018427387904]\nfirst_seed = 4611686018427387904',
+            "p.toml: first_seed: expected seeds up to 9223372036854775807, first_seed added, got 9223372036854775808",
+        ),
+        (
+            'scenarios = ["default"]\nseeds = 2\ndraws = 5\n[draw."turbulence.sigma_m_s"]\nvalues = [0.1, 0.2]',
+            "p.toml: draws: expected points that differ; of listed values fewer draws make them",
+        ),
+        (
+            'scenarios = ["default"]\nsampler = "grid"\n[draw."turbulence.sigma_m_s"]\nvalues = [0.1, 0.2, 0.1]',
+            "p.toml: draw: expected values that differ, got 'turbulence.sigma_m_s = 0.1 2 times'",
+        ),
         ("scenarios = [", "p.toml: expected TOML"),
     ],
 )
@@ -289,6 +309,9 @@ def test_what_the_command_line_asks_in_vain_is_said_to_be_its_own(plan):
     assert "expected a key that the plan does not draw" in refusal_of(plan, text, settings={"start.aft_m": "3"})
     assert refusal_of(plan, 'scenarios = ["default"]', settings={"start.aft_m": "2020-01-01"}).startswith(
         "--set start.aft_m: expected a number, a text"
+    )
+    assert refusal_of(plan, 'scenarios = ["default"]', settings={"seed": "3"}) == (
+        "--set seed: expected a key that decides the flight, got 'seed'"
     )
 
 
@@ -332,3 +355,58 @@ def test_scenarios_of_ones_own_lie_beside_the_plan(plan, tmp_path, monkeypatch):
     (tmp_path / "mine.toml").write_text('name = "my_own"')
     monkeypatch.chdir("/")
     assert jobs_of(plan('scenarios = ["mine.toml"]'))[0].scenario.name == "my_own"
+
+
+MINE = 'name = "mine"\nclaim = "{claim}"\n[turbulence]\nsigma_m_s = {sigma}\n[hardware]\nring = "ring.toml"'
+
+
+@pytest.fixture
+def two_files(tmp_path):
+    """Two scenario files named "mine", each with a sheet beside it; returns what makes the second anew."""
+    for folder in ("a", "b"):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "ring.toml").write_text("a = 1")
+        (tmp_path / folder / "mine.toml").write_text(MINE.format(claim=folder, sigma=0.2))
+
+    def second(sigma: float, ring: str) -> None:
+        (tmp_path / "b/mine.toml").write_text(MINE.format(claim="b", sigma=sigma))
+        (tmp_path / "b/ring.toml").write_text(ring)
+
+    return second
+
+
+@pytest.mark.parametrize("draw", ["", '[draw."start.aft_m"]\nlow = 3.0\nhigh = 5.0'])
+@pytest.mark.parametrize(("sigma", "ring"), [(2.0, "a = 1"), (0.2, "a = 2")])
+def test_two_scenarios_of_one_name_are_no_plan(plan, two_files, sigma, ring, draw):
+    """Pooled, the good one would carry the bad one through the gate."""
+    two_files(sigma, ring)
+    said = refusal_of(plan, f'scenarios = ["a/mine.toml", {{ scenario = "b/mine.toml", seeds = [9] }}]\n{draw}')
+    assert "p.toml: scenarios: expected a name for each scenario, for flights are pooled by it, got 'mine in " in said
+    assert "a/mine.toml, another in " in said and said.endswith("b/mine.toml'")
+
+
+def test_one_scenario_in_two_files_or_under_two_names_is_a_plan(plan, two_files):
+    assert len(jobs_of(plan('scenarios = ["a/mine.toml", { scenario = "b/mine.toml", seeds = [9] }]'))) == 2
+    two_files(2.0, "a = 1")
+    renamed = 'scenarios = ["a/mine.toml", { scenario = "b/mine.toml", set = { name = "rough" } }]'
+    assert [job.scenario.name for job in jobs_of(plan(renamed))] == ["mine", "rough"]
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("seeds = 100000\ndraws = 100000", "p.toml: draws: expected up to 200000 flights, got 10000000000"),
+        ('seeds = 9\nsampler = "grid"', "p.toml: draw: expected up to 200000 flights, got 900000000"),
+        ('scenarios = ["*"]\nseeds = 100000', "p.toml: seeds: expected up to 200000 flights, got "),
+    ],
+)
+def test_too_many_flights_are_refused_before_any_is_made(plan, monkeypatch, text, said):
+    for name in ("grid", "samples", "load_scenario", "Job"):
+        monkeypatch.setattr(f"dockair.scenarios.campaign.jobs.{name}", lambda *_: pytest.fail("made"))
+    scenarios = "" if "scenarios" in text else 'scenarios = ["default"]\n'
+    ranges = "".join(
+        f'[draw."{key}"]\nlow = 3.0\nhigh = 5.0\npoints = 10000\n' for key in ("start.aft_m", "start.up_m")
+    )
+    if "grid" not in text:
+        ranges = ranges.replace("points = 10000", "")
+    assert said in refusal_of(plan, f"{scenarios}{text}\n{ranges}")

@@ -11,6 +11,7 @@ import subprocess
 import sys
 import time
 from collections import Counter
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -21,6 +22,7 @@ from dockair.scenarios import campaign_command, cli
 from dockair.scenarios.campaign import manifest
 from dockair.scenarios.campaign import run as run_module
 from dockair.scenarios.campaign.code import Code, plug_in_files
+from dockair.scenarios.campaign.dry_run import dry_run
 from dockair.scenarios.campaign.folder import rows_of
 from dockair.scenarios.campaign.jobs import jobs_of
 from dockair.scenarios.campaign.journal import Journal
@@ -170,6 +172,95 @@ def test_damage_in_the_middle_is_refused_and_left_as_it_is(here, tmp_path):
     with pytest.raises(DockairError, match=r"journal.jsonl:2: expected an entry of a campaign"):
         fly(plan(tmp_path), tmp_path / "out")
     assert journal.read_bytes() == damaged
+
+
+def damaged(out: Path, number: int, line: bytes) -> bytes:
+    """Put another line in the place of one of the journal's; return the whole."""
+    parts = (out / "journal.jsonl").read_bytes().splitlines(keepends=True)
+    parts[number] = line
+    (out / "journal.jsonl").write_bytes(b"".join(parts))
+    return b"".join(parts)
+
+
+@pytest.mark.parametrize("number", [0, 1])
+@pytest.mark.parametrize(
+    "line", [b"\0" * 30 + b"\n", b'{"key": "x", "row": 3}\n', b'{"key": "x", "row": {}}\n', b"<!doctype html>\n"]
+)
+def test_fresh_forgets_a_damaged_journal_too(here, tmp_path, number, line):
+    whole = fly(plan(tmp_path), tmp_path / "out")
+    before = damaged(tmp_path / "out", number, line)
+    with pytest.raises(DockairError):
+        fly(plan(tmp_path), tmp_path / "out")
+    assert (tmp_path / "out/journal.jsonl").read_bytes() == before
+    assert fly(plan(tmp_path), tmp_path / "out", fresh=True).rows == whole.rows
+    assert fly(plan(tmp_path), tmp_path / "out").rows == whole.rows
+    assert len(lines(here)) == 8
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"row": None},
+        {"row": {}},
+        {"row": "contact"},
+        {"key": "x"},
+        {"key": 3},
+        {"wall_time_s": None},
+        {"seed": "1"},
+        {"seed": None},
+        {"success": "yes"},
+        {"radial_offset_m": "0.1"},
+        {"attempt_log": None},
+        {"command": 3},
+    ],
+)
+def test_a_line_whose_row_is_no_row_is_damage(here, tmp_path, change):
+    fly(plan(tmp_path), tmp_path / "out")
+    entry = json.loads(lines(tmp_path / "out/journal.jsonl")[1])
+    whole = entry | change if change.keys() <= entry.keys() else entry | {"row": entry["row"] | change}
+    damaged(tmp_path / "out", 1, json.dumps(whole).encode() + b"\n")
+    (tmp_path / "out/flights.parquet").unlink()
+    for read in (rows_of, Journal, partial(dry_run, plan(tmp_path))):
+        with pytest.raises(DockairError, match=r"journal.jsonl:2: expected an entry of a campaign .*--fresh"):
+            read(tmp_path / "out")
+
+
+def test_a_damaged_manifest_is_one_line_and_fresh_writes_another(here, tmp_path):
+    fly(plan(tmp_path), tmp_path / "out")
+    for text in ("", '{"plan": {"name": "p"}, "plug_ins": 3}'):
+        (tmp_path / "out/manifest.json").write_text(text)
+        with pytest.raises(DockairError, match=r"manifest.json: expected "):
+            fly(plan(tmp_path), tmp_path / "out")
+    assert len(fly(plan(tmp_path), tmp_path / "out", fresh=True).rows) == 4
+
+
+def test_a_manifest_says_what_each_scenarios_file_holds_whatever_is_set_or_drawn(here, tmp_path):
+    drawn = '[draw."start.aft_m"]\nlow = 3.0\nhigh = 5.0'
+    both = '"default", { scenario = "still_air", set = { "navigation.navigator" = "truth" } }'
+    fly(plan(tmp_path, 3, scenarios=both), tmp_path / "a")
+    fly(plan(tmp_path, 4, drawn, scenarios=both), tmp_path / "b")
+    files = read_manifest(tmp_path / "a")["files"]
+    assert files == read_manifest(tmp_path / "b")["files"]
+    assert list(files) == ["default", "still_air"] and len(set(files.values())) == 2
+
+
+def test_a_seed_that_the_table_cannot_hold_is_refused_before_anything_is_flown(here, tmp_path):
+    with pytest.raises(DockairError, match="p.toml: first_seed: expected seeds up to 9223372036854775807"):
+        fly(
+            plan(
+                tmp_path,
+                2,
+                "first_seed = 4611686018427387904",
+                '{ scenario = "default", seeds = [4611686018427387904] }',
+            ),
+            tmp_path / "out",
+        )
+    assert not lines(here) and not (tmp_path / "out").exists()
+    most = plan(
+        tmp_path, 2, "first_seed = 4611686018427387903", '{ scenario = "default", seeds = [4611686018427387904] }'
+    )
+    assert [row["seed"] for row in fly(most, tmp_path / "out").rows] == [2**63 - 1]
+    assert read_table(tmp_path / "out")[0]["seed"] == 2**63 - 1
 
 
 def test_a_plan_may_grow_and_what_was_flown_is_kept(here, tmp_path):
@@ -650,7 +741,9 @@ def test_claims_are_judged_where_the_plan_changes_nothing_of_the_scenario(here, 
 
 
 def test_mistakes_are_one_line_and_status_two(command, here, tmp_path):
-    for arguments in (("no_such_plan",), ("p.toml", "--set", "start.aft=1"), ("p.toml", "--out", "p.toml")):
+    long = ("p.toml", "--out", "n" * 300)
+    mistakes = [("no_such_plan",), ("p.toml", "--set", "start.aft=1"), ("p.toml", "--out", "p.toml"), long]
+    for arguments in mistakes:
         plan(tmp_path)
         status, out, err = command(*arguments)
         assert (status, out) == (2, "")
@@ -672,6 +765,21 @@ def test_whatever_an_error_says_is_said_as_it_is(command, here, tmp_path, monkey
     assert status == 0
     assert f"truth_navigation, seed 0: {said}" in err
     assert "  [hose]\n" in out
+
+
+def test_what_no_terminal_and_no_page_shows_of_an_error_is_escaped():
+    assert one_line(ValueError("red \x1b[31m\n nothing \0 half \udce9 ä")) == (
+        r"ValueError: red \x1b[31m nothing \x00 half \udce9 ä"
+    )
+
+
+def test_a_plans_name_that_is_too_long_for_a_folder_is_one_line(command, here, tmp_path):
+    path = tmp_path / "p.toml"
+    path.write_text(f'name = "{"n" * 300}"\nscenarios = ["truth_navigation"]')
+    status, out, err = command("p.toml")
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    assert "expected a folder that can be written, got 'File name too long'" in err
+    assert command("p.toml", "--dry-run")[0] == 0  # it writes none
 
 
 def test_a_reason_of_the_gate_is_printed_as_it_is(capsys):

@@ -13,7 +13,7 @@ from dockair.scenarios.campaign import table
 from dockair.scenarios.campaign.row import COLUMNS
 from dockair.scenarios.report.acceptance import claim_of, shortfalls_of
 from dockair.scenarios.report.evidence import as_text, evidence_of
-from dockair.scenarios.report.figures import panels
+from dockair.scenarios.report.figures import overview, panels
 from dockair.scenarios.report.folders import Campaign, read_campaigns
 from dockair.scenarios.report.groups import Share, groups_of, paired
 from dockair.scenarios.report.page import page
@@ -76,12 +76,12 @@ def _campaign(rows):
 class _Page(HTMLParser):
     def __init__(self, text):
         super().__init__()
-        self.links, self.ids, self.stack = [], set(), []
+        self.links, self.ids = [], []
         self.feed(text)
 
     def handle_starttag(self, tag, attrs):
         values = dict(attrs)
-        self.ids.add(values.get("id"))
+        self.ids += [values["id"]] if "id" in values else []
         self.links += [values[key] for key in ("href", "src", "xlink:href") if key in values]
 
 
@@ -351,3 +351,84 @@ def test_where_perfect_navigation_never_docked_there_is_no_ratio():
     text = page("made", [_campaign([_without_attempt(0, "never_steady"), truth])])
     assert "What vision costs" in text
     assert ">nan<" not in text
+
+
+def _bin(count, size, **changes):
+    names = ("range_rmse_m", "range_bias_m", "range_sigma_m", "lateral_rmse_m", "lateral_sigma_m")
+    figures = dict.fromkeys((*names, "attitude_rmse_deg", "attitude_sigma_deg"), size)
+    return {"low_m": 2.0, "high_m": 3.0, "count": count} | figures | changes
+
+
+def test_frames_without_a_figure_make_it_no_smaller():
+    """100 frames of 1 mm beside 300 that say nothing of it: still 1 mm, not 0.5 mm."""
+    silent = dict.fromkeys(("range_rmse_m", "range_bias_m", "range_sigma_m", "attitude_sigma_deg"))
+    rows = [
+        _row(k, nav_by_range=json.dumps([entry]))
+        for k, entry in enumerate([_bin(100, 1e-3), _bin(300, 1e-3, **silent)])
+    ]
+    (bin_,) = groups_of(rows)[0].by_range
+    assert bin_["count"] == 400
+    assert {name: value for name, value in bin_.items() if name not in ("low_m", "high_m", "count")} == pytest.approx(
+        {name: 1e-3 for name in _bin(1, 0.0) if name not in ("low_m", "high_m", "count")}
+    )
+
+
+def test_where_no_frame_has_a_figure_there_is_a_dash():
+    silent = dict.fromkeys(("range_sigma_m", "lateral_sigma_m", "attitude_sigma_deg", "range_bias_m"))
+    text = page("made", [_campaign([_row(0, nav_by_range=json.dumps([_bin(4, 1e-3, **silent)]))])])
+    assert '<td class="n">1.0 / –</td><td class="n">–</td>' in text
+    assert ">nan" not in text and "nan<" not in text and "/ nan" not in text
+
+
+def test_no_text_from_outside_is_read_as_mathematics():
+    """Of matplotlib's own language it would be nonsense, which raises."""
+    sheet, phase = "/tmp/$^$x_y$.toml", "$^$"
+    row = _row(0, command=_command("light_gusts", 0, **{"hardware.camera": sheet}), duration_s=9.0)
+    row |= {"timeline": json.dumps([{"phase": phase, "begun_s": 0.0, "reason": ""}])}
+    failed = _row(
+        1, command=row["command"].replace("--seed 0", "--seed 1"), attempts=[_attempt(1, "miss", 0.4, "$^$ cause")]
+    )
+    (group,) = groups_of([row, failed])
+    assert sheet in overview([group])
+    assert "$^$ cause" in panels(group) and f">{phase}</text>" in panels(group)
+
+
+@pytest.mark.parametrize("text", ["bell \a, nothing \0, red \x1b[31m", "half \udce9", "C1 \x9b, \x7f"])
+def test_a_page_holds_no_character_that_no_page_may_hold(text):
+    made = page(text, [_campaign([_row(0, error=text)])])
+    assert all(character in "\n\t" or character.isprintable() for character in set(made) - set("\xa0\u2009"))
+    made.encode()
+
+
+def test_every_id_is_there_once():
+    rows = [_row(k, sensing=kind, attempts=[_attempt(1, "miss", 0.4, "gust")]) for k in range(3) for kind in _SENSING]
+    rows += [_row(7, command=_command("light_gusts", 7, faults=[{"kind": "dead reel", "start_s": 1.0}]))]
+    ids = _Page(page("made", [_campaign(rows)])).ids
+    assert len(ids) == len(set(ids)) > 100
+    assert not any(re.search(r"\s", name) for name in ids)
+
+
+def test_a_picture_shows_the_markers_and_the_clips_that_it_defines():
+    text = panels(groups_of([_row(0), _row(1)])[0])
+    used = set(re.findall(r'url\(#([^)]+)\)|xlink:href="#([^"]+)"', text))
+    assert used and {name for pair in used for name in pair if name} <= set(_Page(text).ids)
+
+
+def test_each_cause_leads_to_the_flights_that_it_is_of():
+    gust, drogue = [_attempt(1, "miss", 0.4, "gust")], [_attempt(1), _attempt(2, "miss", 0.4, "lost_drogue")]
+    rows = [_row(0), _row(3, attempts=gust), _row(4, attempts=gust + [_attempt(2, "miss", 0.3, "gust")])]
+    rows += [
+        _row(5, attempts=drogue),
+        _without_attempt(6, "never_steady"),
+        _without_attempt(8, "", error="ValueError: x"),
+    ]
+    text = page("made", [_campaign(rows)])
+    table_ = text[text.index("<th>why</th>") : text.index("Flights that failed")]
+    lines = [re.sub(r"<[^>]*>", " ", line).split() for line in table_.splitlines() if line.startswith("<tr>")]
+    assert lines == [
+        ["gust", "3", "3", ",", "4"], ["lost", "drogue", "1", "5"], ["never", "steady", "1", "6"], ["error", "1", "8"],
+    ]  # fmt: skip
+    for seed in (3, 4, 5, 6, 8):
+        (link,) = {name for name, shown in re.findall(r'href="#([^"]+)">(\d+)</a>', table_) if shown == str(seed)}
+        (row,) = re.findall(rf'<tr id="{link}">.*</tr>', text)
+        assert f"dockair fly light_gusts --seed {seed}</code>" in row

@@ -9,7 +9,8 @@ import pytest
 
 from dockair.errors import DockairError, MachineError
 from dockair.scenarios import cli
-from dockair.scenarios.campaign import manifest, table
+from dockair.scenarios.campaign import journal, manifest, table
+from dockair.scenarios.campaign.folder import rows_of
 from dockair.scenarios.campaign.row import COLUMNS
 from dockair.scenarios.report.folders import read_campaigns
 from dockair.scenarios.report.page import write_text
@@ -17,21 +18,21 @@ from dockair.scenarios.report.page import write_text
 
 @pytest.fixture
 def campaign(tmp_path):
-    """Make a folder with a campaign of one flight; its scenario's digest is the folder's name."""
+    """Make a folder with a campaign of one flight, whose seed is the folder's name."""
 
-    def make(name: str, **manifested):
+    def make(name: str, scenario: str = "as it is", **manifested):
         folder = tmp_path / name
         folder.mkdir()
         manifest.write_json({"plan": {"name": "made"}} | manifested, folder / manifest.FILE_NAME)
-        values = {"scenario": "still_air", "seed": 0, "sensing": "camera", "attempts": 0, "scenario_hash": name}
+        values = {"scenario": "still_air", "seed": ord(name), "sensing": "camera", "attempts": 0}
         texts = {
             "attempt_log": "[]",
             "timeline": "[]",
             "nav_by_range": "[]",
             "error": "ValueError: made",
-            "command": "",
+            "command": f"dockair fly still_air --seed {ord(name)}",
+            "scenario_hash": scenario,
         }
-        texts["command"] = "dockair fly still_air --seed 0"
         table.write_table([dict.fromkeys(COLUMNS) | values | texts], folder)
         return folder
 
@@ -51,6 +52,11 @@ def campaign(tmp_path):
             {"code": "c0de", "background": "analytic"},
             {"code": "c0de", "background": "mujoco"},
             "background analytic in {}/a, mujoco in {}/b",
+        ),
+        (
+            {"versions": {"numpy": "2.1", "mujoco": "3.2"}},
+            {"versions": {"mujoco": "3.3", "numpy": "2.1"}},
+            "versions mujoco 3.2, numpy 2.1 in {}/a, mujoco 3.3, numpy 2.1 in {}/b",
         ),
     ],
 )
@@ -132,3 +138,101 @@ def test_a_manifest_without_a_plan_is_refused(campaign, text):
     (folder / manifest.FILE_NAME).write_text(text)
     with pytest.raises(DockairError, match=r"manifest.json: expected the manifest of a campaign, got 'no plan"):
         read_campaigns([folder])
+
+
+@pytest.mark.parametrize("key", ["plug_ins", "versions", "files"])
+def test_a_manifest_with_something_else_in_place_of_a_table_is_refused(campaign, key):
+    with pytest.raises(DockairError, match=f"manifest.json: expected a table {key} in the manifest of a campaign"):
+        read_campaigns([campaign("a", **{key: [1]})])
+
+
+def test_a_scenario_that_was_edited_between_two_campaigns_is_not_pooled_with_itself(campaign):
+    folders = [campaign("a", files={"still_air": "1"}), campaign("b", files={"still_air": "2"})]
+    with pytest.raises(DockairError) as refused:
+        read_campaigns(folders)
+    assert str(refused.value) == (
+        "FOLDER...: expected one content of a scenario's name; of others a report each, or another name, "
+        f"got 'still_air in {folders[0]}, another in {folders[1]}'"
+    )
+    assert len(read_campaigns([folders[0], campaign("c", files={"still_air": "1", "mine": "2"})])) == 2
+
+
+def test_where_no_manifest_says_what_a_file_held_the_flights_digest_does(campaign):
+    folders = [campaign("a"), campaign("b", scenario="another")]
+    with pytest.raises(DockairError, match=r"still_air --seed 97 in .*/a, another scenario by .* --seed 98 in .*/b"):
+        read_campaigns(folders)
+
+
+def test_draws_of_one_scenario_are_one_scenario(campaign):
+    """Each drawn value has a digest of its own."""
+    folders = []
+    for name in "ab":
+        folders.append(campaign(name, scenario=name))
+        (row,) = rows_of(folders[-1])
+        drawn = {"set.start.aft_m": 3.0, "command": f"{row['command']} --set start.aft_m=3.0"}
+        table.write_table([row | drawn], folders[-1])
+    assert len(read_campaigns(folders)) == 2
+
+
+@pytest.fixture
+def report(monkeypatch, capsys):
+    """Run `dockair report`; return its exit status and stderr."""
+
+    def report(*arguments) -> tuple[int, str]:
+        monkeypatch.setattr(sys, "argv", ["dockair", "report", *map(str, arguments)])
+        with pytest.raises(SystemExit) as ended:
+            cli.main()
+        return ended.value.code, capsys.readouterr().err
+
+    return report
+
+
+@pytest.mark.parametrize("option", ["--out", "--evidence"])
+@pytest.mark.parametrize(
+    "name", ["journal.jsonl", "manifest.json", "flights.parquet", "summary.json", "timing.json", "manifest.json.part"]
+)
+def test_a_campaigns_own_files_are_not_written_over(campaign, report, tmp_path, option, name):
+    folder, other = campaign("a"), campaign("b")
+    (other / journal.FILE_NAME).touch()
+    before = {path: path.read_bytes() for path in other.iterdir()}
+    (tmp_path / "link").symlink_to(other)
+    for path in (other / name, tmp_path / "link" / name):
+        said = f'dockair: {option} {path}: expected a file of its own, got "a campaign\'s"\n'
+        assert report(folder, option, path) == (2, said)
+    assert {path: path.read_bytes() for path in other.iterdir()} == before
+    assert not (folder / "report.html").exists()
+
+
+def test_where_no_campaign_is_its_names_are_anybodys(campaign, report, tmp_path):
+    assert report(campaign("a"), "--out", tmp_path / "page.html", "--evidence", tmp_path / "summary.json") == (0, "")
+    assert (tmp_path / "summary.json").is_file()
+
+
+def test_a_table_that_was_cut_off_is_one_line(campaign, report):
+    folder = campaign("a")
+    path = folder / table.FILE_NAME
+    path.write_bytes(path.read_bytes()[:-100])
+    status, said = report(folder)
+    assert (status, said.count("\n")) == (2, 1)
+    assert said.startswith(f"dockair: {path}: expected the table of a campaign (removed, it is made again by")
+
+
+def test_a_table_of_something_else_is_one_line(campaign, report):
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    folder = campaign("a")
+    pq.write_table(pa.table({"departures": [1, 2]}), folder / table.FILE_NAME)
+    status, said = report(folder)
+    assert (status, said.count("\n")) == (2, 1)
+    assert said.endswith("got 'rows of something else'\n")
+
+
+@pytest.mark.parametrize(
+    "arguments", [["{long}"], ["{folder}", "--out", "{long}"], ["{folder}", "--evidence", "{long}"]]
+)
+def test_a_name_that_is_too_long_is_one_line(campaign, report, arguments):
+    places = {"long": "n" * 300, "folder": campaign("a")}
+    status, said = report(*(argument.format(**places) for argument in arguments))
+    assert (status, said.count("\n")) == (2, 1)
+    assert "got 'File name too long'" in said
