@@ -2,7 +2,8 @@
 
 contact: the coupling held the probe. miss: the tip passed the ring's plane, was not held and touched nothing.
 rim_strike: the probe touched the drogue and was not held. abort: the navigation cleared without any of these.
-collision: anything of the receiver but its probe touched something. timeout: none of these. diverged: the simulation
+collision: anything of the receiver but its probe touched something, or the probe anything but basket and coupling, as a
+hose that whips. timeout: none of these. diverged: the simulation
 broke down; the loop says so, not the referee. A flight goes on after a miss: it ends when the navigation is clear, when
 the receiver collides, when time is over.
 

@@ -72,7 +72,7 @@ class Truth:
     fuel_kg: float = 0.0  #: that has flowed through the coupling
     fuel_flow_kg_s: float = 0.0
     probe_touches_drogue: bool  #: any contact of the probe with basket or coupling at this tick
-    receiver_touches: str  #: name of what the receiver (other than its probe) touches, "" for nothing
+    receiver_touches: str  #: name of what the receiver touches, the probe's touches of the drogue apart; "" for nothing
 
     @property
     def p_PD_B(self) -> Array:
