@@ -42,7 +42,7 @@ class TomlFiles:
                 expected = f"{self.packaged}, or the path of a TOML file"
                 raise DockairError(self.kind, expected=expected, got=name_or_path, exists=self.names())
             return self.folder / f"{name_or_path}.toml"
-        if not path.exists():
+        if not os.path.exists(path):  # Path.exists raises where a name is too long
             raise DockairError(str(path), expected=f"a {self.kind} file", got="no such file")
         return path
 

@@ -5,11 +5,9 @@ that is done is known again when the plan has grown.
 """
 
 import json
-import math
 import os
 import re
 import shlex
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from hashlib import blake2b
@@ -17,14 +15,13 @@ from pathlib import Path
 from typing import Any
 
 from dockair.errors import DockairError
-from dockair.scenarios.campaign.draws import Point, grid, samples
+from dockair.scenarios.campaign.draws import Point
 from dockair.scenarios.campaign.plan import Entry
 from dockair.scenarios.campaign.plan_file import PlanFile
+from dockair.scenarios.campaign.points import points_of, refuse_too_many, seeds_of
 from dockair.scenarios.scenario_file import ScenarioFile
 from dockair.scenarios.schema import Scenario, load_scenario
 
-MOST_JOBS = 200_000
-MOST_SEED = 2**63 - 1  # of a scenario's `seed`, and of the table's column
 _SAYS_NOTHING_OF_THE_FLIGHT = {"seed", "claim", "accept"}  # of a scenario's keys; the seed is the job's
 _SHEETS = ("camera", "ring")  # of the keys of [hardware]: paths
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
@@ -78,11 +75,11 @@ def jobs_of(source: PlanFile) -> list[Job]:
             drawn; two scenarios of one name; a navigator that cannot be imported; two jobs that are the same flight;
             too many; a seed that is too large.
     """
-    _refuse_too_many(source)
+    refuse_too_many(source)
     jobs: list[Job] = []
     for index, entry in enumerate(source.plan.scenarios):
         content = ""
-        for point, seeds in _points(source, _seeds(source, entry)):
+        for point, seeds in points_of(source, seeds_of(source, entry)):
             layers = _layers(source, index, entry, point)
             _require_decisive(layers)
             settings = _merged(layers)
@@ -140,58 +137,6 @@ def file_hash(file: str) -> str:
             for key, value in hardware.items()
         }
     return blake2b(json.dumps(table, sort_keys=True, default=str).encode(), digest_size=8).hexdigest()
-
-
-def _seeds(source: PlanFile, entry: Entry) -> list[int]:
-    """Return an entry's seeds.
-
-    Raises:
-        DockairError: one that no scenario and no table takes.
-    """
-    seeds = [source.plan.first_seed + seed for seed in entry.seeds or source.plan.seeds]
-    if max(seeds) > MOST_SEED:
-        expected = f"seeds up to {MOST_SEED}, first_seed added"
-        raise DockairError(source.place("first_seed"), expected=expected, got=max(seeds))
-    return seeds
-
-
-def _refuse_too_many(source: PlanFile) -> None:
-    """Count the flights before any of them is made: they may be more than the memory holds."""
-    plan = source.plan
-    seeds = sum(len(entry.seeds or plan.seeds) for entry in plan.scenarios)
-    points, key = plan.draws or 1, "seeds" if plan.draws is None else "draws"
-    if plan.sampler == "grid" and plan.draw:
-        key = "draw"
-        points = math.prod(len(draw.values or ()) or draw.points or 1 for draw in plan.drawn.values())
-    if points * seeds > MOST_JOBS:
-        raise DockairError(source.place(key), expected=f"up to {MOST_JOBS} flights", got=points * seeds)
-
-
-def _points(source: PlanFile, seeds: Sequence[int]) -> list[tuple[Point, Sequence[int]]]:
-    """Return the points, each with the seeds that are flown there."""
-    plan = source.plan
-    draws = plan.drawn
-    if not draws:
-        return [({}, seeds)]
-    if plan.sampler != "grid" and plan.draws is None:
-        points = samples(draws, plan.sampler, len(seeds), plan.draw_seed)
-        return [(point, [seed]) for point, seed in zip(points, seeds, strict=True)]
-    if plan.sampler == "grid":
-        points = grid(draws, MOST_JOBS)
-        _refuse_twin_points(points, source.place("draw"), "values that differ")
-    else:
-        points = samples(draws, plan.sampler, plan.draws or 1, plan.draw_seed)
-        expected = 'points that differ; of listed values fewer draws make them, or sampler = "grid" without draws'
-        _refuse_twin_points(points, source.place("draws"), expected)
-    return [(point, seeds) for point in points]
-
-
-def _refuse_twin_points(points: Sequence[Point], where: str, expected: str) -> None:
-    """Refuse points that would be flown with every seed more than once."""
-    point, times = Counter(tuple(point.items()) for point in points).most_common(1)[0]
-    if times > 1:
-        got = f"{', '.join(f'{key} = {as_toml(value, key)}' for key, value in point)} {times} times"
-        raise DockairError(where, expected=expected, got=got)
 
 
 def _layers(source: PlanFile, index: int, entry: Entry, point: Point) -> Layers:

@@ -76,7 +76,7 @@ def panels(group: Group) -> str:
         _navigation(axes[1, 0], group)
         _causes(axes[1, 1], group)
         _timelines(axes[1, 2], group)
-        return _svg(figure, group.anchor)
+        return _svg(figure, "p" + group.anchor.rpartition("-")[2])  # its digest: short, for ids are many
 
 
 def _share(ax: Axes, y: float, share: Share, colour: str, marker: str, label: str | None) -> None:

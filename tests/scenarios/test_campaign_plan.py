@@ -401,8 +401,8 @@ def test_one_scenario_in_two_files_or_under_two_names_is_a_plan(plan, two_files)
     ],
 )
 def test_too_many_flights_are_refused_before_any_is_made(plan, monkeypatch, text, said):
-    for name in ("grid", "samples", "load_scenario", "Job"):
-        monkeypatch.setattr(f"dockair.scenarios.campaign.jobs.{name}", lambda *_: pytest.fail("made"))
+    for name in ("points.grid", "points.samples", "jobs.load_scenario", "jobs.Job"):
+        monkeypatch.setattr(f"dockair.scenarios.campaign.{name}", lambda *_: pytest.fail("made"))
     scenarios = "" if "scenarios" in text else 'scenarios = ["default"]\n'
     ranges = "".join(
         f'[draw."{key}"]\nlow = 3.0\nhigh = 5.0\npoints = 10000\n' for key in ("start.aft_m", "start.up_m")
