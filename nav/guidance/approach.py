@@ -30,6 +30,7 @@ from dockair.nav.guidance.closure import Closure
 from dockair.nav.guidance.controller import Controller, Sight, Wanted
 from dockair.nav.guidance.dead_reckoning import DeadReckoning
 from dockair.nav.guidance.guidance_settings import GuidanceSettings, RelativeState
+from dockair.nav.guidance.phase_clocks import PhaseClocks
 from dockair.nav.guidance.phases import Phase, PhaseLimits, Situation, next_phase
 from dockair.nav.guidance.pid import Pid
 from dockair.nav.guidance.predictive import Predictive
@@ -69,11 +70,9 @@ class Guidance:
         self._station = np.array([settings.stand_off_m, 0.0, 0.0])
         speeds = settings.closure_speed_m_s, settings.closure_acceleration_m_s2
         self._closure = Closure(settings.closing, *speeds, self._dt)
-        self._attempts, self._has_seen, self._light_is_red = 0, False, False
-        self._time_s = self._in_phase_s = self._steady_s = self._patient_s = 0.0
-        self._unusable_s = self._track_lost_s = self._blind_s = self._doubtful_s = 0.0
-        self._inside_s = self._pushed_in_m = 0.0
-        self._evades = False
+        self._clocks = PhaseClocks(self._dt)
+        self._attempts, self._pushed_in_m = 0, 0.0
+        self._light_is_red = self._evades = False
 
     def announce(self, announcement: TankerAnnouncement) -> None:
         """Take note of what the tanker is about to do."""
@@ -92,15 +91,16 @@ class Guidance:
         self._axes.step(state.w_WB_B, self._path.turn_rate_rad_s, self._path.bank_rad)
         ring, rate = self._axes.moved(state.p_PD_B, state.rate_PD_B)
         coupling = self._axes.R_NB @ state.p_PK_B
+        lateral_m = float(np.hypot(ring[1], ring[2]))
         if self._path.is_announced:
             self._follow_path(state, ring, rate)
         self._observe(state, ring, rate)
         middle = self._controller.middle_m if state.usable else None
         bearable = self._controller.bears_the_gusts
         self._reckoning.step(middle, self._controller.steady_drift_m_s, self._u, bearable=bearable)
-        self._count(state, ring, rate, coupling)
-        self._change_phase(self._situation(ring, rate, coupling))
-        u_dot = self._follow(ring) if self._follows(state, ring) else self._hold_course(ring)
+        self._count(state, ring, rate, lateral_m)
+        self._change_phase(self._situation(ring, rate, coupling, lateral_m))
+        u_dot = self._follow(ring, lateral_m) if self._follows(state, ring) else self._hold_course(ring)
         limit, change = self._patient_limits if self._is_patient else self._limits
         u_dot = np.minimum(np.maximum(u_dot, -limit), limit)
         self._u_dot = u_dot = np.minimum(np.maximum(u_dot, self._u_dot - change), self._u_dot + change)
@@ -141,37 +141,29 @@ class Guidance:
         if self.phase is Phase.APPROACH:
             self._passed = ring[1:].copy() if ring[0] < self._settings.limits.come_along_m else None
 
-    def _count(self, state: RelativeState, ring: Array, rate: Array, coupling: Array) -> None:
-        settings, limits = self._settings, self._settings.limits
-        self._time_s += self._dt
-        self._in_phase_s += self._dt
-        self._has_seen = self._has_seen or state.usable
-        self._unusable_s = self._unusable_s + self._dt if self._has_seen and not state.usable else 0.0
-        self._track_lost_s = max(self._unusable_s, state.age_s if self._has_seen else 0.0)
-        self._blind_s = max(self._blind_s + (self._dt if self._unusable_s > 0.0 else -self._dt), 0.0)
-        self._doubtful_s = 0.0 if state.contact_usable else self._doubtful_s + self._dt
-        steady = (
+    def _count(self, state: RelativeState, ring: Array, rate: Array, lateral_m: float) -> None:
+        """Count time and way in the phase that is flown."""
+        ring_ahead_m, steady = float(ring[0]), self._is_steady(state, float(ring[0]))
+        self._clocks.step(self.phase, state, ring_ahead_m, steady=steady, light_is_red=self._light_is_red)
+        if self.phase is Phase.APPROACH:
+            self._close(state, ring_ahead_m, -float(rate[0]))
+        if ring_ahead_m > 0.0:
+            self._entered_m = 0.0
+        elif self._entered_m == 0.0 and math.isfinite(lateral_m):
+            self._entered_m = lateral_m
+        if self.phase in _TOUCHING:
+            self._pushed_in_m += (self._u[0] - self._controller.steady_drift_m_s[0]) * self._dt
+
+    def _is_steady(self, state: RelativeState, ring_ahead_m: float) -> bool:
+        """Whether the receiver is where an approach may begin, and knows it."""
+        limits = self._settings.limits
+        return (
             self.phase is Phase.PRE_CONTACT
             and state.usable
-            and abs(ring[0] - settings.stand_off_m) < limits.steady_along_m
+            and abs(ring_ahead_m - self._settings.stand_off_m) < limits.steady_along_m
             and state.sigma_lateral_m < limits.steady_sigma_m
             and self._controller.bears_the_gusts
         )
-        self._steady_s = self._steady_s + self._dt if steady else 0.0
-        if self.phase not in (Phase.PRE_CONTACT, Phase.APPROACH):
-            self._patient_s = 0.0
-        elif not self._light_is_red:  # who waits for amber has not waited for a calm moment
-            self._patient_s += self._dt
-        if self.phase is Phase.APPROACH:
-            self._close(state, float(ring[0]), -float(rate[0]))
-            self._inside_s = self._inside_s + self._dt if ring[0] <= 0.0 else 0.0
-        aside_m = float(np.hypot(ring[1], ring[2]))
-        if ring[0] > 0.0:
-            self._entered_m = 0.0
-        elif self._entered_m == 0.0 and math.isfinite(aside_m):
-            self._entered_m = aside_m
-        if self.phase in _TOUCHING:
-            self._pushed_in_m += (self._u[0] - self._controller.steady_drift_m_s[0]) * self._dt
 
     def _close(self, state: RelativeState, distance_m: float, closing_m_s: float) -> None:
         """Say how good a moment it is to close; the longer one has been waited for, the less is asked of it."""
@@ -190,26 +182,27 @@ class Guidance:
     def _late(self) -> float:
         """What is asked of a moment now, of what is asked at first."""
         limits = self._settings.limits
-        return 1.0 + (limits.late_radius - 1.0) * min(self._patient_s / limits.patience_s, 1.0)
+        return 1.0 + (limits.late_radius - 1.0) * min(self._clocks.patient_s / limits.patience_s, 1.0)
 
-    def _situation(self, ring: Array, rate: Array, coupling: Array) -> Situation:
+    def _situation(self, ring: Array, rate: Array, coupling: Array, lateral_m: float) -> Situation:
+        clocks = self._clocks
         return Situation(
-            time_s=self._time_s,
-            in_phase_s=self._in_phase_s,
-            steady_s=self._steady_s,
+            time_s=clocks.time_s,
+            in_phase_s=clocks.in_phase_s,
+            steady_s=clocks.steady_s,
             spread_m=self._miss.spread_m,
             radius_m=self._late * self._settings.closing.hopeful * self._settings.limits.capture_radius_m,
             waiting_s=self._closure.waiting_s,
-            inside_s=self._inside_s,
-            unusable_s=self._unusable_s,
-            track_lost_s=self._track_lost_s,
-            blind_s=self._blind_s,
-            doubtful_s=self._doubtful_s,
+            inside_s=clocks.inside_s,
+            unusable_s=clocks.unusable_s,
+            track_lost_s=clocks.track_lost_s,
+            blind_s=clocks.blind_s,
+            doubtful_s=clocks.doubtful_s,
             station_m=_length(ring - self._station),
             ahead_m=float(coupling[0]),
             beside_m=float(np.hypot(coupling[1], coupling[2])),
             ring_ahead_m=float(ring[0]),
-            lateral_m=float(np.hypot(ring[1], ring[2])),
+            lateral_m=lateral_m,
             entered_m=self._entered_m,
             closing_m_s=-float(rate[0]),
             committed=self._closure.committed,
@@ -224,10 +217,10 @@ class Guidance:
         if transition is None:
             return
         held = self.phase in (Phase.CONTACT, Phase.HOLD)
-        self.phase, self.phase_reason, self._in_phase_s = transition.to, transition.reason, 0.0
-        self._evades = False
+        self.phase, self.phase_reason, self._evades = transition.to, transition.reason, False
+        self._clocks.begin(self.phase)
         if self.phase is Phase.APPROACH:
-            self._attempts, self._passed, self._inside_s = self._attempts + 1, None, 0.0
+            self._attempts, self._passed = self._attempts + 1, None
             self._closure.begin()
         elif self.phase is Phase.CONTACT:  # what is commanded already will still be flown
             self._pushed_in_m = self._closure.speed_m_s * self._settings.response_s[0]
@@ -241,25 +234,25 @@ class Guidance:
     def _follows(self, state: RelativeState, ring: Array) -> bool:
         """Whether the drogue is followed; not while it is on the probe or about it, or out of view."""
         clear = self.phase in (Phase.BACK_OFF, Phase.BREAKAWAY) and ring[0] > self._settings.limits.off_axis_range_m
-        past = self.phase is Phase.APPROACH and self._inside_s > self._settings.funnel_s
+        past = self.phase is Phase.APPROACH and self._clocks.inside_s > self._settings.funnel_s
         return state.usable and not past and not self._is_evading and (self.phase in _FOLLOWING or clear)
 
     @property
     def _is_evading(self) -> bool:
         """Whether it goes down now, out of the way of a hose that may whip."""
-        return self._evades and self._in_phase_s < self._settings.evade_s
+        return self._evades and self._clocks.in_phase_s < self._settings.evade_s
 
     def _aim_now(self) -> Array:
         """(2,) off the drogue's predicted place, left and up: what is learnt applies to contact."""
         return self._aim if self.phase is Phase.APPROACH else np.zeros(2)
 
-    def _clearance(self, ring: Array) -> Array:
+    def _clearance(self, ring: Array, lateral_m: float) -> Array:
         """(2,) added to the aim: beside a basket that is not to be met and may be, from outside the rim."""
-        limits, lateral_m = self._settings.limits, float(np.hypot(ring[1], ring[2]))
+        limits = self._settings.limits
         meets = not self._closure.committed and ring[0] < limits.clear_range_m and lateral_m > limits.rim_m
         return -limits.beside_m / lateral_m * ring[1:] if meets else np.zeros(2)
 
-    def _follow(self, ring: Array) -> Array:
+    def _follow(self, ring: Array, lateral_m: float) -> Array:
         """(3,) du/dt of the controller."""
         s = self._settings
         if self.phase is Phase.APPROACH:
@@ -267,7 +260,7 @@ class Guidance:
             wanted = Wanted(
                 distance_m=None,
                 speed_m_s=self._closure.speed_m_s,
-                aim_m=self._aim_now() + self._clearance(ring),
+                aim_m=self._aim_now() + self._clearance(ring, lateral_m),
                 patient=self._is_patient,
                 must_follow=True,
                 to_contact_s=self._to_contact_s(distance_m) if self._closure.committed else None,
@@ -297,7 +290,7 @@ class Guidance:
         """(3,) du/dt toward the drogue's drift, plus the speed along that the phase asks for."""
         about_it = self.phase in _RETREATING and ring[0] <= 0.0  # it may come along: its drift would be one's own
         s, steady, touching = self._settings, self._controller.steady_drift_m_s, self.phase in _TOUCHING
-        lost = self._unusable_s > 0.0 and not touching
+        lost = self._clocks.unusable_s > 0.0 and not touching
         target = self._reckoning.believed(steady) if lost else self._controller.drift_m_s
         if touching or about_it:
             target[0] = steady[0]
@@ -307,12 +300,12 @@ class Guidance:
             to_go = max(s.limits.take_in_m - self._pushed_in_m, 0.0)
             target[0] += min(s.closure_speed_m_s, s.take_in_gain_1_s * to_go)
         elif self.phase in _RETREATING or (
-            self.phase in _WAITING and self._unusable_s > s.limits.lost_s
+            self.phase in _WAITING and self._clocks.unusable_s > s.limits.lost_s
         ):  # nobody waits near a drogue that is not seen
             if lost:
                 target += self._reckoning.astern_m_s()
             target[0] -= s.back_off_speed_m_s
-        elif self.phase is Phase.APPROACH and lost and not self._closure.committed and self._inside_s == 0.0:
+        elif self.phase is Phase.APPROACH and lost and not self._closure.committed and self._clocks.inside_s == 0.0:
             target[0] += self._closure.speed_m_s
         elif self.phase is Phase.APPROACH:  # out of view at the last, or in the basket: on as before
             target[0] = self._u[0]

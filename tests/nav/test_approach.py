@@ -426,7 +426,8 @@ def test_a_retreat_from_a_drogue_that_comes_along_gains_no_speed():
     now = plant.step(ReceiverCommand())
     while not guidance._closure.committed:
         now = plant.step(guidance.step(now))
-    guidance.phase, guidance._in_phase_s = Phase.BACK_OFF, 0.0
+    guidance.phase = Phase.BACK_OFF
+    guidance._clocks.begin(guidance.phase)
     back = [guidance.step(state([-0.15, 0.0, 0.0])).velocity_m_s[0] for _ in range(6 * RATE_HZ)]
     assert guidance.phase is Phase.BACK_OFF
     assert back[-1] == pytest.approx(-SETTINGS.back_off_speed_m_s, abs=0.05)

@@ -1,0 +1,63 @@
+"""For how long what decides the next phase has lasted, s."""
+
+from dockair.nav.guidance.guidance_settings import RelativeState
+from dockair.nav.guidance.phases import Phase
+
+
+class PhaseClocks:
+    """Clocks that run on, stand still or begin anew with what the navigation says, one control tick at a time.
+
+    Args:
+        step_s: control period.
+    """
+
+    def __init__(self, step_s: float) -> None:
+        self._step_s = step_s
+        self._has_seen = False
+        self.time_s = 0.0  #: since the guidance began
+        self.in_phase_s = 0.0  #: since the phase began
+        self.steady_s = 0.0  #: steady astern of the drogue
+        self.patient_s = 0.0  #: waiting for a calm moment, astern or in the approach
+        self.unusable_s = 0.0  #: the relative state has been unusable, once it has been usable
+        self.track_lost_s = 0.0  #: the same, or since the newest frame that was used, whichever is longer
+        self.blind_s = 0.0  #: unusable beyond that for which it has been usable
+        self.doubtful_s = 0.0  #: the integrity monitor has not claimed that contact may be flown
+        self.inside_s = 0.0  #: the tip has been past the ring's plane
+
+    def begin(self, phase: Phase) -> None:
+        """Begin a phase."""
+        self.in_phase_s = 0.0
+        if phase is Phase.APPROACH:
+            self.inside_s = 0.0
+
+    def step(
+        self, phase: Phase, state: RelativeState, ring_ahead_m: float, *, steady: bool, light_is_red: bool
+    ) -> None:
+        """Advance by one control tick.
+
+        Args:
+            phase: that is flown.
+            state: relative state now.
+            ring_ahead_m: ring centre ahead of the probe's tip.
+            steady: whether the receiver is steady astern of the drogue.
+            light_is_red: of the pod.
+        """
+        dt = self._step_s
+        self.time_s += dt
+        self.in_phase_s += dt
+        self._see(state)
+        self.steady_s = self.steady_s + dt if steady else 0.0
+        if phase not in (Phase.PRE_CONTACT, Phase.APPROACH):
+            self.patient_s = 0.0
+        elif not light_is_red:  # who waits for amber has not waited for a calm moment
+            self.patient_s += dt
+        if phase is Phase.APPROACH:
+            self.inside_s = self.inside_s + dt if ring_ahead_m <= 0.0 else 0.0
+
+    def _see(self, state: RelativeState) -> None:
+        dt = self._step_s
+        self._has_seen = self._has_seen or state.usable
+        self.unusable_s = self.unusable_s + dt if self._has_seen and not state.usable else 0.0
+        self.track_lost_s = max(self.unusable_s, state.age_s if self._has_seen else 0.0)
+        self.blind_s = max(self.blind_s + (dt if self.unusable_s > 0.0 else -dt), 0.0)
+        self.doubtful_s = 0.0 if state.contact_usable else self.doubtful_s + dt

@@ -1,0 +1,84 @@
+"""The clocks that the phases look at: what makes each run on, stand still, begin anew."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from dockair.nav.guidance.guidance_settings import RelativeState
+from dockair.nav.guidance.phase_clocks import PhaseClocks
+from dockair.nav.guidance.phases import Phase
+
+STEP_S = 0.5  # exact in binary
+SEEN = RelativeState(
+    p_PD_B=np.array([4.0, 0.0, 0.0]),
+    rate_PD_B=np.zeros(3),
+    p_PK_B=np.array([4.2, 0.0, 0.0]),
+    w_WB_B=np.zeros(3),
+    dv_WP_B=np.zeros(3),
+    usable=True,
+    contact_usable=True,
+    sigma_lateral_m=0.01,
+    age_s=0.0,
+)
+UNSEEN = dataclasses.replace(SEEN, usable=False, contact_usable=False, age_s=np.inf)
+
+
+def after(clocks, *steps):
+    """Step by (phase, state, keywords); ring 4 m ahead unless told."""
+    for phase, state, keys in steps:
+        clocks.step(
+            phase,
+            state,
+            keys.get("ring_ahead_m", 4.0),
+            steady=keys.get("steady", False),
+            light_is_red=keys.get("light_is_red", False),
+        )
+    return clocks
+
+
+def test_a_drogue_never_seen_is_not_lost():
+    clocks = after(PhaseClocks(STEP_S), *[(Phase.JOIN_UP, UNSEEN, {})] * 4)
+    assert clocks.unusable_s == clocks.track_lost_s == clocks.blind_s == 0.0
+    assert clocks.doubtful_s == clocks.time_s == clocks.in_phase_s == 2.0
+
+
+def test_a_drogue_out_of_view_is_lost_since_its_newest_frame():
+    old = dataclasses.replace(UNSEEN, age_s=3.0)
+    clocks = after(PhaseClocks(STEP_S), (Phase.APPROACH, SEEN, {}), (Phase.APPROACH, old, {}))
+    assert clocks.unusable_s == 0.5 and clocks.track_lost_s == 3.0
+
+
+def test_a_glimpse_ends_what_is_lost_and_takes_back_a_tick_of_what_is_blind():
+    clocks = after(PhaseClocks(STEP_S), (Phase.APPROACH, SEEN, {}), *[(Phase.APPROACH, UNSEEN, {})] * 4)
+    assert clocks.blind_s == clocks.unusable_s == 2.0
+    after(clocks, (Phase.APPROACH, SEEN, {}))
+    assert clocks.unusable_s == clocks.track_lost_s == clocks.doubtful_s == 0.0
+    assert clocks.blind_s == 1.5
+
+
+def test_patience_lasts_through_astern_and_approach_but_not_in_front_of_a_red_light():
+    astern, closing = (Phase.PRE_CONTACT, SEEN, {}), (Phase.APPROACH, SEEN, {})
+    clocks = after(PhaseClocks(STEP_S), astern, closing, (Phase.PRE_CONTACT, SEEN, {"light_is_red": True}))
+    assert clocks.patient_s == 1.0
+    after(clocks, (Phase.BACK_OFF, SEEN, {}))
+    assert clocks.patient_s == 0.0
+
+
+def test_steadiness_begins_anew_where_it_is_broken():
+    still, moving = (Phase.PRE_CONTACT, SEEN, {"steady": True}), (Phase.PRE_CONTACT, SEEN, {})
+    assert after(PhaseClocks(STEP_S), still, still).steady_s == 1.0
+    assert after(PhaseClocks(STEP_S), still, still, moving, still).steady_s == 0.5
+
+
+@pytest.mark.parametrize(("to", "inside_s"), [(Phase.APPROACH, 0.0), (Phase.CONTACT, 1.0)])
+def test_a_phase_begins_at_zero_and_an_approach_outside(to, inside_s):
+    clocks = after(PhaseClocks(STEP_S), *[(Phase.APPROACH, SEEN, {"ring_ahead_m": 0.0})] * 2)
+    assert clocks.inside_s == clocks.in_phase_s == 1.0
+    clocks.begin(to)
+    assert clocks.in_phase_s == 0.0 and clocks.inside_s == inside_s and clocks.time_s == 1.0
+
+
+def test_the_time_past_the_ring_s_plane_ends_before_it():
+    inside, outside = ((Phase.APPROACH, SEEN, {"ring_ahead_m": x}) for x in (-0.1, 0.1))
+    assert after(PhaseClocks(STEP_S), inside, outside).inside_s == 0.0
