@@ -147,12 +147,12 @@ def build(scenario: Scenario, seed: int) -> Parts:
         navigator: Navigates = TruthNavigator(sheets, guidance_settings(scenario))
     else:
         _check_camera_rate(scenario.rates.camera_hz, as_built.camera, camera_sheets(scenario))
-        measured = scenario.camera.sensing == "measurements"
-        camera = (measured_leds if measured else _camera)(scenario, seed, as_built, faults, world)
         recipe = _recipe(scenario, sheets)
         navigator = recipe.build()
         if isinstance(navigator, TruthNavigator):  # its results would not be marked
             raise DockairError("navigation.navigator", expected='"truth" for perfect navigation', got=recipe.class_name)
+        measured = scenario.camera.sensing == "measurements"
+        camera = (measured_leds if measured else _camera)(scenario, seed, as_built, faults, world)
     periods = Periods(
         gyro=clock.ticks_per(scenario.rates.gyro_hz, "rates.gyro_hz"),
         control=clock.ticks_per(scenario.rates.control_hz, "rates.control_hz"),

@@ -6,7 +6,11 @@ K successes of n flights, z the normal quantile of (1 + confidence) / 2, p = K /
     half   = z sqrt(p (1 - p) / n + z^2 / 4n^2) / (1 + z^2 / n)                      (2)
     P(K <= k | n, p) = sum over i = 0 .. k of C(n, i) p^i (1 - p)^(n - i)            (3)
 
-Source: (1), (2) [Wilson 1927, J. Am. Stat. Assoc. 22, 209].
+Of two that were tried on the same n cases, a of these were only the one's and b only the other's (sign test):
+
+    P = min(1, 2 P(K <= min(a, b) | a + b, 1/2))                                     (4)
+
+Source: (1), (2) [Wilson 1927, J. Am. Stat. Assoc. 22, 209]; (4) [McNemar 1947, Psychometrika 12, 153], exact.
 """
 
 import math
@@ -46,6 +50,16 @@ def probability_of_at_most(successes: int, trials: int, rate: float) -> float:
     if successes < 0:
         return 0.0
     return 1.0 if successes >= trials else float(bdtr(successes, trials, rate))
+
+
+def sign_test(only_one: int, only_other: int) -> float:
+    """Return how often chance divides cases as unevenly between two that are as good, Eq. (4); 1 without any.
+
+    Args:
+        only_one: a.
+        only_other: b.
+    """
+    return min(1.0, 2.0 * probability_of_at_most(min(only_one, only_other), only_one + only_other, 0.5))
 
 
 def largest_rejected_count(trials: int, rate: float, false_alarm: float) -> int:

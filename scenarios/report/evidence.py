@@ -10,7 +10,8 @@ import numpy as np
 from dockair.rotations import Array
 from dockair.scenarios.report.acceptance import shortfalls_of
 from dockair.scenarios.report.folders import Campaign
-from dockair.scenarios.report.groups import Group, Paired, Share, drawn_of, groups_of, paired
+from dockair.scenarios.report.groups import Group, Share, drawn_of, groups_of
+from dockair.scenarios.report.pairs import Paired, beside_perfect_navigation, side_by_side
 
 _MANIFEST = ("plan", "flights", "seeds", "commit", "uncommitted_changes", "code", "plug_ins", "versions", "begun")
 _OF_EACH = ("seed", "outcome", "first_attempt", "success", "unsafe", "attempts", "radial_offset_m", "closure_speed_m_s")
@@ -24,6 +25,7 @@ def evidence_of(campaigns: Sequence[Campaign]) -> dict[str, Any]:
     return {
         "groups": [_group(group, groups) for group in groups],
         "each_flight": (*_OF_EACH, _DRAWN),
+        "side_by_side": [_side_by_side(*two) for two in side_by_side(groups)],
         "campaigns": [
             {"flown": len(campaign.rows)} | {key: campaign.manifest.get(key) for key in _MANIFEST}
             for campaign in campaigns
@@ -38,7 +40,7 @@ def as_text(table: Mapping[str, Any]) -> str:
 
 
 def _group(group: Group, groups: Sequence[Group]) -> dict[str, Any]:
-    pair = paired(group, groups)
+    pair = beside_perfect_navigation(group, groups)
     shortfalls = shortfalls_of(group)
     return {
         **group.kind,
@@ -65,8 +67,22 @@ def _group(group: Group, groups: Sequence[Group]) -> dict[str, Any]:
 
 
 def _pair(pair: Paired) -> dict[str, Any]:
-    counts = {"flights": pair.flights, "seeds": pair.seeds, "ours": pair.ours, "perfect": pair.truth}
+    counts = {"flights": pair.flights, "seeds": pair.seeds, "ours": pair.ours, "perfect": pair.theirs}
     return counts | {"ratio": _finite(pair.ratio)}
+
+
+def _side_by_side(one: Group, other: Group, pair: Paired) -> dict[str, Any]:
+    return {
+        "one": one.kind,
+        "other": other.kind,
+        "flights": pair.flights,
+        "seeds": pair.seeds,
+        "one_docked": pair.ours,
+        "other_docked": pair.theirs,
+        "only_one": pair.only_ours,
+        "only_other": pair.only_theirs,
+        "by_chance": float(f"{pair.by_chance:.3g}"),
+    }
 
 
 def _share(share: Share) -> dict[str, Any]:

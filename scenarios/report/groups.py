@@ -3,7 +3,7 @@
 A key that the plan draws differs from flight to flight of one group, which is apart from flights without that draw; of
 any other key each value is a group of its own.
 Perfect navigation, the measurement model and the camera never share a group: what one shows says nothing of the other
-until both stand side by side. Where a group on the truth has flown the same flights, `paired` puts it there.
+until both stand side by side (`pairs`).
 """
 
 import json
@@ -15,7 +15,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from hashlib import blake2b
-from os.path import normpath
 from typing import Any
 
 import numpy as np
@@ -32,8 +31,7 @@ CAPTURE_M = 0.15  # of the tip from the ring's centre, inside which a contact is
 SENSING_IN_WORDS = {"camera": "camera", "measurements": "measurement model", "truth": "perfect navigation"}
 NOT_SAID = "not said"  # in place of a cause
 _NO_WORD = re.compile(r"[^\w.]+")
-_SEES = ("navigation.navigator", "camera.sensing")  # keys that say what the navigation sees, and nothing of the world
-_IN_COLUMNS = (*_SEES, "guidance.controller")  # keys whose values have a column, whoever sets them
+_IN_COLUMNS = ("navigation.navigator", "camera.sensing", "guidance.controller")  # keys whose values have a column
 
 
 @dataclass(frozen=True, slots=True)
@@ -228,73 +226,19 @@ def file_and_settings(row: Row) -> tuple[str, list[str]]:
 
 def drawn_of(row: Row) -> list[str]:
     """Return what the plan has drawn for this flight: "key=value" each."""
-    return [text for text in file_and_settings(row)[1] if row.get(SET + _key(text)) is not None]
+    return [text for text in file_and_settings(row)[1] if row.get(SET + key_of(text)) is not None]
 
 
 def _settings_of(row: Row) -> str:
     """Return what was set over the scenario, of a draw the key alone; without keys that have a column of their own."""
     drawn = drawn_of(row)
-    settings = [text for text in file_and_settings(row)[1] if _key(text) not in _IN_COLUMNS]
-    return ", ".join(sorted(f"{_key(text)} drawn" if text in drawn else text for text in settings))
+    settings = [text for text in file_and_settings(row)[1] if key_of(text) not in _IN_COLUMNS]
+    return ", ".join(sorted(f"{key_of(text)} drawn" if text in drawn else text for text in settings))
 
 
-def _key(text: str) -> str:
+def key_of(text: str) -> str:
+    """Return the key of "key=value"."""
     return text.partition("=")[0]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Paired:
-    """A group beside perfect navigation on the same flights: same seed, same draw, same settings."""
-
-    flights: int  #: that both have flown
-    seeds: int  #: different ones among them
-    ours: int  #: successes
-    truth: int
-    only_ours: int  #: flights at which only ours succeeded
-    only_truth: int
-
-    @property
-    def ratio(self) -> float:
-        """Successes of ours over those on the truth; NaN without any."""
-        return self.ours / self.truth if self.truth else math.nan
-
-
-def paired(group: Group, groups: Sequence[Group]) -> Paired | None:
-    """Return the comparison at the first attempt, None where the truth has not flown any of these flights.
-
-    A flight that one of both has twice by the same command (a file that has changed meanwhile) is in no pair.
-    """
-    for other in groups:
-        if other.sensing == "truth" != group.sensing and _docks_alike(other, group):
-            mine, truth = _by_conditions(group.rows), _by_conditions(other.rows)
-            both = [c for c in mine if len(mine[c]) == len(truth.get(c, ())) == 1]
-            if both:
-                a, b = np.array([(_docked_at_once(mine[c][0]), _docked_at_once(truth[c][0])) for c in both]).T
-                return Paired(
-                    flights=len(both), seeds=len({mine[c][0]["seed"] for c in both}),
-                    ours=int(a.sum()), truth=int(b.sum()),
-                    only_ours=int((a & ~b).sum()), only_truth=int((~a & b).sum()),
-                )  # fmt: skip
-    return None
-
-
-def _docks_alike(a: Group, b: Group) -> bool:
-    return (a.scenario, a.controller, a.settings) == (b.scenario, b.controller, b.settings)
-
-
-def _docked_at_once(row: Row) -> bool:
-    """Whether the first attempt succeeded; a flight that ended in an error is none."""
-    return bool(row["first_attempt"]) and not row["error"]
-
-
-def _by_conditions(rows: Sequence[Row]) -> dict[tuple[str, ...], list[Row]]:
-    """Return the rows by what decides the flight but for what the navigation sees: file, seed, values set and drawn."""
-    found: dict[tuple[str, ...], list[Row]] = {}
-    for row in rows:
-        file, options = file_and_settings(row)
-        settings = [text for text in options if _key(text) not in _SEES]
-        found.setdefault((normpath(file), str(row["seed"]), *sorted(settings)), []).append(row)
-    return found
 
 
 def _is_good(attempt: Mapping[str, Any]) -> bool:

@@ -1,4 +1,4 @@
-"""The page: overview, what vision costs, a section a group, how it was made; one HTML file that needs no other."""
+"""The page: overview, what vision costs, crews side by side, a section a group, how it was made; one HTML file that needs no other."""
 
 import json
 import math
@@ -18,7 +18,8 @@ from dockair.scenarios.campaign.whole_file import NO_ROOM, write_whole
 from dockair.scenarios.report import figures
 from dockair.scenarios.report.acceptance import claim_of, shortfalls_of
 from dockair.scenarios.report.folders import Campaign
-from dockair.scenarios.report.groups import Group, Row, cause_without_attempt, causes_of, groups_of, paired
+from dockair.scenarios.report.groups import Group, Row, cause_without_attempt, causes_of, groups_of
+from dockair.scenarios.report.pairs import beside_perfect_navigation, side_by_side
 
 LIMITS = "0.15 m, 10 degrees, 2.6 m/s"
 #: What no page may hold: control characters, half of a pair of UTF-16.
@@ -39,14 +40,15 @@ def page(title: str, campaigns: Sequence[Campaign]) -> str:
         trim_blocks=True, lstrip_blocks=True,
     )  # fmt: skip
     environment.filters |= {"quantile": _quantile, "figure": _figure}
-    pairs = [(group, pair) for group in groups if (pair := paired(group, groups)) is not None]
+    beside_perfect = [(group, pair) for group in groups if (pair := beside_perfect_navigation(group, groups))]
     text = environment.get_template("page.html.jinja").render(
         title=title,
         flights=len(rows),
         crashed=sum(len(group.failed_to_fly) for group in groups),
         limits=LIMITS,
         groups=groups,
-        pairs=pairs,
+        beside_perfect=beside_perfect,
+        side_by_side=side_by_side(groups),
         overview=Markup(figures.overview(groups)),
         panels={group.anchor: Markup(figures.panels(group)) for group in groups},
         shortfalls={group.anchor: shortfalls_of(group) for group in groups},

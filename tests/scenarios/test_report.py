@@ -15,8 +15,9 @@ from dockair.scenarios.report.acceptance import claim_of, shortfalls_of
 from dockair.scenarios.report.evidence import as_text, evidence_of
 from dockair.scenarios.report.figures import overview, panels
 from dockair.scenarios.report.folders import Campaign, read_campaigns
-from dockair.scenarios.report.groups import Share, groups_of, paired
+from dockair.scenarios.report.groups import Share, groups_of
 from dockair.scenarios.report.page import page
+from dockair.scenarios.report.pairs import beside_perfect_navigation, side_by_side
 from dockair.scenarios.statistics import wilson_interval
 
 OUR_NAVIGATOR = "dockair.nav.navigator:Navigator"
@@ -116,7 +117,7 @@ def test_what_is_set_is_compared_with_perfect_navigation_that_flew_it_so():
         for kind in ("camera", "truth")
     ]
     groups = groups_of([_row(0), *with_sigma])
-    pairs = [paired(group, groups) for group in groups]
+    pairs = [beside_perfect_navigation(group, groups) for group in groups]
     assert [(g.settings, g.sensing, p and p.flights) for g, p in zip(groups, pairs, strict=True)] == [
         ("", "camera", None), ("turbulence.sigma_m_s=0.5", "camera", 1), ("turbulence.sigma_m_s=0.5", "truth", None),
     ]  # fmt: skip
@@ -148,9 +149,9 @@ def test_what_vision_costs_is_counted_on_common_seeds_only():
     camera = [_row(0), _row(1, attempts=bad), _row(2), _row(9)]
     truth = [_row(0, sensing="truth"), _row(1, sensing="truth"), _row(2, sensing="truth", attempts=bad)]
     groups = groups_of(camera + truth)
-    pair = paired(groups[0], groups)
-    assert (pair.seeds, pair.flights, pair.ours, pair.truth, pair.only_ours, pair.only_truth) == (3, 3, 2, 2, 1, 1)
-    assert paired(groups[1], groups) is None
+    pair = beside_perfect_navigation(groups[0], groups)
+    assert (pair.seeds, pair.flights, pair.ours, pair.theirs, pair.only_ours, pair.only_theirs) == (3, 3, 2, 2, 1, 1)
+    assert beside_perfect_navigation(groups[1], groups) is None
 
 
 @pytest.mark.parametrize("sensing", ["camera", "measurements"])
@@ -165,17 +166,63 @@ def test_perfect_navigation_is_compared_on_the_same_draws_and_settings(sensing):
 
     ours = [drawn(sensing, 0.5, bad), drawn(sensing, 1.5), drawn(sensing, 2.5)]  # the last is the truth's never
     groups = groups_of([*ours, drawn("truth", 0.5), drawn("truth", 1.5, bad)])
-    pair = paired(groups[0], groups)
-    assert (pair.flights, pair.seeds, pair.ours, pair.truth) == (2, 1, 1, 1)
-    assert (pair.only_ours, pair.only_truth) == (1, 1)
-    assert paired(groups[0], [groups[0], groups_of([drawn("truth", 3.5)])[0]]) is None
+    pair = beside_perfect_navigation(groups[0], groups)
+    assert (pair.flights, pair.seeds, pair.ours, pair.theirs) == (2, 1, 1, 1)
+    assert (pair.only_ours, pair.only_theirs) == (1, 1)
+    assert beside_perfect_navigation(groups[0], [groups[0], groups_of([drawn("truth", 3.5)])[0]]) is None
 
 
 def test_an_error_beside_perfect_navigation_is_a_flight_that_has_not_docked():
     camera = [_row(0), _without_attempt(1, "", error="ValueError: x", outcome="error")]
     groups = groups_of(camera + [_row(seed, sensing="truth") for seed in (0, 1)])
-    pair = paired(groups[0], groups)
-    assert (pair.flights, pair.ours, pair.truth, pair.only_truth, pair.ratio) == (2, 1, 2, 1, 0.5)
+    pair = beside_perfect_navigation(groups[0], groups)
+    assert (pair.flights, pair.ours, pair.theirs, pair.only_theirs, pair.ratio) == (2, 1, 2, 1, 0.5)
+
+
+def _flown_by(crew, seed, docks, **settings):
+    command = _command("light_gusts", seed, **settings, **crew)
+    attempts = None if docks else [_attempt(1, "miss", 0.4, "gust")]
+    controller = crew.get("guidance.controller", "predictive")
+    return _row(seed, attempts=attempts, controller=controller, command=command)
+
+
+def test_two_controllers_are_compared_on_the_flights_that_both_have_flown():
+    """Of six common flights one is only the first's, three are only the second's; the seventh is nobody's pair."""
+    predictive, pid = {}, {"guidance.controller": "pid"}
+    one = [_flown_by(predictive, seed, seed < 3) for seed in range(7)]
+    other = [_flown_by(pid, seed, seed > 0) for seed in range(6)]
+    ((a, b, pair),) = side_by_side(groups_of(one + other))
+    assert (a.controller, b.controller) == ("pid", "predictive")
+    assert (pair.flights, pair.seeds, pair.ours, pair.theirs, pair.only_ours, pair.only_theirs) == (6, 6, 5, 3, 3, 1)
+    assert pair.by_chance == pytest.approx(2 * (1 + 4) / 16)
+    (evidence,) = evidence_of([_campaign(one + other)])["side_by_side"]
+    assert (evidence["one"]["controller"], evidence["only_one"], evidence["by_chance"]) == ("pid", 3, 0.625)
+    text = page("made", [_campaign(one + other)])
+    assert "Two crews side by side" in text and "0.62" in text
+
+
+def test_a_key_of_guidance_is_the_crews_and_one_of_the_world_is_not():
+    narrow, gusts = {"guidance.capture_radius_m": 0.1}, {"turbulence.sigma_m_s": 0.5}
+    rows = [_flown_by({}, 0, True), _flown_by(narrow, 0, False), _flown_by({}, 0, True, **gusts)]
+    ((a, b, pair),) = side_by_side(groups_of(rows))
+    assert (a.settings, b.settings, pair.only_ours) == ("", "guidance.capture_radius_m=0.1", 1)
+
+
+def test_perfect_navigation_is_in_no_pair_of_crews_but_with_itself():
+    pid = {"guidance.controller": "pid"}
+    truth = [_flown_by(crew | _SENSING["truth"], 0, True) | {"sensing": "truth"} for crew in ({}, pid)]
+    pairs = side_by_side(groups_of([_row(0), *truth]))
+    assert [(a.sensing, b.sensing) for a, b, _ in pairs] == [("truth", "truth")]
+
+
+def test_a_draw_of_the_crews_own_is_in_no_pair():
+    """One seed at two capture radii has no single flight of the other crew beside it."""
+
+    def drawn(radius_m):
+        row = _flown_by({"guidance.capture_radius_m": radius_m}, 0, True)
+        return row | {"set.guidance.capture_radius_m": radius_m}
+
+    assert side_by_side(groups_of([drawn(0.1), drawn(0.12), _row(0)])) == []
 
 
 def test_flights_that_began_no_attempt_are_counted_by_their_causes_and_errors_with_them():

@@ -5,10 +5,12 @@ import math
 import numpy as np
 import pytest
 from scipy.special import ndtri
+from scipy.stats import binomtest
 
 from dockair.scenarios.statistics import (
     largest_rejected_count,
     probability_of_at_most,
+    sign_test,
     trials_to_reject_none,
     wilson_interval,
 )
@@ -77,3 +79,9 @@ def test_ninety_five_of_a_hundred_intervals_hold_the_rate():
             for low, high in (wilson_interval(int(k), trials) for k in generator.binomial(trials, rate, 2000))
         ]
         assert 0.92 <= np.mean(held) <= 0.985  # coverage of a discrete count; 2000 trials leave a sigma of 0.005
+
+
+@pytest.mark.parametrize(("one", "other"), [(0, 0), (3, 1), (1, 3), (5, 5), (0, 9), (121, 59)])
+def test_the_sign_test_is_the_exact_two_sided_binomial_test(one, other):
+    expected = binomtest(one, one + other, 0.5).pvalue if one + other else 1.0
+    assert sign_test(one, other) == pytest.approx(expected)
