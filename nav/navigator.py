@@ -100,6 +100,7 @@ class Navigator:
         self._points_D = sheets.ring.positions_D
         self._time_s = 0.0
         self._used_time_s = self._posed_time_s = self._begun_s = float("nan")
+        self._looked_time_s = 0.0  # when the newest frame came
         self._felt_time_s = 0.0
         self._integrity: Integrity | None = None
         self._learnt_m: Array = np.zeros(3)  # what its pose owes to the LEDs' places that are learnt, camera axes
@@ -130,7 +131,7 @@ class Navigator:
         if np.isnan(self._begun_s):
             self._begun_s = self._time_s
         if frame is not None:
-            self._status = self._look(frame)
+            self._looked_time_s, self._status = self._time_s, self._look(frame)
         return self._solution()
 
     @property
@@ -296,6 +297,7 @@ class Navigator:
                 dv_WP_B=self._felt_change(w_WB_B),
                 sigma_lateral_m=sigma_lateral_m,
                 age_s=aged_s,
+                frame_age_s=self._time_s - self._looked_time_s,
             )
         )
         exposure_s, heading_rad, sigma_rad = self._heading_now()

@@ -11,6 +11,7 @@ import numpy as np
 from pydantic import Field
 
 from dockair.errors import DockairError
+from dockair.scenarios.attempts import RefereeLimits
 from dockair.scenarios.table import Table
 
 OutcomeName = Literal["contact", "miss", "rim_strike", "abort", "collision", "timeout", "diverged"]
@@ -18,6 +19,7 @@ OutcomeName = Literal["contact", "miss", "rim_strike", "abort", "collision", "ti
 Row = Mapping[str, Any]
 _Rate = Annotated[float | None, Field(ge=0.0, le=1.0)]
 _UNTOUCHED = ("abort", "miss")  # outcomes of a flight that ended clear without having touched anything
+_GOOD = RefereeLimits()
 
 
 class Accept(Table):
@@ -73,9 +75,15 @@ class Accept(Table):
         lines = [f"unsafe: {what}" for what in unsafe]
         if self.outcome is not None and outcome != self.outcome:
             lines.append(f"outcome {outcome}, wanted {self.outcome}")
+        offset_max_m, speed_max_m_s = self.radial_offset_max_m, self.closure_speed_max_m_s
+        if self.clean_rate_min is not None and self.outcome is None:
+            if outcome not in ("contact", *_UNTOUCHED):
+                lines.append(f"outcome {outcome}, wanted a contact or a clean departure")
+            offset_max_m = offset_max_m or _GOOD.radial_offset_m
+            speed_max_m_s = speed_max_m_s or _GOOD.closure_speed_m_s
         limits = (
-            ("radial offset", radial_offset_m, 0.0, self.radial_offset_max_m, "m"),
-            ("closure speed", closure_speed_m_s, self.closure_speed_min_m_s, self.closure_speed_max_m_s, "m/s"),
+            ("radial offset", radial_offset_m, 0.0, offset_max_m, "m"),
+            ("closure speed", closure_speed_m_s, self.closure_speed_min_m_s, speed_max_m_s, "m/s"),
         )
         for label, value, low, high, unit in limits:
             if value is None:
@@ -113,11 +121,11 @@ class Accept(Table):
             low, high = self.closure_speed_min_m_s or 0.0, self.closure_speed_max_m_s or np.inf
             inside = sum(low <= _number(row["closure_speed_m_s"]) <= high for row in contacts)
             lines += _rate(f"contacts at {low:g} to {high:g} m/s", inside, len(contacts), self.closure_rate_min)
-        if self.radial_offset_median_max_m is not None and contacts:
-            median_m = float(np.median([_number(row["radial_offset_m"]) for row in contacts]))
+        if self.radial_offset_median_max_m is not None:
+            median_m = float(np.median([_number(row["radial_offset_m"]) for row in contacts])) if contacts else np.nan
             if not median_m <= self.radial_offset_median_max_m:
-                wanted = self.radial_offset_median_max_m
-                lines.append(f"median radial offset {median_m:.3f} m, wanted at most {wanted:g}")
+                wanted, got = self.radial_offset_median_max_m, f"{median_m:.3f} m" if contacts else "of no contact"
+                lines.append(f"median radial offset {got}, wanted at most {wanted:g}")
         return lines
 
     def _each(self, rows: Sequence[Row]) -> list[str]:

@@ -3,7 +3,7 @@
 An attempt begins whenever the phase becomes "approach". It ends when the coupling holds the probe, or when the phase
 next leaves {"approach", "contact"}; what the probe does after that and before the next attempt is still put down to it,
 for a probe that has been called back may be too quick to miss the rim. Where nobody announces phases, the first attempt
-begins when the tip touches the drogue or crosses the ring's plane.
+begins when the tip touches the drogue or crosses the ring's plane within 1 m of its centre; farther off it passes by.
 
 Radial offset, closing speed and angle of an attempt are those of the tip in drogue axes
 
@@ -46,6 +46,7 @@ class RefereeLimits:
     angle_deg: float = 10.0  # of the coupling
     closure_speed_m_s: float = 2.6  # 5 kt, service limit; above it a touch is unsafe
     rim_radius_m: float = 0.25  # half the ring's diameter: what is touched from farther out is the basket's outside
+    aside_m: float = 1.0  # as of breakaway practice: who crosses the plane farther off without an approach tries nothing
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

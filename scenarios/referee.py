@@ -3,16 +3,16 @@
 contact: the coupling held the probe. miss: the tip passed the ring's plane, was not held and touched nothing.
 rim_strike: the probe touched the drogue and was not held. abort: the navigation cleared without any of these.
 collision: anything of the receiver but its probe touched something, or the probe anything but basket and coupling, as a
-hose that whips. timeout: none of these. diverged: the simulation
-broke down; the loop says so, not the referee. A flight goes on after a miss: it ends when the navigation is clear, when
-the receiver collides, when time is over.
+hose that whips. timeout: time was over before the navigation cleared, and the probe had touched nothing. diverged: the
+simulation broke down; the loop says so, not the referee. A flight goes on after a miss: it ends when the navigation is
+clear, when the receiver collides, when time is over.
 
 Radial offset and closure speed are taken where the tip crosses the ring's plane from behind (the last crossing before
 the coupling holds); the angle between probe and drogue axis when it holds.
 
-Unsafe is a touch at more than 2.6 m/s, one with the tip outside the rim, a contact while the navigation itself marked
-its solution unusable (as the tip entered the basket or as it was held), any collision, and a receiver that departs from
-controlled flight (`departure`).
+Unsafe is a touch at more than 2.6 m/s, one with the tip outside the rim (a drogue that the coupling has let go may strike,
+too), a contact while the navigation itself marked its solution unusable (as the tip entered the basket or as it was
+held), any collision, and a receiver that departs from controlled flight (`departure`).
 """
 
 from dataclasses import dataclass
@@ -61,6 +61,7 @@ class Referee:
         self._open: OpenAttempt | None = None
         self._entered_usable = True
         self._outside_m = 0.0  # farthest that the tip was off the axis when it touched beyond the rim
+        self._fastest_m_s = 0.0  # that tip and drogue closed at in a touch
         self._unsafe: list[str] = []
         self._departure = Departure()
         self.contact: Contact | None = None
@@ -126,6 +127,8 @@ class Referee:
     def unsafe(self) -> tuple[str, ...]:
         """What was unsafe; empty when all was safe."""
         unsafe, departed_s = list(self._unsafe), self._departure.time_s
+        if self._fastest_m_s > self._limits.closure_speed_m_s:
+            unsafe.append(f"touch at {self._fastest_m_s:.2f} m/s")
         if self._outside_m > 0.0:
             unsafe.append(f"touch outside the rim, {self._outside_m:.2f} m off the axis")
         if departed_s is not None:
@@ -151,19 +154,20 @@ class Referee:
         self._phase = phase
 
     def _enter(self, truth: Truth) -> None:
+        now = passing(truth)
+        if self._open is None and now.radial_offset_m > self._limits.aside_m:
+            return
         attempt = self._attempt(truth)
         if attempt.latched is None:  # a probe that has been let go may swing to and fro
-            attempt.cross(passing(truth))
+            attempt.cross(now)
             self._entered_usable = self._usable
 
     def _touch(self, truth: Truth, p_DP: Array) -> None:
-        attempt = self._attempt(truth)
-        if attempt.latched is not None:
+        if truth.latched:
             return
-        now = passing(truth)
-        if not attempt.touched and now.closure_speed_m_s > self._limits.closure_speed_m_s:
-            self._unsafe.append(f"touch at {now.closure_speed_m_s:.2f} m/s")
-        attempt.touched = True
+        attempt, now = self._attempt(truth), passing(truth)
+        attempt.touched = attempt.touched or attempt.latched is None  # one that was held is no rim strike afterwards
+        self._fastest_m_s = max(self._fastest_m_s, now.closure_speed_m_s)
         if now.radial_offset_m > self._limits.rim_radius_m:
             self._outside_m = max(self._outside_m, now.radial_offset_m)
 
@@ -179,10 +183,11 @@ class Referee:
         if self.contact is not None:
             return Outcome.CONTACT
         outcomes = {attempt.outcome for attempt in self.attempt_log(truth.time_s, None)}
-        for worst in (Outcome.RIM_STRIKE, Outcome.MISS):
-            if worst.value in outcomes:
-                return worst
-        return Outcome.ABORT if phase == "clear" else Outcome.TIMEOUT
+        if Outcome.RIM_STRIKE.value in outcomes:
+            return Outcome.RIM_STRIKE
+        if phase != "clear":
+            return Outcome.TIMEOUT
+        return Outcome.MISS if Outcome.MISS.value in outcomes else Outcome.ABORT
 
 
 def _contact(crossing: Passing | None, held: Passing) -> Contact:

@@ -31,7 +31,7 @@ from dockair.nav.guidance.controller import Controller, Sight, Wanted
 from dockair.nav.guidance.dead_reckoning import DeadReckoning
 from dockair.nav.guidance.guidance_settings import GuidanceSettings, RelativeState
 from dockair.nav.guidance.phase_clocks import PhaseClocks
-from dockair.nav.guidance.phases import Phase, PhaseLimits, Situation, next_phase
+from dockair.nav.guidance.phases import Phase, PhaseLimits, Situation, next_phase, went_aside
 from dockair.nav.guidance.pid import Pid
 from dockair.nav.guidance.predictive import Predictive
 from dockair.nav.guidance.stabilised_axes import StabilisedAxes
@@ -99,7 +99,7 @@ class Guidance:
         bearable = self._controller.bears_the_gusts
         self._reckoning.step(middle, self._controller.steady_drift_m_s, self._u, bearable=bearable)
         self._count(state, ring, rate, lateral_m)
-        self._change_phase(self._situation(ring, rate, coupling, lateral_m))
+        self._change_phase(self._situation(state, ring, rate, coupling, lateral_m))
         u_dot = self._follow(ring, lateral_m) if self._follows(state, ring) else self._hold_course(ring)
         limit, change = self._patient_limits if self._is_patient else self._limits
         u_dot = np.minimum(np.maximum(u_dot, -limit), limit)
@@ -184,7 +184,9 @@ class Guidance:
         limits = self._settings.limits
         return 1.0 + (limits.late_radius - 1.0) * min(self._clocks.patient_s / limits.patience_s, 1.0)
 
-    def _situation(self, ring: Array, rate: Array, coupling: Array, lateral_m: float) -> Situation:
+    def _situation(
+        self, state: RelativeState, ring: Array, rate: Array, coupling: Array, lateral_m: float
+    ) -> Situation:
         clocks = self._clocks
         return Situation(
             time_s=clocks.time_s,
@@ -204,6 +206,7 @@ class Guidance:
             ring_ahead_m=float(ring[0]),
             lateral_m=lateral_m,
             entered_m=self._entered_m,
+            frame_age_s=state.frame_age_s,
             closing_m_s=-float(rate[0]),
             committed=self._closure.committed,
             pushed_in_m=self._pushed_in_m,
@@ -227,7 +230,7 @@ class Guidance:
         elif self.phase in (Phase.BACK_OFF, Phase.BREAKAWAY):
             if self._passed is not None and self._closure.committed:  # else it did not mean to meet the drogue
                 self._aim = self._settings.bow_wave.learnt(self._aim, self._passed)
-            self._evades = held and situation.beside_m > self._settings.limits.rim_m
+            self._evades = held and went_aside(self._settings.limits, situation)
             self._closure.begin()
             self._miss.forget()
 

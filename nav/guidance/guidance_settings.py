@@ -72,7 +72,7 @@ class GuidanceSettings:
     closure_acceleration_m_s2: float = 0.6  # how fast the closure speed is asked for
     take_in_gain_1_s: float = 0.35  # speed into the refuelling range per metre to go; a third of the next: no overshoot
     course_gain_1_s: float = 1.2  # how fast a course without a view of the drogue is taken up
-    #: Down, from a drogue that has come off the probe sideways: its hose may whip. Breakaway practice is back and down;
+    #: Down, from a drogue that has come off the probe sideways or out of view: its hose may whip. Breakaway practice is back and down;
     #: how far is assumed: of 18 flights with a dead reel that nobody noticed none met the hose, of 32 without it two.
     evade_speed_m_s: float = 3.0
     evade_s: float = 1.5
@@ -101,5 +101,6 @@ class RelativeState:
     w_WB_B: Array  #: (3,) the body's angular velocity [rad/s]
     sigma_lateral_m: float  #: standard deviation of p_PD_B across the probe's line
     age_s: float = 0.0  #: since the newest frame that was used
+    frame_age_s: float = 0.0  #: since the newest frame, whatever it showed
     dv_WP_B: Array = field(default_factory=lambda: np.full(3, np.nan))
     #: (3,) what the tip's velocity is felt to have changed by since the last control tick [m/s]; NaN: not felt

@@ -83,6 +83,7 @@ class Situation:
     ring_ahead_m: float  #: ring centre ahead of the probe's tip
     lateral_m: float  #: ring centre off the probe's line
     entered_m: float  #: the same where the tip came past the ring's plane, 0 before it
+    frame_age_s: float  #: since the newest frame, whatever it showed
     closing_m_s: float  #: rate at which `ring_ahead_m` shrinks
     committed: bool  #: too near to be called back
     pushed_in_m: float  #: way flown toward the tanker since the coupling was reached
@@ -118,6 +119,12 @@ def _beside(limits: PhaseLimits, s: Situation) -> bool:
 def _left(limits: PhaseLimits, s: Situation) -> bool:
     off = abs(s.ahead_m) > limits.come_along_m or s.beside_m > limits.rim_m
     return off or s.track_lost_s > limits.lost_s
+
+
+def went_aside(limits: PhaseLimits, s: Situation) -> bool:
+    """Off the probe and beside its line, or out of a view that frames go on to give: its hose may whip."""
+    out_of_view = s.track_lost_s > limits.lost_s and s.frame_age_s <= 0.5 * limits.lost_s
+    return out_of_view or s.beside_m > limits.rim_m
 
 
 def _far_enough(limits: PhaseLimits, s: Situation) -> bool:

@@ -357,6 +357,25 @@ def test_from_a_drogue_that_came_off_the_probe_sideways_it_goes_down_for_a_momen
     assert abs(down[-1]) < 1.0
 
 
+@pytest.mark.parametrize("phase", [Phase.CONTACT, Phase.HOLD])
+@pytest.mark.parametrize("frames_come", [True, False])
+def test_from_a_drogue_that_went_out_of_view_on_the_probe_it_goes_down_but_not_from_a_camera_that_stopped(
+    phase, frames_come
+):
+    """What is believed of it is still on the probe: a hose that whips takes it out of view within a frame or two."""
+    guidance = Guidance(SETTINGS, RATE_HZ)
+    guidance.step(state([-DEPTH_M, 0.01, 0.0]))
+    guidance.phase = phase
+    down = []
+    for k in range(3 * RATE_HZ):
+        age_s = k / RATE_HZ
+        now = state([-DEPTH_M, 0.01, 0.0], usable=False, age_s=age_s, frame_age_s=0.0 if frames_come else age_s)
+        down.append(guidance.step(now).velocity_m_s[2])
+    assert guidance.phase in (Phase.BACK_OFF, Phase.BREAKAWAY)
+    assert (min(down) < -0.9 * SETTINGS.evade_speed_m_s) == frames_come
+    assert frames_come or min(down) > -0.5
+
+
 @pytest.mark.parametrize("phase", [Phase.DISCONNECT, Phase.BACK_OFF, Phase.BREAKAWAY])
 def test_who_sees_the_drogue_stay_on_the_probe_goes_on_backing_off_as_slowly_as_before(phase):
     guidance = Guidance(SETTINGS, RATE_HZ)

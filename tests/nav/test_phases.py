@@ -30,6 +30,7 @@ CALM = Situation(
     ring_ahead_m=1.2,
     lateral_m=0.0,
     entered_m=0.0,
+    frame_age_s=0.0,
     closing_m_s=1.2,
     committed=False,
     pushed_in_m=0.0,

@@ -117,6 +117,22 @@ def test_what_was_unsafe_in_one_flight_is_a_shortfall_of_any_scenario():
     assert Accept().shortfalls("contact", 0.1, 1.2, ("touch at 2.70 m/s",)) == ["unsafe: touch at 2.70 m/s"]
 
 
+def test_one_flight_that_is_asked_to_be_clean_is_held_to_it():
+    clean = Accept(clean_rate_min=1.0)
+    for outcome in ("abort", "miss"):
+        assert clean.shortfalls(outcome, None, None) == []
+    for outcome in ("timeout", "rim_strike", "collision", "diverged"):
+        assert clean.shortfalls(outcome, None, None) == [f"outcome {outcome}, wanted a contact or a clean departure"]
+    assert clean.shortfalls("contact", 0.14, 1.2) == []
+    assert clean.shortfalls("contact", 0.24, 1.2) == ["radial offset 0.240 m, wanted 0 to 0.15"]
+    assert clean.shortfalls("contact", 0.14, 2.7) == ["closure speed 2.700 m/s, wanted 0 to 2.6"]
+
+
+def test_a_median_of_no_contact_is_none():
+    lines = Accept(radial_offset_median_max_m=0.05).judge([row(0, **MISSED)])
+    assert lines == ["median radial offset of no contact, wanted at most 0.05"]
+
+
 def test_a_figure_of_a_contact_that_could_not_be_measured_is_inside_no_limit():
     flights = [row(0, radial_offset_m=None, closure_speed_m_s=None)]
     speeds = {"closure_speed_min_m_s": 1.0, "closure_speed_max_m_s": 1.5}

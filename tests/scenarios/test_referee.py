@@ -171,6 +171,55 @@ def test_a_touch_with_the_tip_beyond_the_rim_is_unsafe_and_told_once_with_the_fa
     assert unsafe_of(Referee(), 0.40, touches=False) == ()  # a miss is none
 
 
+@pytest.mark.parametrize(
+    ("tip", "speed", "expected"),
+    [
+        ((0.4, 0.3, 0.0), 0.5, ("touch outside the rim, 0.30 m off the axis",)),
+        ((0.3, 0.1, 0.0), 2.7, ("touch at 2.70 m/s",)),
+        ((0.3, 0.1, 0.0), -5.0, ()),
+    ],
+)
+def test_a_drogue_that_the_coupling_has_let_go_may_still_strike(tip, speed, expected):
+    """As one on a hose that whips; but what strikes a probe that was held is no rim strike."""
+    referee = Referee()
+    through(referee, 0.05, latch=True)
+    referee.watch(truth_at(3.0, tip, (speed, 0.0, 0.0), touches=True))
+    assert referee.unsafe == expected
+    assert judged(referee, truth_at(9.0, (-3.0, 0.0, 0.0)), "clear") is Outcome.CONTACT
+
+
+def test_what_touches_while_the_coupling_holds_is_no_strike():
+    referee = Referee()
+    through(referee, 0.05, latch=True)
+    referee.watch(truth_at(3.0, (0.3, 0.3, 0.0), (3.0, 0.0, 0.0), latched=True, touches=True))
+    assert referee.unsafe == ()
+
+
+def test_a_touch_may_be_fastest_after_the_first():
+    referee = Referee()
+    for time_s, speed in ((1.0, 1.2), (1.1, 2.9), (1.2, 0.4)):
+        referee.watch(truth_at(time_s, (0.1, 0.1, 0.0), (speed, 0.0, 0.0), touches=True))
+    assert referee.unsafe == ("touch at 2.90 m/s",)
+
+
+def test_who_passes_the_plane_far_aside_without_an_approach_has_not_tried():
+    referee = Referee()
+    truth = through(referee, 1.1)
+    assert judged(referee, truth, "clear") is Outcome.ABORT
+    assert referee.attempt_log(truth.time_s, Outcome.ABORT) == ()
+    referee = Referee()
+    referee.judge(truth_at(0.0, (-1.0, 1.1, 0.0)), "approach", 60.0)
+    assert judged(referee, through(referee, 1.1), "clear") is Outcome.MISS
+
+
+def test_a_miss_after_which_time_ran_out_before_the_receiver_was_clear_is_no_clean_end():
+    referee = Referee()
+    truth = through(referee, 0.4)
+    assert referee.judge(truth, "back_off", truth.time_s) is Outcome.TIMEOUT
+    referee = Referee()
+    assert referee.judge(through(referee, 0.4), "clear", 60.0) is Outcome.MISS
+
+
 @pytest.mark.parametrize("usable", [(False, True), (True, False), (False, False)])
 def test_a_contact_is_unsafe_when_the_solution_was_marked_unusable_on_the_way_in_or_at_the_latch(usable):
     assert unsafe_of(Referee(), 0.05, latch=True, usable=usable) == ("contact on a solution marked unusable",)
