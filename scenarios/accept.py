@@ -5,21 +5,22 @@ Where no rate is asked for, every flight has to show what one flight must.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field
 
 from dockair.errors import DockairError
-from dockair.scenarios.attempts import RefereeLimits
 from dockair.scenarios.table import Table
+
+if TYPE_CHECKING:
+    from dockair.scenarios.attempts import RefereeLimits
 
 OutcomeName = Literal["contact", "miss", "rim_strike", "abort", "collision", "timeout", "diverged"]
 
 Row = Mapping[str, Any]
 _Rate = Annotated[float | None, Field(ge=0.0, le=1.0)]
 _UNTOUCHED = ("abort", "miss")  # outcomes of a flight that ended clear without having touched anything
-_GOOD = RefereeLimits()
 
 
 class Accept(Table):
@@ -79,8 +80,9 @@ class Accept(Table):
         if self.clean_rate_min is not None and self.outcome is None:
             if outcome not in ("contact", *_UNTOUCHED):
                 lines.append(f"outcome {outcome}, wanted a contact or a clean departure")
-            offset_max_m = offset_max_m or _GOOD.radial_offset_m
-            speed_max_m_s = speed_max_m_s or _GOOD.closure_speed_m_s
+            good = _good_contact()
+            offset_max_m = offset_max_m or good.radial_offset_m
+            speed_max_m_s = speed_max_m_s or good.closure_speed_m_s
         limits = (
             ("radial offset", radial_offset_m, 0.0, offset_max_m, "m"),
             ("closure speed", closure_speed_m_s, self.closure_speed_min_m_s, speed_max_m_s, "m/s"),
@@ -156,6 +158,12 @@ _IN_WORDS = {
     "success_rate_min": "within all",
     "clean_rate_min": "contact or clean departure",
 }
+
+
+def _good_contact() -> "RefereeLimits":
+    from dockair.scenarios.attempts import RefereeLimits  # loads an engine, which who reads a scenario does not need
+
+    return RefereeLimits()
 
 
 def _check(rows: Sequence[Row]) -> None:

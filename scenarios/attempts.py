@@ -46,7 +46,9 @@ class RefereeLimits:
     angle_deg: float = 10.0  # of the coupling
     closure_speed_m_s: float = 2.6  # 5 kt, service limit; above it a touch is unsafe
     rim_radius_m: float = 0.25  # half the ring's diameter: what is touched from farther out is the basket's outside
-    aside_m: float = 1.0  # as of breakaway practice: who crosses the plane farther off without an approach tries nothing
+    aside_m: float = (
+        1.0  # as of breakaway practice: who crosses the plane farther off without an approach tries nothing
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -68,6 +68,8 @@ class Episodes(gymnasium.Env[Obs, NDArray[np.float32]], Generic[Obs]):
         check_choice("reward", reward, REWARDS)
         check_integer("ticks_per_step", ticks_per_step, 1)
         check_integer("attempts", attempts, 1)
+        if not isinstance(until_clear, bool):
+            raise DockairError("until_clear", expected="True or False", got=until_clear)
         self._source, self._attempts, self._is_dense = scenario, attempts, reward == "dense"
         self._until_clear, self._ticks_per_step = until_clear, ticks_per_step
         self.render_mode = render_mode

@@ -37,13 +37,23 @@ def import_by_name(name: str) -> Any:
     expected = 'an importable "module:Class"'
     try:
         found: Any = importlib.import_module(module)
+    except (Exception, SystemExit) as error:  # somebody's own module may raise anything, and may end the process
+        if _is_no_module(module, error):
+            raise DockairError(name, expected=expected, got=str(error)) from None
+        raise DockairError(name, expected=expected, got=said_by(error, module.partition(".")[0])) from error
+    try:
         for part in path.split("."):
             found = getattr(found, part)
-    except (ImportError, AttributeError, ValueError) as error:
+    except AttributeError as error:
         raise DockairError(name, expected=expected, got=str(error)) from None
-    except (Exception, SystemExit) as error:  # somebody's own module may raise anything, and may end the process
-        raise DockairError(name, expected=expected, got=said_by(error)) from error
     return found
+
+
+def _is_no_module(module: str, error: BaseException) -> bool:
+    """Whether there is no module of this name, rather than one that fails."""
+    if isinstance(error, ModuleNotFoundError):
+        return error.name is not None and f"{module}.".startswith(f"{error.name}.")
+    return module in ("", ".") or module.startswith(".")
 
 
 def said_by(error: BaseException, package: str = "") -> str:

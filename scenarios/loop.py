@@ -196,6 +196,7 @@ def fly(
                 if progress is not None:
                     progress(tick.truth, tick.solution)
             recorder.append(tick)
-        return recorder.finish(flight, tick.outcome, seed, time.perf_counter() - begun)
+            recorder.settle()
+            return recorder.finish(flight, tick.outcome, seed, time.perf_counter() - begun)
     finally:
         flight.close()

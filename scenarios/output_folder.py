@@ -1,5 +1,9 @@
-"""Where results are written: a flight's into an empty folder or over an earlier flight, never over others' files."""
+"""Where results are written: a flight's into an empty folder or over an earlier flight, never over others' files.
 
+An earlier flight is replaced by a whole one only: while a flight goes on its files are in a folder within.
+"""
+
+import shutil
 import tempfile
 from pathlib import Path
 
@@ -18,6 +22,9 @@ FLIGHT_FILES = (
 )
 
 
+_UNDER_WAY = ".flight"  # what a flight that was killed has left is the next one's to remove
+
+
 def default_output_folder(scenario_name: str, seed: int) -> Path:
     """Return out/<scenario>-<seed>."""
     return Path("out") / f"{scenario_name}-{seed}"
@@ -30,29 +37,45 @@ def check_output_folder(folder: Path) -> None:
         DockairError: it is not a folder, or holds files but no flight.
     """
     expected = "a new or empty folder, or one with an earlier flight"
-    if folder.exists() and not folder.is_dir():
-        raise DockairError(f"--out {folder}", expected=expected, got="a file")
-    present = sorted(path.name for path in folder.iterdir()) if folder.is_dir() else []
-    if present and not set(present) & set(FLIGHT_FILES):
+    try:
+        if folder.exists() and not folder.is_dir():
+            raise DockairError(f"--out {folder}", expected=expected, got="a file")
+        present = sorted(path.name for path in folder.iterdir()) if folder.is_dir() else []
+    except OSError as error:
+        raise DockairError(f"--out {folder}", expected=expected, got=error.strerror) from None
+    if present and not set(present) & {*FLIGHT_FILES, _UNDER_WAY}:
         raise DockairError(f"--out {folder}", expected=expected, got=f"a folder with {present[0]}")
 
 
-def prepare_output_folder(folder: Path) -> None:
-    """Make the folder, and remove an earlier flight's files from it; other files stay.
+def prepare_output_folder(folder: Path) -> Path:
+    """Make the folder, and return one within for the files of the flight that begins; what is there stays.
 
     Raises:
         DockairError: as `check_output_folder`, or it cannot be written.
     """
     try:
         check_output_folder(folder)
-        for name in FLIGHT_FILES:
-            (folder / name).unlink(missing_ok=True)
-        folder.mkdir(parents=True, exist_ok=True)
-        probe = folder / "result.json"
-        probe.touch()
-        probe.unlink()
+        under_way = folder / _UNDER_WAY
+        if under_way.exists():
+            shutil.rmtree(under_way)
+        under_way.mkdir(parents=True)
     except OSError as error:
         raise DockairError(f"--out {folder}", expected="a folder that can be written", got=error.strerror) from None
+    return under_way
+
+
+def keep_flight(folder: Path) -> None:
+    """Put the files of the flight that is over in the place of an earlier one's; other files stay."""
+    for name in FLIGHT_FILES:
+        (folder / name).unlink(missing_ok=True)
+    for path in sorted((folder / _UNDER_WAY).iterdir()):
+        path.replace(folder / path.name)
+    forget_flight(folder)
+
+
+def forget_flight(folder: Path) -> None:
+    """Remove what a flight that came to nothing has written."""
+    shutil.rmtree(folder / _UNDER_WAY, ignore_errors=True)
 
 
 def made_folder(folder: Path) -> Path:

@@ -150,7 +150,7 @@ def _shade_phases(axes: Any, flight: Any, *, named: bool) -> None:
             middle = 0.5 * (time_s[begin] + time_s[end])
             label = phases[begin].replace("_", "-")
             axes.text(middle, 0.98, label, transform=axes.get_xaxis_transform(), fontsize=8, ha="center", va="top")
-    axes.set_xlim(time_s[0], time_s[-1])
+    axes.set_xlim(time_s[0], max(time_s[-1], time_s[0] + 1e-3))  # also of a flight of one tick
 
 
 def _legend_beside(axes: Any) -> None:

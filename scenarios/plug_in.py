@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 
 from dockair.errors import DockairError
 from dockair.messages import CameraFrame, ImuSample, Navigates, NavSolution, PodSignal, TankerAnnouncement
+from dockair.scenarios.answer import check_answer
 from dockair.scenarios.exact_json import import_by_name, name_of, said_by
 
 T = TypeVar("T")
@@ -39,19 +40,26 @@ def make_navigator(navigator_class: Callable[..., Navigates], *given: Any) -> Na
     Raises:
         DockairError: it is somebody's own, and its constructor raises an exception.
     """
-    return _called(navigator_class, "a navigator that can be made of the sheets", navigator_class, *given)
+    made = _called(navigator_class, "a navigator that can be made of the sheets", navigator_class, *given)
+    if not callable(getattr(made, "step", None)):  # a class may make anything
+        expected = "a navigator with step(imu, frame)"
+        raise DockairError(name_of(navigator_class), expected=expected, got=type(made).__name__)  # type: ignore[arg-type]
+    return made
 
 
 def step_navigator(navigator: Navigates, imu: Sequence[ImuSample], frame: CameraFrame | None) -> NavSolution:
     """Return what a navigator answers in a control tick.
 
     Raises:
-        DockairError: it is somebody's own and raises an exception, or answers something else than a NavSolution.
+        DockairError: it is somebody's own and raises an exception, or answers something else than a NavSolution whose
+            fields are what `dockair.messages` says.
     """
     answer = _called(type(navigator), "step(imu, frame) without an exception", navigator.step, imu, frame)
     if not isinstance(answer, NavSolution):
         expected = "a NavSolution from step(imu, frame)"
         raise DockairError(name_of(type(navigator)), expected=expected, got=type(answer).__name__)
+    if not _is_ours(type(navigator)):
+        check_answer(name_of(type(navigator)), answer)
     return answer
 
 
@@ -86,10 +94,14 @@ def _called(owner: Any, expected: str, function: Callable[..., T], *given: Any) 
     except DockairError:
         raise
     except (Exception, SystemExit) as error:  # somebody's own code may raise anything
-        package = owner.__module__.partition(".")[0]
-        if package == "dockair":
+        if _is_ours(owner):
             raise
+        package = owner.__module__.partition(".")[0]
         raise DockairError(name_of(owner), expected=expected, got=said_by(error, package)) from error
+
+
+def _is_ours(owner: Any) -> bool:
+    return bool(owner.__module__.partition(".")[0] == "dockair")
 
 
 def _takes_one(made: Callable[..., Any]) -> bool:

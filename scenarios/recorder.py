@@ -10,7 +10,7 @@ from dockair.messages import LedObservation
 from dockair.scenarios.causes import flown_of
 from dockair.scenarios.flight_log import FlightLog
 from dockair.scenarios.message_log import MessageLog, read_messages
-from dockair.scenarios.output_folder import prepare_output_folder
+from dockair.scenarios.output_folder import forget_flight, keep_flight, prepare_output_folder
 from dockair.scenarios.referee import Outcome
 from dockair.scenarios.result import Result, summarise
 
@@ -37,12 +37,12 @@ class Recorder:
         if record not in RECORD:
             raise DockairError("record", expected="what to keep of the frames", got=record, exists=RECORD)
         self._folder = None if out is None else Path(out)
-        self._log = FlightLog()
+        self._log, self._finished = FlightLog(), False
         self._messages: MessageLog | None = None
         if self._folder is not None:
-            prepare_output_folder(self._folder)  # only now: an earlier flight outlives one that cannot be built
+            self._under_way = prepare_output_folder(self._folder)
             if record != "none" and flight.recipe is not None:
-                self._messages = MessageLog(self._folder, flight.recipe)
+                self._messages = MessageLog(self._under_way, flight.recipe)
 
     def append(self, tick: "Tick") -> None:
         """Take one control tick."""
@@ -51,14 +51,22 @@ class Recorder:
             assert not isinstance(tick.frame, LedObservation), "a flight without frames has no recipe"
             self._messages.append(tick.imu, tick.frame, tick.solution, tick.announcement, tick.signal)
 
+    def settle(self) -> None:
+        """Write the messages that still wait; no more are taken."""
+        if self._messages is not None:
+            self._messages.close()
+
     def __enter__(self) -> Self:
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
-        if self._messages is not None:
-            self._messages.close()
+        try:
+            self.settle()
+        finally:
+            if self._folder is not None and not self._finished:
+                forget_flight(self._folder)
 
     def finish(self, flight: "Flight", outcome: Outcome, seed: int, wall_time_s: float) -> Result:
         """Return the result; with a folder, write result.json, flight.parquet, episode.rrd and flight.png there.
@@ -84,7 +92,10 @@ class Recorder:
             out_dir=self._folder,
         )
         if self._folder is not None:
-            self._write(flight, result, self._folder)
+            self.settle()
+            self._write(flight, result, self._under_way)
+            keep_flight(self._folder)
+            self._finished = True
         return result
 
     def _write(self, flight: "Flight", result: Result, folder: Path) -> None:

@@ -72,8 +72,9 @@ class GuidanceSettings:
     closure_acceleration_m_s2: float = 0.6  # how fast the closure speed is asked for
     take_in_gain_1_s: float = 0.35  # speed into the refuelling range per metre to go; a third of the next: no overshoot
     course_gain_1_s: float = 1.2  # how fast a course without a view of the drogue is taken up
-    #: Down, from a drogue that has come off the probe sideways or out of view: its hose may whip. Breakaway practice is back and down;
-    #: how far is assumed: of 18 flights with a dead reel that nobody noticed none met the hose, of 32 without it two.
+    #: Down, from a drogue that has come off the probe sideways or out of view: its hose may whip. Breakaway practice is
+    #: back and down; how far is assumed: of 18 flights with a dead reel that nobody noticed none met the hose, of 32
+    #: without it two.
     evade_speed_m_s: float = 3.0
     evade_s: float = 1.5
     unseen_drift_m_s: float = 0.5  # 2.5 sigma of an inertial velocity; a drogue keeps place behind its tanker

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from dockair.scenarios.campaign import journal
-from dockair.scenarios.campaign.folder import entries_of
+from dockair.scenarios.campaign.folder import check, entries_of
 from dockair.scenarios.campaign.plan_file import PlanFile
 from dockair.scenarios.campaign.row import flight_of, unflown
 from dockair.scenarios.campaign.run import checked_jobs
@@ -33,9 +33,10 @@ def dry_run(source: PlanFile, folder: Path) -> DryRun:
     """Return what a campaign would fly; flights in the folder's journal count as done, errors among them.
 
     Raises:
-        DockairError: the plan cannot be flown; the folder's journal is damaged.
+        DockairError: the plan cannot be flown; the folder is no campaign's, or its journal is damaged.
     """
     jobs = checked_jobs(source)
+    check(folder)
     entries = entries_of(folder) if os.path.isfile(folder / journal.FILE_NAME) else {}
     done = {flight_of(entry["row"]) for entry in entries.values()}
     groups = [

@@ -31,13 +31,29 @@ def make(folder: Path, *, fresh: bool = False) -> None:
     Raises:
         DockairError: a file, a folder with other files and no campaign, or one that cannot be made.
     """
+    check(folder, fresh=fresh)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise DockairError(f"--out {folder}", expected="a folder that can be written", got=error.strerror) from None
+
+
+def check(folder: Path, *, fresh: bool = False) -> None:
+    """Refuse what `make` would, as far as can be told without making anything.
+
+    Args:
+        folder: as of `make`.
+        fresh: as of `make`.
+
+    Raises:
+        DockairError: as `make`.
+    """
     where = f"--out {folder}"
     expected = f"a new or empty folder, or one with the {journal.FILE_NAME} of an earlier campaign"
     try:
         if folder.exists() and not folder.is_dir():
             raise DockairError(where, expected=expected, got="a file")
-        folder.mkdir(parents=True, exist_ok=True)
-        present = sorted(path.name for path in folder.iterdir())
+        present = sorted(path.name for path in folder.iterdir()) if folder.exists() else []
         if present and journal.FILE_NAME not in present:
             raise DockairError(where, expected=expected, got=f"a folder with {present[0]}")
         damaged = bool(present) and not journal.begins_like_one(folder / journal.FILE_NAME)

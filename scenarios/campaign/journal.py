@@ -100,10 +100,13 @@ def read(path: Path) -> tuple[dict[str, Entry], int]:
     """Return the entries by key, later ones in place of earlier, and how many bytes they take.
 
     Raises:
-        DockairError: a line other than the last is no entry.
+        DockairError: it cannot be read; a line other than the last is no entry.
     """
     entries: dict[str, Entry] = {}
-    size, lines = 0, path.read_bytes().splitlines(keepends=True)
+    try:
+        size, lines = 0, path.read_bytes().splitlines(keepends=True)
+    except OSError as error:
+        raise DockairError(str(path), expected="a journal that can be read", got=error.strerror) from None
     for number, line in enumerate(lines, start=1):
         entry = _entry(line)
         if entry is None and number < len(lines):

@@ -1,7 +1,7 @@
 """What people see of a campaign: how much is done, how fast, how often it docked so far; then a table."""
 
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from types import TracebackType
 from typing import Any, Self
 
@@ -122,6 +122,9 @@ def show_campaign(table: Mapping[str, Any]) -> None:
     shown = Table(box=None, padding=(0, 1))
     for heading in ("scenario", "sensing", "first attempt", "success", "offset", "closing", "unsafe", "errors"):
         shown.add_column(heading, no_wrap=True)
+    crew = _crew_columns(table["groups"])
+    for name in crew:
+        shown.add_column(name)
     with_settings = any(group["settings"] for group in table["groups"])
     if with_settings:
         shown.add_column("set")
@@ -133,6 +136,7 @@ def show_campaign(table: Mapping[str, Any]) -> None:
             f"{offset['median']:.3f} m" if offset else "",
             f"{speed['min']:.2f}-{speed['max']:.2f} m/s" if speed else "",
             *(str(group[name]) if group[name] else "" for name in ("unsafe", "errors")),
+            *(group[name] for name in crew),
             *((Text(group["settings"]),) if with_settings else ()),  # a list's brackets are no markup
         )
     console.print(shown)
@@ -144,14 +148,22 @@ def show_campaign(table: Mapping[str, Any]) -> None:
     console.print(f"  {table['folder']}", soft_wrap=True)
 
 
+def _crew_columns(groups: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return what of a crew differs from group to group, perfect navigation apart, which stands under sensing."""
+    crews = {name: {group[name] for group in groups} - {"truth"} for name in ("controller", "navigator")}
+    return [name for name, found in crews.items() if len(found) > 1]
+
+
 def show_dry_run(planned: Mapping[str, Any]) -> None:
     """Print what `dockair campaign --dry-run --json` would, but for the commands."""
     console, shown = plain_console(), Table(box=None, padding=(0, 1))
-    for heading in ("scenario", "sensing", "controller", "flights", "done", "set"):
+    crew = _crew_columns(planned["groups"])
+    for heading in ("scenario", "sensing", *crew, "flights", "done", "set"):
         shown.add_column(heading, no_wrap=True)
     for group in planned["groups"]:
         counts = str(group["flights"]), str(group["done"] or "")
-        shown.add_row(group["scenario"], group["sensing"], group["controller"], *counts, Text(group["settings"]))
+        flown_by = (group[name] for name in crew)
+        shown.add_row(group["scenario"], group["sensing"], *flown_by, *counts, Text(group["settings"]))
     console.print(shown)
     left = planned["flights"] - planned["done"]
     console.print(f"  {left} of {planned['flights']} flights would be flown; {planned['folder']}", soft_wrap=True)

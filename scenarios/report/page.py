@@ -1,4 +1,7 @@
-"""The page: overview, what vision costs, crews side by side, a section a group, how it was made; one HTML file that needs no other."""
+"""The page: overview, what vision costs, crews side by side, a section a group, how it was made.
+
+One HTML file that needs no other.
+"""
 
 import json
 import math

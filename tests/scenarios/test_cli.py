@@ -17,7 +17,7 @@ from dockair.errors import DockairError, MachineError
 from dockair.scenarios import cli, doctor
 from dockair.scenarios.cli_options import overrides
 from dockair.scenarios.metrics import NavigationFigures
-from dockair.scenarios.output_folder import prepare_output_folder
+from dockair.scenarios.output_folder import keep_flight, prepare_output_folder
 from dockair.scenarios.referee import Contact
 from dockair.scenarios.result import Result
 from dockair.scenarios.schema import load_scenario
@@ -93,9 +93,10 @@ def flights(monkeypatch, tmp_path):
             progress(
                 SimpleNamespace(time_s=time_s, p_PD_B=np.array([3.0, 4.0, 0.0])), SimpleNamespace(phase="approach")
             )
-        prepare_output_folder(Path(out))  # as the recorder does, once the flight is built
+        under_way = prepare_output_folder(Path(out))  # as the recorder does, once the flight is built
         result = a_result(scenario, seed, out)
-        result.write(out)
+        result.write(under_way)
+        keep_flight(Path(out))
         return result
 
     monkeypatch.setitem(sys.modules, "dockair.scenarios.loop", SimpleNamespace(fly=fly))

@@ -1,5 +1,6 @@
 """What a navigator of one's own has to be, and what is said of one that is not."""
 
+import dataclasses
 import linecache
 import re
 
@@ -7,7 +8,8 @@ import numpy as np
 import pytest
 
 from dockair.errors import DockairError
-from dockair.messages import NavSolution
+from dockair.messages import NavSolution, ReceiverCommand, Window
+from dockair.nav.guidance.phases import Phase
 from dockair.nav.navigator import Navigator
 from dockair.scenarios.loop import fly
 from dockair.scenarios.message_log import NavigatorRecipe
@@ -159,3 +161,119 @@ def test_a_flight_with_a_navigator_that_fails_ends_in_that_line():
     changes = {"navigation.navigator": f"{HERE}:Fails", "camera.sensing": "measurements"}
     with pytest.raises(DockairError, match=r"Fails: expected step\(imu, frame\) without an exception, got "):
         fly(load_scenario("still_air", changes), 0)
+
+
+GOOD = NavSolution(
+    time_stamp_s=1.0, valid=True, phase="join_up", status="", p_PD_B=np.zeros(3), v_PD_B=np.zeros(3), R_BD=np.eye(3),
+    covariance=np.eye(9), command=ReceiverCommand(), window=None, frame_time_stamp_s=float("nan"),
+    candidates_px=np.empty((0, 2)), led_pixels_px=np.full((8, 2), np.nan),
+)  # fmt: skip
+
+
+class Answers(Steps):
+    def __init__(self, **changes):
+        self.answer = dataclasses.replace(GOOD, **changes)
+
+    def step(self, imu, frame):
+        return self.answer
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        {"valid": np.bool_(False), "p_PD_B": np.full(3, np.nan), "covariance": np.full((9, 9), np.nan)},
+        {"window": Window(0, 10, np.int64(0), 10), "exposure_s": 1e-4, "candidates_px": np.zeros((5, 2))},
+        {"time_stamp_s": 3, "covariance": np.full((9, 9), np.nan)},
+    ],
+)
+def test_a_solution_that_can_be_flown_is_passed_on(changes):
+    navigator = Answers(**changes)
+    assert step_navigator(navigator, (), None) is navigator.answer
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"command": None}, "command: expected a ReceiverCommand, got 'None'"),
+        ({"command": (1, 2)}, "command: expected a ReceiverCommand"),
+        (
+            {"command": ReceiverCommand(velocity_m_s=np.full(3, np.nan))},
+            "command.velocity_m_s: expected an array of 3 finite numbers, got '[nan, nan, nan]'",
+        ),
+        ({"command": ReceiverCommand(velocity_m_s=[0.0, 0.0, 0.0])}, "command.velocity_m_s"),
+        ({"command": ReceiverCommand(acceleration_m_s2=None)}, "command.acceleration_m_s2"),
+        ({"command": ReceiverCommand(velocity_m_s=np.zeros(2))}, "command.velocity_m_s"),
+        ({"command": ReceiverCommand(climb_rad=float("nan"))}, "command.climb_rad: expected a finite number"),
+        ({"p_PD_B": np.zeros(2)}, "p_PD_B: expected an array (3,) of numbers, got '[0.0, 0.0]'"),
+        ({"p_PD_B": "here"}, "p_PD_B: expected an array"),
+        (
+            {"p_PD_B": np.zeros(3, dtype=complex)},
+            "p_PD_B: expected an array (3,) of numbers, got 'an array (3,) of complex128'",
+        ),
+        ({"p_PD_B": np.full(3, np.nan)}, "p_PD_B: expected finite numbers while valid"),
+        ({"R_BD": np.zeros(3)}, "R_BD: expected an array (3, 3) of numbers"),
+        ({"R_BD": np.zeros((3, 3))}, "R_BD: expected a rotation"),
+        ({"covariance": np.eye(3)}, "covariance: expected an array (9, 9) of numbers"),
+        ({"covariance": None}, "covariance"),
+        ({"covariance": -np.eye(9)}, "covariance: expected no variance below 0"),
+        ({"candidates_px": []}, "candidates_px: expected an array (n, 2) of numbers, got '[]'"),
+        ({"led_pixels_px": np.zeros((4, 2))}, "led_pixels_px: expected an array (8, 2) of numbers"),
+        ({"valid": None}, "valid: expected True or False, got 'None'"),
+        ({"status": None}, "status: expected text"),
+        ({"phase": Phase.APPROACH}, "phase: expected text, got"),
+        ({"time_stamp_s": "x"}, "time_stamp_s: expected a finite number"),
+        ({"time_stamp_s": float("nan")}, "time_stamp_s: expected a finite number"),
+        ({"frame_time_stamp_s": None}, "frame_time_stamp_s: expected a number, or NaN"),
+        ({"heading_rad": None}, "heading_rad"),
+        ({"exposure_s": -1.0}, "exposure_s: expected above 0, or NaN"),
+        ({"window": (0, 0, 10, 10)}, "window: expected a Window of whole numbers, or None"),
+        ({"window": Window(0.5, 10, 0, 10)}, "window"),
+    ],
+)
+def test_a_solution_that_could_not_be_flown_logged_or_judged_is_refused_by_its_field(changes, said):
+    with pytest.raises(DockairError) as refused:
+        step_navigator(Answers(**changes), (), None)
+    assert f"{HERE}:Answers: {said}" in str(refused.value) and "\n" not in str(refused.value)
+
+
+class MakesAnother(Steps):
+    def __new__(cls, sheets):
+        return 3
+
+
+def test_a_class_that_makes_something_else_is_refused():
+    with pytest.raises(DockairError, match=r"expected a navigator with step\(imu, frame\), got 'int'"):
+        NavigatorRecipe(class_name=f"{HERE}:MakesAnother", sheets=None).build()
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (
+            "import numpy as np\nX = np.zerosx(3)\n",
+            r"AttributeError: module 'numpy' has no attribute 'zerosx' \(.*, line 2\)",
+        ),
+        ("raise ValueError('at\\nimport')\n", r"ValueError: at import \(.*, line 1\)"),
+        ("import nosuchmod\n", r"ModuleNotFoundError: No module named 'nosuchmod' \(.*, line 1\)"),
+    ],
+)
+def test_a_module_that_fails_is_said_with_its_line(tmp_path, monkeypatch, text, said):
+    (tmp_path / "fails_at_import.py").write_text(text)
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(DockairError, match=said):
+        navigator_class_of("fails_at_import:MyNavigator")
+
+
+@pytest.mark.parametrize(
+    ("name", "got"),
+    [
+        ("nosuch:X", "No module named 'nosuch'"),
+        ("nosuch.deep:X", "No module named 'nosuch'"),
+        ("os:Nobody", "no attribute"),
+    ],
+)
+def test_what_does_not_exist_is_said_plainly(name, got):
+    with pytest.raises(DockairError, match=got) as refused:
+        navigator_class_of(name)
+    assert "line" not in str(refused.value)
