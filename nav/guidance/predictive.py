@@ -94,7 +94,7 @@ class Predictive:
     def looks_ahead_s(self) -> Array:
         """(n,) now, after the response time to the left and at the nodes of the plan.
 
-        Up, the push of the bow wave is taken for the same times: unmanned, where up answers sooner, that of 0.15 s later.
+        The push of the bow wave up is taken for the same: unmanned, where up answers sooner, that of 0.15 s later.
         """
         return self._times
 
