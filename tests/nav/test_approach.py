@@ -607,3 +607,11 @@ def test_a_drogue_that_is_not_seen_is_not_waited_for_beside_it():
     assert phases == [Phase.PRE_CONTACT, Phase.APPROACH, Phase.BREAKAWAY, Phase.PRE_CONTACT, Phase.CLEAR]
     assert guidance.phase_reason == "drogue lost"
     assert now.p_PD_B[0] > 10.0
+
+
+@pytest.mark.parametrize("closure_m_s", [0.5, 0.8, 1.2, 1.5])
+def test_the_drogue_is_met_at_the_speed_that_a_scenario_may_ask_for(closure_m_s):
+    plant = Plant()
+    phases, _ = fly(plant, settings=dataclasses.replace(SETTINGS, closure_speed_m_s=closure_m_s))
+    assert phases == DOCKING
+    assert plant.crossings[0][1] == pytest.approx(closure_m_s, abs=0.05)
