@@ -16,7 +16,7 @@ import numpy as np
 from dockair.nav.guidance.guidance_settings import GuidanceSettings
 from dockair.rotations import Array
 
-_HALVINGS = 20
+_HALVINGS = 20  # to a millionth of the way
 
 
 class CommandLimits:
