@@ -16,8 +16,8 @@ leans on it, by c / V more than announced, so that v goes:
 
     v' = -V r e - c,     c = k v - V r e                                                                 (3)
 
-A Kalman filter learns v and e from the drogue's velocity on the receiver's scale. Where that tells nothing any more, on
-the probe, the path goes on as learnt.
+A Kalman filter learns v and e from the drogue's velocity on the receiver's scale; another turn rate has another e, a
+change of the slope alone leaves it. Where the drogue tells nothing any more, on the probe, the path goes on as learnt.
 
 Not modelled: an error of the slope that grows (one that is steady is a velocity like any other); a change of the
 tanker's turn that was not announced.
@@ -116,10 +116,11 @@ class AnnouncedPath:
         )
 
     def _begin(self, change: _Ahead) -> None:
+        same_turn = change.turn_rate_rad_s == self._after[0]
         self._before = (self.turn_rate_rad_s, self.climb_rad)
         self._after = (change.turn_rate_rad_s, change.climb_rad)
         self._entry_s, self._since_s = change.entry_s, self._clock_s - change.starts_s
-        if change.turn_rate_rad_s != 0.0:  # another turn, another error
+        if change.turn_rate_rad_s != 0.0 and not same_turn:  # another turn, another error
             sigma = self._settings.turn_rate_sigma_rad_s / change.turn_rate_rad_s
             self._e, self._covariance = 0.0, (self._covariance[0], 0.0, sigma**2)
 

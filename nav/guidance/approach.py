@@ -27,6 +27,7 @@ from dockair.messages import PodSignal, ReceiverCommand, TankerAnnouncement
 from dockair.nav.guidance.announced_path import AnnouncedPath
 from dockair.nav.guidance.closing import PredictedMiss, time_to_contact_s
 from dockair.nav.guidance.closure import Closure
+from dockair.nav.guidance.command_limits import CommandLimits
 from dockair.nav.guidance.controller import Controller, Sight, Wanted
 from dockair.nav.guidance.dead_reckoning import DeadReckoning
 from dockair.nav.guidance.guidance_settings import GuidanceSettings, RelativeState
@@ -54,9 +55,7 @@ class Guidance:
         self.phase, self.phase_reason = Phase.JOIN_UP, ""
         self._axes = StabilisedAxes(settings.levelling_s, self._dt)
         self._controller = _controller(settings, self._dt)
-        limits = np.array(settings.acceleration_limit_m_s2), self._dt * np.array(settings.jerk_limit_m_s3)
-        share = np.append(1.0, settings.patient_share)
-        self._limits, self._patient_limits = limits, (share * limits[0], share * limits[1])  # of u', of its change
+        self._limits = CommandLimits(settings, self._dt)
         self._miss = PredictedMiss(settings.closing, self._dt)
         self._u: Array = np.zeros(3)
         self._u_dot: Array = np.zeros(3)
@@ -100,13 +99,10 @@ class Guidance:
         self._reckoning.step(middle, self._controller.steady_drift_m_s, self._u, bearable=bearable)
         self._count(state, ring, rate, lateral_m)
         self._change_phase(self._situation(state, ring, rate, coupling, lateral_m))
-        u_dot = self._follow(ring, lateral_m) if self._follows(state, ring) else self._hold_course(ring)
-        limit, change = self._patient_limits if self._is_patient else self._limits
-        u_dot = np.minimum(np.maximum(u_dot, -limit), limit)
-        self._u_dot = u_dot = np.minimum(np.maximum(u_dot, self._u_dot - change), self._u_dot + change)
-        self._u = _limited(self._u + u_dot * self._dt, self._settings.velocity_limit_m_s)
-        self._controller.given(self._u, u_dot)
-        return self._command(u_dot)
+        asked = self._follow(ring, lateral_m) if self._follows(state, ring) else self._hold_course(ring)
+        self._u, self._u_dot = self._limits.step(self._u, self._u_dot, asked, patient=self._is_patient)
+        self._controller.given(self._u, self._u_dot)
+        return self._command(self._u_dot)
 
     def _follow_path(self, state: RelativeState, ring: Array, rate: Array) -> None:
         """Go on with the announced path, and learn from the drogue what it leaves."""
@@ -342,8 +338,3 @@ def _controller(settings: GuidanceSettings, step_s: float) -> Controller:
 
 def _length(v: Array) -> float:
     return math.sqrt(v @ v)
-
-
-def _limited(v: Array, limit: float) -> Array:
-    norm = _length(v)
-    return v if norm <= limit else v * (limit / norm)

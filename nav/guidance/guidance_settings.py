@@ -49,6 +49,8 @@ class PidSettings:
 
     proportional_1_s: float = 1.0  # k_p: a quarter of 1 / tau
     integral_1_s2: float = 0.15  # k_i: a steady drift goes within some 7 s, twice the drogue's period
+    integrated_m: float = 0.75  # error up to which an axis is integrated: a bias of 0.4 m/s leaves 0.4 m with k_p
+    error_max_m: float = 1.5  # of k_p e across: a drogue farther off is gone to at no more than the join-up speed
     derivative: float = 0.3  # k_d: more would fly the noise of the rate
     smoothing_1_s: float = 4.0  # how fast u goes to the u of Eq. (1)
 

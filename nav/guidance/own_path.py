@@ -4,11 +4,12 @@ The tip answers a command that comes with its rate a response time later, axis b
 gyros feel otherwise, it strays by. With dv the felt change of the tip's velocity from tick to tick,
 
     v(t) = u(t - tau),      f <- (f + dv - (v_k - v_k-1)) / (1 + dt/T_f)                                  (1)
-    e <- (e + f_k - f_k-1) / (1 + dt/T_f),      y_r' = v + e                                              (2)
+    e <- (e + g_k - g_k-1) / (1 + dt/T_f),      y_r' = v + e                                              (2)
 
-Twice forgotten, a steady part of gravity that is not taken off adds nothing to e; and e is no more than a limit, lest
-what is felt wrongly, as a turn that nobody announced, is flown against. Flight control brings back a velocity that a
-gust has changed, not the place: e dies away,
+where g is f cut off at a limit, lest what is felt wrongly, as a turn that nobody announced, is flown against; fed with
+g, e comes back with f as it went, and is no more than the limit itself. Twice forgotten, a steady part of gravity that
+is not taken off adds nothing to e. Flight control brings back a velocity that a gust has changed, not the place: e dies
+away,
 
     e(t) = e exp(-t/T_e),      y_r(t) - y_r - way commanded = T_e (1 - exp(-t/T_e)) e                     (3)
 
@@ -35,7 +36,7 @@ class OwnPath:
         step_s: control period.
         straying_s: (3,) T_e.
         forgotten_s: T_f.
-        limit_m_s: of e, each axis.
+        limit_m_s: of g and e, each axis.
     """
 
     def __init__(
@@ -50,7 +51,7 @@ class OwnPath:
         self._axes, self._newest = np.arange(3), 0
         self._places, self._velocities = np.zeros((self._length, 3)), np.zeros((self._length, 3))  # rings
         self._own: Array = np.zeros((5, 3))  # v_k-1, f, and what follows
-        self._felt_change: Array = self._own[2]  # of f inside the limit
+        self._felt_change: Array = self._own[2]  # of g
         self._straying: Array = self._own[3]  # e
         self._strayed: Array = self._own[4]  # its integral
 
@@ -66,7 +67,7 @@ class OwnPath:
 
     @property
     def felt_change_m_s(self) -> Array:
-        """(3,) of f inside the limit, in the last period; 0 where not felt."""
+        """(3,) of g in the last period; 0 where not felt."""
         return self._felt_change.copy()
 
     @property
@@ -104,14 +105,15 @@ class OwnPath:
 
 @njit(cache=True)
 def _feel(own, v, change, dies, kept, limit, step):  # type: ignore[no-untyped-def]
-    """Eqs. (1) and (2) over a step in place: own (5, 3) are the rows v_k-1, f, its change inside the limit, e, way."""
+    """Eqs. (1) and (2) over a step in place: own (5, 3) are the rows v_k-1, f, change of g, e, way."""
     felt = np.isfinite(change[0]) and np.isfinite(change[1]) and np.isfinite(change[2])
     for i in range(3):
         f, e = own[1, i], own[3, i]
         if felt:
             own[1, i] = kept * (f + change[i] - (v[i] - own[0, i]))
-            own[2, i] = min(max(own[1, i], -limit), limit) - min(max(f, -limit), limit)
-            own[3, i] = min(max(kept * (e + own[1, i] - f), -limit), limit)
+            before, now = min(max(f, -limit), limit), min(max(own[1, i], -limit), limit)
+            own[2, i] = now - before
+            own[3, i] = min(max(kept * (e + now - before), -limit), limit)
         else:
             own[1, i], own[2, i], own[3, i] = 0.0, 0.0, dies[i] * e
         own[0, i] = v[i]

@@ -170,7 +170,12 @@ TRANSITIONS: dict[Phase, tuple[Transition, ...]] = {
         Transition(
             Phase.APPROACH,
             "steady",
-            lambda limits, s: s.steady_s >= limits.stabilise_s and s.spread_m <= s.radius_m and not s.light_is_red,
+            lambda limits, s: (
+                s.steady_s > 0.0  # now, if for no longer
+                and s.steady_s >= limits.stabilise_s
+                and s.spread_m <= s.radius_m
+                and not s.light_is_red
+            ),
         ),
     ),
     Phase.APPROACH: (

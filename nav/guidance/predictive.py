@@ -7,9 +7,11 @@ Along, the commanded velocity u goes to
 
     v = y_D' - e,     u* = v + k (y_D - y_r - wanted),     du/dt = y_D'' + k (v - u) + s (u* - u)         (1)
 
-while closing at c, u* = v + c. Both u and du/dt go out, so that the flight control has nothing to guess. A bias of
-the receiver's inertial velocity is part of y_D'. What the tip does otherwise than commanded is part of y_r where it is
-felt; where not, of y_D: it is then predicted and flown against like the drogue's own motion, with the same filter.
+where k (y_D - y_r - wanted) is no more than the speed asked for, nor is u* forward. While closing at c no place is
+kept: u* = v + c, and du/dt is without k (v - u). Both u and du/dt go out, so that the flight control has nothing to
+guess. A bias of the receiver's inertial velocity is part of y_D'. What the tip does otherwise than commanded is part of
+y_r where it is felt; where not, of y_D: it is then predicted and flown against like the drogue's own motion, with the
+same filter.
 
 A swing that asks for more than a share of the acceleration that the receiver may fly (rms over some swings) is not
 followed but waited for astern: then y_D is the middle of the swing, and haste has a higher price. In gusts that move
@@ -18,7 +20,8 @@ unasked: the more the swing asks for, the farther astern it is waited for, and a
 run after faster than the receiver joins up.
 
 Not modelled: limits of the airframe beyond those of acceleration and jerk; what they cut off is missing from y_r until
-it is felt or seen. That e dies away while du/dt is flown.
+it is felt or seen. That e dies away while du/dt is flown. That the bow wave's push is wanted for another moment up than
+to the left where the response times differ.
 """
 
 from dataclasses import replace
@@ -70,8 +73,8 @@ class Predictive:
             ]
             for share in ((1.0, 1.0), patient_share)
         )
-        self._response_s = float(response_s[_ACROSS[0]])
-        nodes = self._response_s + plan.node_s * np.arange(plan.nodes + 1)
+        self._response_s: list[float] = np.asarray(response_s).tolist()
+        nodes = self._response_s[_ACROSS[0]] + plan.node_s * np.arange(plan.nodes + 1)
         self._times: Array = np.append(0.0, nodes)
         node_times = response_s + plan.node_s * np.arange(1, plan.nodes + 1)[:, np.newaxis]  # (nodes, 3)
         self._strays_s = self._own.strays_s(node_times)
@@ -89,7 +92,10 @@ class Predictive:
 
     @property
     def looks_ahead_s(self) -> Array:
-        """(n,) now, after the response time and at the nodes of the plan."""
+        """(n,) now, after the response time to the left and at the nodes of the plan.
+
+        The push of the bow wave up is taken for the same: unmanned, where up answers sooner, that of 0.15 s later.
+        """
         return self._times
 
     def observe(self, sight: Sight | None, change_m_s: Array) -> None:
@@ -191,12 +197,12 @@ class Predictive:
         s = self._settings
         path = self._motion.path(self._push) if bearable else self._motion.mean_path(s.plan.nodes)
         path = path - self._own.places_m(self._strays_s)
-        to_contact_s = None if wanted.to_contact_s is None else wanted.to_contact_s - self._response_s
         out, u_dot = [], self._u_dot.tolist()
         plans = self._patient_plans if wanted.patient else self._plans
         for row, (axis, plan) in enumerate(zip(_ACROSS, plans, strict=True)):
             places = path[:, axis] + wanted.aim_m[row]
             places -= places[0] - clipped(places[0], s.plan.error_max_m)
             x = np.array([0.0, u[axis], u_dot[axis]])
+            to_contact_s = None if wanted.to_contact_s is None else wanted.to_contact_s - self._response_s[axis]
             out.append(u_dot[axis] + plan.jerk_m_s3(x, places, to_contact_s, calm=not bearable) * self._step_s)
         return out

@@ -114,6 +114,23 @@ def test_a_turn_that_is_less_than_announced_is_learnt_and_the_path_leans_on_it()
     assert path.flown_rad_s == pytest.approx(0.98 * TURN, rel=2e-3)
 
 
+def test_a_descent_that_is_announced_in_a_turn_leaves_what_was_learnt_of_the_turn():
+    """The turn goes on at the same rate, and with the same error; another rate has another one."""
+    learnt = {}
+    for turn in (TURN, 1.01 * TURN):
+        path = AnnouncedPath()
+        path.announce(_said())
+        path.announce(_said(starts_s=40.0, entry_s=5.0, turn=turn, climb=-0.03))
+        _behind(path, 0.02, 0.2, -0.2, 39.9)
+        before = path._e
+        for _ in range(20):
+            path.step(0.01)
+        learnt[turn] = path._e, before
+    assert before == pytest.approx(0.02, rel=0.1)
+    assert learnt[TURN][0] == learnt[TURN][1]
+    assert learnt[1.01 * TURN][0] == 0.0
+
+
 def test_without_sight_of_the_drogue_the_path_goes_on_as_learnt():
     path = AnnouncedPath()
     path.announce(_said())

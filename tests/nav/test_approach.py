@@ -455,11 +455,19 @@ def test_a_retreat_from_a_drogue_that_comes_along_gains_no_speed():
 
 @pytest.mark.parametrize("settings", [SETTINGS, PID])
 def test_commands_respect_their_limits(settings):
-    guidance = Guidance(settings, RATE_HZ)
-    for _ in range(10 * RATE_HZ):
-        command = guidance.step(state([30.0, 20.0, 9.0]))
-        assert np.linalg.norm(command.velocity_m_s) <= settings.velocity_limit_m_s * (1 + 1e-12)
+    """A drogue that flies away: velocity and acceleration belong together where the velocity's limit is met, too."""
+    rate_hz = 100
+    guidance, before, fastest = Guidance(settings, rate_hz), ReceiverCommand(), 0.0
+    for _ in range(10 * rate_hz):
+        command = guidance.step(state([30.0, 20.0, 9.0], [2.0, 5.0, 2.0]))
+        fastest = max(fastest, float(np.linalg.norm(command.velocity_m_s)))
         assert (np.abs(command.acceleration_m_s2) <= np.array(settings.acceleration_limit_m_s2) * (1 + 1e-12)).all()
+        change = (command.velocity_m_s - before.velocity_m_s) * rate_hz
+        np.testing.assert_allclose(change, command.acceleration_m_s2, atol=1e-9)
+        jerk = np.abs(command.acceleration_m_s2 - before.acceleration_m_s2) * rate_hz
+        assert (jerk <= np.array(settings.jerk_limit_m_s3) * (1 + 1e-9)).all()
+        before = command
+    assert 0.99 * settings.velocity_limit_m_s < fastest <= 1.001 * settings.velocity_limit_m_s
 
 
 def test_a_drogue_that_is_pushed_along_by_the_probe_is_not_chased():
@@ -618,3 +626,11 @@ def test_a_drogue_that_is_not_seen_is_not_waited_for_beside_it():
     assert phases == [Phase.PRE_CONTACT, Phase.APPROACH, Phase.BREAKAWAY, Phase.PRE_CONTACT, Phase.CLEAR]
     assert guidance.phase_reason == "drogue lost"
     assert now.p_PD_B[0] > 10.0
+
+
+@pytest.mark.parametrize("closure_m_s", [0.5, 0.8, 1.2, 1.5])
+def test_the_drogue_is_met_at_the_speed_that_a_scenario_may_ask_for(closure_m_s):
+    plant = Plant()
+    phases, _ = fly(plant, settings=dataclasses.replace(SETTINGS, closure_speed_m_s=closure_m_s))
+    assert phases == DOCKING
+    assert plant.crossings[0][1] == pytest.approx(closure_m_s, abs=0.05)

@@ -1,6 +1,7 @@
 """The receiver's place by its own commands."""
 
 import numpy as np
+import pytest
 
 from dockair.nav.guidance.own_path import OwnPath
 
@@ -81,8 +82,22 @@ def test_where_nothing_is_felt_any_more_straying_dies_away():
 
 
 def test_a_turn_that_nobody_announced_is_not_flown_against_for_more_than_the_limit():
-    path = OwnPath(RESPONSE_S, 0.01, STRAYING_S, 4.0, 0.5)
+    path, most = OwnPath(RESPONSE_S, 0.01, STRAYING_S, 4.0, 0.5), 0.0
     for _ in range(1000):
         path.feel(np.full(3, 0.05))  # 5 m/s^2
         path.step(np.zeros(3))
-    np.testing.assert_allclose(path.velocity_m_s, 0.5)
+        most = max(most, float(path.velocity_m_s.max()))
+    assert 0.4 < most <= 0.5
+    assert (path.velocity_m_s <= 0.5).all() and (path.velocity_m_s > 0.0).all()
+
+
+@pytest.mark.parametrize("most_m_s", [0.4, 1.0, 3.0])
+def test_who_was_blown_aside_and_is_at_rest_again_strays_no_more_though_the_limit_was_met(most_m_s):
+    path, strays = OwnPath(RESPONSE_S, 0.01, STRAYING_S, 1e6, 0.5), []
+    for change_m_s in np.repeat([most_m_s / 50.0, -most_m_s / 50.0], 50):  # up and down again, 0.5 s each
+        path.feel(np.full(3, change_m_s))
+        path.step(np.zeros(3))
+        strays.append(path.velocity_m_s)
+    assert np.max(strays) == pytest.approx(min(most_m_s, 0.5), abs=1e-5)
+    assert np.min(strays) > -1e-5
+    np.testing.assert_allclose(strays[-1], 0.0, atol=1e-5)

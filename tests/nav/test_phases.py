@@ -118,6 +118,13 @@ def test_no_approach_is_begun_once_the_time_slot_is_over():
         assert next_phase(phase, PhaseLimits(slot_s=45.1), late).to is not Phase.CLEAR
 
 
+def test_who_need_not_have_been_steady_for_long_has_to_be_steady_now():
+    at_once = PhaseLimits(stabilise_s=0.0)
+    assert next_phase(Phase.PRE_CONTACT, at_once, CALM) is None
+    steady = dataclasses.replace(CALM, steady_s=0.01)
+    assert next_phase(Phase.PRE_CONTACT, at_once, steady).to is Phase.APPROACH
+
+
 def test_an_approach_that_stands_still_is_given_up_once_the_time_slot_is_over():
     late = dataclasses.replace(CALM, time_s=45.0, waiting_s=0.1)
     assert next_phase(Phase.APPROACH, PhaseLimits(slot_s=45.0), late).to is Phase.BACK_OFF
