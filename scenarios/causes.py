@@ -22,8 +22,8 @@ not flown. The largest share names the cause. Rules, the first that holds:
 |                  | angle                                                                                            |
 | not_held         | the same, and was not held                                                                       |
 | called_off       | the navigation went back although the ring was inside the capture radius for all of that second  |
-| ambiguity        | share of navigation the largest, and the believed attitude was the mirrored one or rolled by     |
-|                  | more than half an LED's spacing for half of the last second                                      |
+| ambiguity        | share of navigation the largest, and the believed attitude was the mirrored one, about the line  |
+|                  | from the camera, or rolled by more than half an LED's spacing for half of the last second        |
 | navigation_error | share of navigation the largest, otherwise                                                       |
 | gust             | share of what could not be foreseen the largest                                                  |
 | bow_wave         | the rest the largest, the miss points away from the nose, and the air at the drogue blew that    |
@@ -87,6 +87,7 @@ class Flown:
     truths: Sequence[Truth]  #: one a control tick
     solutions: Sequence[NavSolution]  #: likewise
     p_PN_B: Array  #: (3,) tip of the nose from the probe's tip, body axes [m]
+    p_CP_B: Array  #: (3,) the probe's tip from the camera, body axes [m]
     faults: Collection[Fault] = ()
     departed_s: float = field(init=False)  #: when the receiver departed from controlled flight; infinite if it did not
 
@@ -116,14 +117,16 @@ def flown_of(
 
     Args:
         scenario: that was flown.
-        mounting: of the probe.
+        mounting: of probe and camera.
         truths: one a control tick.
         solutions: likewise.
     """
     sheet = load_parameters("bow_wave", BowWaveParameters, scenario.parameters.get("bow_wave"))
     nose = np.array([-sheet.nose_behind_tip_m, -mounting.p_BP[1], sheet.nose_height_m - mounting.p_BP[2]])
     faults = [table.fault for table in scenario.faults]
-    return Flown(truths=truths, solutions=solutions, p_PN_B=nose, faults=faults)
+    return Flown(
+        truths=truths, solutions=solutions, p_PN_B=nose, p_CP_B=mounting.p_BP - mounting.p_BC, faults=faults
+    )  # fmt: skip
 
 
 def with_cause(attempt: Attempt, flown: Flown, rules: CauseRules | None = None) -> Attempt:
@@ -228,13 +231,13 @@ def unforeseen_motion(k: int, flown: Flown, rules: CauseRules) -> Array:
 def _mistaken(k: int, flown: Flown, rules: CauseRules) -> bool:
     """Whether the believed attitude was the ring's other one, or its numbering another, for half of the last second."""
     span = range(max(k + 1 - _ticks(rules.look_back_s, flown), 0), k + 1)
-    wrong = [_other_attitude(flown.truths[i], flown.solutions[i], rules) for i in span]
+    wrong = [_other_attitude(flown.truths[i], flown.solutions[i], flown.p_CP_B, rules) for i in span]
     return bool(np.mean(wrong) >= rules.for_half)
 
 
-def _other_attitude(truth: Truth, solution: NavSolution, rules: CauseRules) -> bool:
-    R_true, R = truth.R_WB.T @ truth.R_WD, solution.R_BD
-    sight = truth.p_PD_B / np.linalg.norm(truth.p_PD_B)
+def _other_attitude(truth: Truth, solution: NavSolution, p_CP_B: Array, rules: CauseRules) -> bool:
+    R_true, R, p_CD_B = truth.R_WB.T @ truth.R_WD, solution.R_BD, p_CP_B + truth.p_PD_B
+    sight = p_CD_B / np.linalg.norm(p_CD_B)
     axis, believed = R_true[:, 0], R[:, 0]
     mirrored = 2.0 * (axis @ sight) * sight - axis
     if _angle(axis, mirrored) > rules.told_apart_rad and _angle(believed, mirrored) < _angle(believed, axis):

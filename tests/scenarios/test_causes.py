@@ -1,5 +1,6 @@
 """Why an attempt failed, on histories of which each is wrong in one thing alone."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from dockair.sim.faults import CameraDropOut, DeadReel, LedOff
 TIMES = np.round(np.arange(0.0, 5.0, 0.01), 2)
 END_S = 4.0  # when the attempt is decided
 NOSE = np.array([-1.2, 0.9, -0.65])  # to the left of the probe and below
+TIP = np.array([2.7, -0.45, -0.15])  # from the camera
 
 
 def attempt(**changes):
@@ -49,7 +51,7 @@ def flight(make_truth):
             believed = truth.p_PD_B + np.array([0.0, *error(t)])
             truths.append(truth)
             solutions.append(solution(t, believed, exp(np.array(turn)) @ R_BD, valid(t), usable(t)))
-        return Flown(truths=truths, solutions=solutions, p_PN_B=NOSE, faults=faults)
+        return Flown(truths=truths, solutions=solutions, p_PN_B=NOSE, p_CP_B=TIP, faults=faults)
 
     return make
 
@@ -128,18 +130,24 @@ def test_a_roll_of_less_than_half_an_led_is_no_ambiguity(flight):
     assert cause(flight(**MISLED, turn=(np.radians(22.0), 0.0, 0.0))) == "navigation_error"
 
 
-def test_an_error_with_the_mirrored_attitude_is_an_ambiguity(flight):
-    """A drogue 6 degrees nose up, seen at the end along the line of the miss, and believed on the other side of it."""
-    tilt = np.radians(6.0)
-    sight = np.array([0.0, 0.0, 1.0])  # from a tip that is below the drogue, at the crossing
-    axis = exp(np.array([0.0, tilt, 0.0]))[:, 0]
-    mirrored = 2.0 * (axis @ sight) * sight - axis
-    assert mirrored @ axis < 0.0  # so seen, the two differ by more than a right angle: the last second decides
-    far = dict(
-        tip=lambda t: (0.0, -0.3 if t > END_S - 0.3 else 0.0), error=lambda t: (0.0, -0.3), attitude=(0, tilt, 0)
-    )
-    assert cause(flight(**far, turn=(0.0, -2.0 * tilt, 0.0))) == "ambiguity"
-    assert cause(flight(**far, turn=(0.0, -0.4 * tilt, 0.0))) == "navigation_error"
+@pytest.mark.parametrize("tilt_deg", [(6.0, 0.0), (-6.0, 0.0), (0.0, 6.0), (0.0, -6.0), (4.0, -8.0)])
+def test_an_error_with_the_mirrored_attitude_is_an_ambiguity(flight, tilt_deg):
+    """The ring's two images that look alike lie on both sides of the line from the camera, not of that from the tip."""
+    misled = flight(**MISLED, attitude=(0.0, *np.radians(tilt_deg)))
+    for share, expected in ((1.0, "ambiguity"), (0.3, "navigation_error")):
+        believed = [
+            replace(solution, R_BD=towards_mirror_image(truth, share))
+            for truth, solution in zip(misled.truths, misled.solutions, strict=True)
+        ]
+        assert cause(replace(misled, solutions=believed)) == expected
+
+
+def towards_mirror_image(truth, share):
+    """R_BD of the drogue turned, without a roll, by a share of the way to its mirror image about the camera's sight."""
+    R_BD, p_CD_B = truth.R_WB.T @ truth.R_WD, TIP + truth.p_PD_B
+    across = np.cross(R_BD[:, 0], p_CD_B) / np.linalg.norm(p_CD_B)
+    sine = np.linalg.norm(across)
+    return exp(share * 2.0 * np.arcsin(sine) * across / sine) @ R_BD
 
 
 @pytest.mark.parametrize(("lost_s", "expected"), [(0.49, "control_limit"), (0.51, "detection")])
@@ -263,3 +271,9 @@ def test_the_nose_stands_in_the_plane_of_symmetry_ahead_of_the_centre_of_gravity
     """Probe's tip at (6.8, 0.4, 1.0) from the centre of gravity; the nose 1.2 m behind it, 0.05 m below that centre."""
     flown = flown_of(load_scenario("default"), hand_made.sheets.mounting, [], [])
     np.testing.assert_allclose(hand_made.sheets.mounting.p_BP + flown.p_PN_B, [5.6, 0.0, -0.05], atol=1e-12)
+
+
+def test_the_tip_is_where_the_mounting_has_it_from_the_camera(hand_made):
+    mounting = hand_made.sheets.mounting
+    flown = flown_of(load_scenario("default"), mounting, [], [])
+    np.testing.assert_allclose(mounting.p_BC + flown.p_CP_B, mounting.p_BP, atol=1e-12)
