@@ -29,7 +29,8 @@ not flown. The largest share names the cause. Rules, the first that holds:
 | bow_wave         | the rest the largest, the miss points away from the nose, and the air at the drogue blew that    |
 |                  | way by more than twice what it varied by before                                                  |
 | control_limit    | the rest the largest, otherwise: the receiver could not follow, or was not told to               |
-| fault            | instead of one of these, when a fault acted that can bring it about                              |
+| fault            | instead of one of these, when a fault that can bring it about acted before the attempt was       |
+|                  | decided, or ended if it was called off                                                           |
 
 A flight without any attempt has the cause detection if the solution was valid for less than half of its last half, else
 never_steady. A flight in which an attempt failed or none began, and whose receiver departed at any time, has the cause
@@ -57,6 +58,7 @@ from dockair.sim.truth import Truth
 #: Causes that faults of LEDs, camera and IMU can bring about, and those of the reel.
 _OF_SENSORS = ("detection", "integrity", "ambiguity", "navigation_error", "called_off", "never_steady")
 _OF_REEL = ("gust", "bow_wave", "control_limit", "outside_limits", "not_held", "collision", "never_steady")
+_CALLED_OFF = (AttemptOutcome.GIVEN_UP.value, AttemptOutcome.BREAKAWAY.value)
 _RED_LIGHT = "red light"  # the navigation's reason, of the table of phases
 
 CAUSES = (
@@ -137,7 +139,9 @@ def with_cause(attempt: Attempt, flown: Flown, rules: CauseRules | None = None) 
     if attempt.reason == _RED_LIGHT:
         return replace(attempt, cause="fault")
     cause = _cause(attempt, flown, rules)
-    until_s = flown.truths[-1].time_s if cause == "collision" else attempt.decided_s  # what ends a hold comes later
+    until_s = attempt.ended_s if attempt.outcome in _CALLED_OFF else attempt.decided_s
+    if cause == "collision":
+        until_s = flown.truths[-1].time_s  # what ends a hold comes later
     return replace(attempt, cause=_or_fault(cause, attempt.begun_s, until_s, flown))
 
 
@@ -180,7 +184,7 @@ def _cause(attempt: Attempt, flown: Flown, rules: CauseRules) -> str:
         return "out_of_time"
     if attempt.outcome == AttemptOutcome.COLLISION.value and _was_held(attempt, flown):
         return "collision"
-    called_off = attempt.outcome in (AttemptOutcome.GIVEN_UP.value, AttemptOutcome.BREAKAWAY.value)
+    called_off = attempt.outcome in _CALLED_OFF
     k = flown.tick_at(attempt.ended_s if called_off else attempt.decided_s)
     last = range(max(k + 1 - _ticks(rules.look_back_s, flown), 0), k + 1)
     if np.mean([flown.solutions[i].valid for i in last]) <= rules.for_half:

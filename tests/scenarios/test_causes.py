@@ -224,6 +224,15 @@ def test_a_fault_is_named_where_it_can_have_brought_the_cause_about_and_acted_du
     assert cause(flight(faults=[DeadReel()]), outcome="given_up", reason="red light") == "fault"
 
 
+@pytest.mark.parametrize("outcome", ["given_up", "breakaway"])
+def test_a_fault_after_the_closest_approach_is_named_for_an_attempt_that_it_ended(flight, outcome):
+    blind = flight(**BEHIND, valid=lambda t: t < 3.2, faults=[CameraDropOut(start_s=3.2)])
+    assert cause(blind, outcome=outcome, decided_s=3.0, ended_s=END_S) == "fault"
+    assert cause(blind, outcome="miss", decided_s=3.0, ended_s=END_S) == "control_limit"  # that was over before
+    later = flight(**BEHIND, valid=lambda t: t < 3.2, faults=[CameraDropOut(start_s=4.1)])
+    assert cause(later, outcome=outcome, decided_s=3.0, ended_s=END_S) == "detection"
+
+
 def test_a_flight_has_the_cause_of_its_last_failed_attempt(flight):
     flown = flight()
     failed = [attempt(outcome="miss", cause="gust"), attempt(number=2, cause="bow_wave")]
