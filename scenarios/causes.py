@@ -32,9 +32,9 @@ not flown. The largest share names the cause. Rules, the first that holds:
 | fault            | instead of one of these, when a fault that can bring it about acted before the attempt was       |
 |                  | decided, or ended if it was called off                                                           |
 
-A flight without any attempt has the cause detection if the solution was valid for less than half of its last half, else
-never_steady. A flight in which an attempt failed or none began, and whose receiver departed at any time, has the cause
-departed.
+A flight without any attempt has the cause diverged if the simulation broke down, detection if the solution was valid
+for less than half of its last half, else never_steady. A flight in which an attempt failed or none began, and whose
+receiver departed at any time, has the cause departed.
 
 Not modelled: causes that act together; the one named is the largest, not the only one.
 """
@@ -50,6 +50,7 @@ from dockair.parameters import load_parameters
 from dockair.rotations import Array
 from dockair.scenarios.attempts import Attempt, AttemptOutcome, RefereeLimits, is_good_contact
 from dockair.scenarios.departure import Departure
+from dockair.scenarios.referee import Outcome
 from dockair.scenarios.schema import Scenario
 from dockair.sim.air.bow_wave import BowWaveParameters
 from dockair.sim.faults import DeadReel, Fault
@@ -145,18 +146,19 @@ def with_cause(attempt: Attempt, flown: Flown, rules: CauseRules | None = None) 
     return replace(attempt, cause=_or_fault(cause, attempt.begun_s, until_s, flown))
 
 
-def cause_of_flight(attempts: Sequence[Attempt], flown: Flown, rules: CauseRules | None = None) -> str:
+def cause_of_flight(attempts: Sequence[Attempt], flown: Flown, outcome: str, rules: CauseRules | None = None) -> str:
     """Return the cause of the last attempt that failed; "" if none did, and what kept the receiver back if none began.
 
     Args:
         attempts: with their causes.
         flown: the flight.
+        outcome: of the flight, by the referee.
         rules: their numbers.
     """
     last = next((attempt.cause for attempt in reversed(attempts) if attempt.cause), "")
     if attempts and last in ("", "diverged"):
         return last
-    if not flown.truths:
+    if not attempts and outcome == Outcome.DIVERGED.value:
         return "diverged"
     if np.isfinite(flown.departed_s):
         return "departed"

@@ -237,15 +237,22 @@ def test_a_flight_has_the_cause_of_its_last_failed_attempt(flight):
     flown = flight()
     failed = [attempt(outcome="miss", cause="gust"), attempt(number=2, cause="bow_wave")]
     held = attempt(number=3, outcome="contact", radial_offset_m=0.05)
-    assert cause_of_flight([*failed, held], flown) == "bow_wave"
-    assert cause_of_flight([held], flown) == ""
+    assert cause_of_flight([*failed, held], flown, "abort") == "bow_wave"
+    assert cause_of_flight([held], flown, "abort") == ""
 
 
 def test_a_flight_without_an_attempt_was_never_steady_or_saw_nothing(flight):
-    assert cause_of_flight([], flight()) == "never_steady"
-    assert cause_of_flight([], flight(valid=lambda t: t < 3.0)) == "detection"
-    assert cause_of_flight([], flight(valid=lambda t: t > 3.0)) == "never_steady"  # it came to see in time
-    assert cause_of_flight([], flight(faults=[LedOff()])) == "fault"
+    assert cause_of_flight([], flight(), "abort") == "never_steady"
+    assert cause_of_flight([], flight(valid=lambda t: t < 3.0), "abort") == "detection"
+    assert cause_of_flight([], flight(valid=lambda t: t > 3.0), "abort") == "never_steady"  # it came to see in time
+    assert cause_of_flight([], flight(faults=[LedOff()]), "abort") == "fault"
+
+
+def test_a_flight_without_an_attempt_whose_simulation_broke_down_has_diverged_whatever_else_went_wrong(flight):
+    assert cause_of_flight([], flight(), "diverged") == "diverged"
+    blind = flight(tip=lambda t: (0.0, -25.0 * (t > 1.0)), valid=lambda t: False, faults=[LedOff()])
+    assert cause_of_flight([], blind, "diverged") == "diverged"
+    assert cause_of_flight([attempt(cause="gust")], flight(), "diverged") == "gust"  # it broke down after that attempt
 
 
 def test_a_receiver_that_falls_away_has_departed_whatever_else_went_wrong(flight):
@@ -253,9 +260,9 @@ def test_a_receiver_that_falls_away_has_departed_whatever_else_went_wrong(flight
     fallen = flight(tip=lambda t: (0.0, -25.0 * (t > 1.0)), error=lambda t: (0.0, -25.0))
     assert cause(fallen) == "departed"
     assert cause(fallen, outcome="timeout") == "departed"
-    assert cause_of_flight([], fallen) == "departed"
-    assert cause_of_flight([attempt(cause="gust")], fallen) == "departed"  # it departed after that attempt
-    assert cause_of_flight([attempt(outcome="contact", cause="")], fallen) == ""
+    assert cause_of_flight([], fallen, "abort") == "departed"
+    assert cause_of_flight([attempt(cause="gust")], fallen, "abort") == "departed"  # it departed after that attempt
+    assert cause_of_flight([attempt(outcome="contact", cause="")], fallen, "abort") == ""
 
 
 def test_an_attempt_that_ended_before_the_departure_has_its_own_cause(flight):
