@@ -4,6 +4,7 @@ import numpy as np
 
 from dockair.calibration import Camera, Mounting
 from dockair.errors import DockairError
+from dockair.nav.navigator import NavigatorSettings
 from dockair.parameters import load_parameters
 from dockair.scenarios.measured_leds import MeasuredLeds, MeasurementParameters
 from dockair.scenarios.mounting_parameters import MountingParameters
@@ -39,6 +40,7 @@ def measured_leds(scenario: Scenario, seed: int, as_built: AsBuilt, faults: Faul
         transfer=noise.transfer,
         defects=Defects(as_built.camera, sheets.glare, sheets.exposure, faults, noise.dirt, noise.hot_pixels),
         faults=faults,
+        followed_s=NavigatorSettings().usable_age_s,
         extinction_1_m=extinction_1_m(scenario.weather.visibility_m),
         automatic_exposure=scenario.camera.exposure == "auto",
     )

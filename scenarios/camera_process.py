@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 
 from dockair.errors import MachineError
 from dockair.messages import CameraFrame, Window
+from dockair.scenarios.exposures import newest_arrived
 from dockair.sim.camera.camera import NearInfraredCamera
 from dockair.sim.camera.scene_state import SceneState, size_of
 
@@ -107,9 +108,7 @@ class OverlappedExposures:
         """See `exposures.Exposures`."""
         while any(begun.least_s <= time_s for begun in self._begun):
             self._collect()
-        if self._in_transfer and self._in_transfer[0][0] <= time_s:
-            return self._in_transfer.popleft()[1]
-        return None
+        return newest_arrived(self._in_transfer, time_s)
 
     def close(self) -> None:
         """See `exposures.Exposures`."""

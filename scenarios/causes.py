@@ -22,18 +22,19 @@ not flown. The largest share names the cause. Rules, the first that holds:
 |                  | angle                                                                                            |
 | not_held         | the same, and was not held                                                                       |
 | called_off       | the navigation went back although the ring was inside the capture radius for all of that second  |
-| ambiguity        | share of navigation the largest, and the believed attitude was the mirrored one or rolled by     |
-|                  | more than half an LED's spacing for half of the last second                                      |
+| ambiguity        | share of navigation the largest, and the believed attitude was the mirrored one, about the line  |
+|                  | from the camera, or rolled by more than half an LED's spacing for half of the last second        |
 | navigation_error | share of navigation the largest, otherwise                                                       |
 | gust             | share of what could not be foreseen the largest                                                  |
 | bow_wave         | the rest the largest, the miss points away from the nose, and the air at the drogue blew that    |
 |                  | way by more than twice what it varied by before                                                  |
 | control_limit    | the rest the largest, otherwise: the receiver could not follow, or was not told to               |
-| fault            | instead of one of these, when a fault acted that can bring it about                              |
+| fault            | instead of one of these, when a fault that can bring it about acted before the attempt was       |
+|                  | decided, or ended if it was called off                                                           |
 
-A flight without any attempt has the cause detection if the solution was valid for less than half of its last half, else
-never_steady. A flight in which an attempt failed or none began, and whose receiver departed at any time, has the cause
-departed.
+A flight without any attempt has the cause diverged if the simulation broke down, detection if the solution was valid
+for less than half of its last half, else never_steady. A flight in which an attempt failed or none began, and whose
+receiver departed at any time, has the cause departed.
 
 Not modelled: causes that act together; the one named is the largest, not the only one.
 """
@@ -49,6 +50,7 @@ from dockair.parameters import load_parameters
 from dockair.rotations import Array
 from dockair.scenarios.attempts import Attempt, AttemptOutcome, RefereeLimits, is_good_contact
 from dockair.scenarios.departure import Departure
+from dockair.scenarios.referee import Outcome
 from dockair.scenarios.schema import Scenario
 from dockair.sim.air.bow_wave import BowWaveParameters
 from dockair.sim.faults import DeadReel, Fault
@@ -57,6 +59,7 @@ from dockair.sim.truth import Truth
 #: Causes that faults of LEDs, camera and IMU can bring about, and those of the reel.
 _OF_SENSORS = ("detection", "integrity", "ambiguity", "navigation_error", "called_off", "never_steady")
 _OF_REEL = ("gust", "bow_wave", "control_limit", "outside_limits", "not_held", "collision", "never_steady")
+_CALLED_OFF = (AttemptOutcome.GIVEN_UP.value, AttemptOutcome.BREAKAWAY.value)
 _RED_LIGHT = "red light"  # the navigation's reason, of the table of phases
 
 CAUSES = (
@@ -87,6 +90,7 @@ class Flown:
     truths: Sequence[Truth]  #: one a control tick
     solutions: Sequence[NavSolution]  #: likewise
     p_PN_B: Array  #: (3,) tip of the nose from the probe's tip, body axes [m]
+    p_CP_B: Array  #: (3,) the probe's tip from the camera, body axes [m]
     faults: Collection[Fault] = ()
     departed_s: float = field(init=False)  #: when the receiver departed from controlled flight; infinite if it did not
 
@@ -116,14 +120,16 @@ def flown_of(
 
     Args:
         scenario: that was flown.
-        mounting: of the probe.
+        mounting: of probe and camera.
         truths: one a control tick.
         solutions: likewise.
     """
     sheet = load_parameters("bow_wave", BowWaveParameters, scenario.parameters.get("bow_wave"))
     nose = np.array([-sheet.nose_behind_tip_m, -mounting.p_BP[1], sheet.nose_height_m - mounting.p_BP[2]])
     faults = [table.fault for table in scenario.faults]
-    return Flown(truths=truths, solutions=solutions, p_PN_B=nose, faults=faults)
+    return Flown(
+        truths=truths, solutions=solutions, p_PN_B=nose, p_CP_B=mounting.p_BP - mounting.p_BC, faults=faults
+    )  # fmt: skip
 
 
 def with_cause(attempt: Attempt, flown: Flown, rules: CauseRules | None = None) -> Attempt:
@@ -134,22 +140,25 @@ def with_cause(attempt: Attempt, flown: Flown, rules: CauseRules | None = None) 
     if attempt.reason == _RED_LIGHT:
         return replace(attempt, cause="fault")
     cause = _cause(attempt, flown, rules)
-    until_s = flown.truths[-1].time_s if cause == "collision" else attempt.decided_s  # what ends a hold comes later
+    until_s = attempt.ended_s if attempt.outcome in _CALLED_OFF else attempt.decided_s
+    if cause == "collision":
+        until_s = flown.truths[-1].time_s  # what ends a hold comes later
     return replace(attempt, cause=_or_fault(cause, attempt.begun_s, until_s, flown))
 
 
-def cause_of_flight(attempts: Sequence[Attempt], flown: Flown, rules: CauseRules | None = None) -> str:
+def cause_of_flight(attempts: Sequence[Attempt], flown: Flown, outcome: str, rules: CauseRules | None = None) -> str:
     """Return the cause of the last attempt that failed; "" if none did, and what kept the receiver back if none began.
 
     Args:
         attempts: with their causes.
         flown: the flight.
+        outcome: of the flight, by the referee.
         rules: their numbers.
     """
     last = next((attempt.cause for attempt in reversed(attempts) if attempt.cause), "")
     if attempts and last in ("", "diverged"):
         return last
-    if not flown.truths:
+    if not attempts and outcome == Outcome.DIVERGED.value:
         return "diverged"
     if np.isfinite(flown.departed_s):
         return "departed"
@@ -177,7 +186,7 @@ def _cause(attempt: Attempt, flown: Flown, rules: CauseRules) -> str:
         return "out_of_time"
     if attempt.outcome == AttemptOutcome.COLLISION.value and _was_held(attempt, flown):
         return "collision"
-    called_off = attempt.outcome in (AttemptOutcome.GIVEN_UP.value, AttemptOutcome.BREAKAWAY.value)
+    called_off = attempt.outcome in _CALLED_OFF
     k = flown.tick_at(attempt.ended_s if called_off else attempt.decided_s)
     last = range(max(k + 1 - _ticks(rules.look_back_s, flown), 0), k + 1)
     if np.mean([flown.solutions[i].valid for i in last]) <= rules.for_half:
@@ -228,13 +237,13 @@ def unforeseen_motion(k: int, flown: Flown, rules: CauseRules) -> Array:
 def _mistaken(k: int, flown: Flown, rules: CauseRules) -> bool:
     """Whether the believed attitude was the ring's other one, or its numbering another, for half of the last second."""
     span = range(max(k + 1 - _ticks(rules.look_back_s, flown), 0), k + 1)
-    wrong = [_other_attitude(flown.truths[i], flown.solutions[i], rules) for i in span]
+    wrong = [_other_attitude(flown.truths[i], flown.solutions[i], flown.p_CP_B, rules) for i in span]
     return bool(np.mean(wrong) >= rules.for_half)
 
 
-def _other_attitude(truth: Truth, solution: NavSolution, rules: CauseRules) -> bool:
-    R_true, R = truth.R_WB.T @ truth.R_WD, solution.R_BD
-    sight = truth.p_PD_B / np.linalg.norm(truth.p_PD_B)
+def _other_attitude(truth: Truth, solution: NavSolution, p_CP_B: Array, rules: CauseRules) -> bool:
+    R_true, R, p_CD_B = truth.R_WB.T @ truth.R_WD, solution.R_BD, p_CP_B + truth.p_PD_B
+    sight = p_CD_B / np.linalg.norm(p_CD_B)
     axis, believed = R_true[:, 0], R[:, 0]
     mirrored = 2.0 * (axis @ sight) * sight - axis
     if _angle(axis, mirrored) > rules.told_apart_rad and _angle(believed, mirrored) < _angle(believed, axis):

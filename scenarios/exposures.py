@@ -1,14 +1,15 @@
 """Frames on their way from the exposure to the navigation.
 
 A frame arrives when it has been exposed, read out and transferred, and never before the one exposed before it: jitter
-of a transfer delays the frames behind it, too. A control tick takes one frame.
+of a transfer delays the frames behind it, too. A control tick takes one frame, the newest: of two that have arrived the
+older is dropped, for where camera and control have one rate it would keep every later frame waiting for a tick.
 
 The frame exposed at t is not wanted before t plus its least latency, so a camera may work on it meanwhile in a process
 of its own (`camera_process`). Which of the two takes the frames changes no bit of them.
 """
 
 from collections import deque
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 import mujoco
 import numpy as np
@@ -17,6 +18,7 @@ from dockair.messages import CameraFrame, LedObservation, Window
 from dockair.scenarios.measured_leds import Senses
 
 Frame = CameraFrame | LedObservation
+_F = TypeVar("_F")
 
 
 class Exposures(Protocol):
@@ -37,7 +39,7 @@ class Exposures(Protocol):
         ...
 
     def delivered(self, time_s: float) -> Frame | None:
-        """Return the oldest frame if it has arrived; it is then taken."""
+        """Return the newest frame that has arrived; it is then taken, and older ones are dropped."""
         ...
 
     def close(self) -> None:
@@ -67,9 +69,20 @@ class ExposuresInTurn:
 
     def delivered(self, time_s: float) -> Frame | None:
         """See `Exposures`."""
-        if self._in_transfer and self._in_transfer[0][0] <= time_s:
-            return self._in_transfer.popleft()[1]
-        return None
+        return newest_arrived(self._in_transfer, time_s)
 
     def close(self) -> None:
         """Nothing runs."""
+
+
+def newest_arrived(in_transfer: deque[tuple[float, _F]], time_s: float) -> _F | None:
+    """Return the newest frame that has arrived, None without one; it and all older ones are taken out.
+
+    Args:
+        in_transfer: times at which frames have been transferred [s], with the frames in the order of their exposures.
+        time_s: now.
+    """
+    newest = None
+    while in_transfer and in_transfer[0][0] <= time_s:
+        _, newest = in_transfer.popleft()
+    return newest

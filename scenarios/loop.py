@@ -1,7 +1,8 @@
 """The closed loop, one control tick at a time: world, sensors, navigation, command.
 
 A command decided at the end of a control tick is flown from the next one on.
-A frame reaches the navigation when it has been exposed, read out and transferred; its stamp is the exposure's middle.
+A frame reaches the navigation when it has been exposed, read out and transferred, unless a newer one has, too; its
+stamp is the exposure's middle.
 Not modelled: the time that the navigation takes to compute.
 """
 

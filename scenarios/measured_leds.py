@@ -13,8 +13,9 @@ exposure t. The image stages state of the spot, on each axis,
 and it is measured with an error of e sigma, e = e_u or e_c. Of the texture's part a share stays with the LED for a
 time (Gauss-Markov); the rest is new in every frame. An LED is seen that is on the sensor, not hidden, and whose
 brightest pixel is above y (1 + y_s N(0, 1)), y = y_0 + y_T T levels. A share of the seen, in proportion to T, gets no
-name, a share a wrong place. Fewer than `ring_least` LEDs are no ring, and in a share of the frames, in proportion to
-T, there is none anyway.
+name, a share a wrong place. Fewer than `ring_least` LEDs are no ring, and none of them is named unless a belief that
+follows does it, that is while the last LEDs that were named are not too old. In a share of the frames, in proportion to
+T, no LED is named anyway.
 
 Not modelled: sky, Sun and what they do to the picture (stray light, glints, gaps in clouds, LED-like lights); smear by
 motion; a ring that is lost and must be looked for. What a scenario has of these is refused, see `refuse_unmodelled`.
@@ -122,6 +123,7 @@ class MeasuredLeds:
         transfer: stream "frame_transfer".
         defects: dirt on the window.
         faults: what breaks, and when.
+        followed_s: for how long after LEDs were named the navigation's belief can name LEDs too few for a ring [s].
         extinction_1_m: of the air.
         automatic_exposure: whether the camera sets its exposure itself.
     """
@@ -140,6 +142,7 @@ class MeasuredLeds:
         transfer: np.random.Generator,
         defects: Defects,
         faults: Faults,
+        followed_s: float,
         extinction_1_m: float = 0.0,
         automatic_exposure: bool = True,
     ) -> None:
@@ -149,6 +152,7 @@ class MeasuredLeds:
         self._rng, self._transfer, self._defects, self._faults = rng, transfer, defects, faults
         self._control = ExposureControl(sheets.exposure, sheets.sensor, automatic=automatic_exposure)
         self._last: LedObservation | None = None
+        self._followed_s, self._named_s = followed_s, -np.inf
         self._window, self._exposure_s = as_built.camera.full_window, sheets.exposure.exposure_s
         self._tracking, self._drawn_s = False, -np.inf
         self._lasting = np.zeros((len(as_built.led_intensity_w_sr), 2))
@@ -179,6 +183,7 @@ class MeasuredLeds:
         self._control.step(levels.reshape(1, -1), exposure_s)
         self._last = self._measured(view, levels, width_px, numbers, time_s)
         self._tracking = len(self._last.led_numbers) > 0
+        self._named_s = time_s if self._tracking else self._named_s
         return self._last
 
     @property
@@ -254,7 +259,8 @@ class MeasuredLeds:
         faintest_dn, clutter = p.faintest_dn + p.faintest_dn_per_e * texture_e, texture_e / max(p.texture_e, 1.0)
         bright = levels.max(axis=1) - self._black > faintest_dn * (1.0 + p.faintest_spread * numbers.level)
         named = np.flatnonzero(view.clear & bright & (uniform[:count, 0] >= clutter * p.unnamed_share))
-        if len(named) < p.ring_least or uniform[count, 0] < clutter * p.no_ring_share:
+        least = 1 if time_s - self._named_s <= self._followed_s else p.ring_least
+        if len(named) < least or uniform[count, 0] < clutter * p.no_ring_share:
             named = named[:0]
         return LedObservation(
             time_stamp_s=time_s,

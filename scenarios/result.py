@@ -124,7 +124,7 @@ def summarise(
         outcome=outcome,
         success=succeeded(attempts),
         first_attempt=first_attempt_succeeded(attempts),
-        cause=cause_of_flight(attempts, flown),
+        cause=cause_of_flight(attempts, flown, outcome),
         unsafe=referee.unsafe,
         attempts=len(attempts),
         attempt_log=attempts,

@@ -43,13 +43,13 @@ def fork_is_wanted(camera):
         pytest.skip("one core, or no fork")
 
 
-def frames_of(exposures, data, seconds=0.3):
+def frames_of(exposures, data, seconds=0.3, tick_s=TICK_S):
     """Every frame, with the time at which it was delivered."""
     delivered = []
     try:
-        for tick in range(round(seconds / TICK_S)):
-            time_s = tick * TICK_S
-            if tick % round(PERIOD_S / TICK_S) == 0:
+        for tick in range(round(seconds / tick_s)):
+            time_s = tick * tick_s
+            if tick % round(PERIOD_S / tick_s) == 0:
                 number = round(time_s / PERIOD_S)
                 exposures.begin(data, time_s, number, (SMALL, OTHER)[number % 2])
             frame = exposures.delivered(time_s)
@@ -74,6 +74,18 @@ def test_frames_and_their_arrivals_are_those_of_a_camera_that_is_waited_for():
             assert getattr(ours, field) == getattr(theirs, field)
 
 
+def test_of_two_frames_that_have_arrived_both_ways_drop_the_older():
+    """Ticks as long as the period, and a transfer that takes one tick or two, as its jitter has it."""
+    late = {"parameters.sensor.transfer_s": 0.019, "parameters.sensor.transfer_jitter_s": 0.005}
+    first, second = (build(scenario(**late), 5) for _ in range(2))
+    fork_is_wanted(second.camera)
+    waited = frames_of(ExposuresInTurn(first.camera), first.world.data, tick_s=PERIOD_S)
+    beside = frames_of(OverlappedExposures(second.camera, second.world.model), second.world.data, tick_s=PERIOD_S)
+    assert len(waited) < 13
+    assert {round((at_s - frame.time_stamp_s) / PERIOD_S) for at_s, frame in waited[-5:]} <= {1, 2}
+    assert [(at_s, frame.time_stamp_s) for at_s, frame in beside] == [(a, f.time_stamp_s) for a, f in waited]
+
+
 def test_what_the_world_does_after_an_exposure_changes_no_pixel(parts):
     fork_is_wanted(parts.camera)
     still = frames_of(OverlappedExposures(parts.camera, parts.world.model), parts.world.data, 0.02)
@@ -92,7 +104,7 @@ def test_more_frames_under_way_than_there_are_slots_are_none_the_worse(parts):
     count = 2 * camera_process._SLOTS + 1
     for number in range(count):
         exposures.begin(parts.world.data, PERIOD_S * number, number, SMALL)
-    frames = [exposures.delivered(10.0) for _ in range(count)]
+    frames = [exposures.delivered(PERIOD_S * (number + 1)) for number in range(count)]
     assert exposures.delivered(10.0) is None
     exposures.close()
     for number, frame in enumerate(frames):

@@ -2,6 +2,8 @@
 
 import itertools
 import math
+import re
+from pathlib import Path
 
 import pytest
 
@@ -122,3 +124,17 @@ def test_a_test_names_the_navigator_that_is_neither_ours_nor_the_truth():
 def test_the_packaged_plan_with_a_gate_may_be_flown():
     source = PlanFile("ci")
     require_power(source.plan.gate, [unflown(job) for job in jobs_of(source)], "gate")
+
+
+def test_the_packaged_plan_notices_a_build_as_often_as_its_page_says():
+    source = PlanFile("ci")
+    tests = judge(source.plan.gate, [unflown(job) for job in jobs_of(source)]).tests
+    truth, camera = (next(t for t in tests if name in t.group) for name in ("truth_navigation", "default"))
+    assert [(t.flights, t.fails_up_to) for t in (truth, camera)] == [(12, 5), (8, 3)]
+    page = (Path(__file__).parents[2] / "docs/campaigns.md").read_text(encoding="utf-8")
+    for rate in (0.9, 0.7, 0.5, 0.3, 0.1):
+        said = re.search(rf"^\| {rate} \| ([0-9.]+) % \| ([0-9.]+) % \|$", page, re.MULTILINE)
+        for test, percent in zip((truth, camera), said.groups(), strict=True):
+            noticed = 100.0 * sum(chance(k, test.flights, rate) for k in range(test.fails_up_to + 1))
+            decimals = len(percent.partition(".")[2])
+            assert f"{noticed:.{decimals}f}" == percent

@@ -1,5 +1,6 @@
 """Why an attempt failed, on histories of which each is wrong in one thing alone."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from dockair.sim.faults import CameraDropOut, DeadReel, LedOff
 TIMES = np.round(np.arange(0.0, 5.0, 0.01), 2)
 END_S = 4.0  # when the attempt is decided
 NOSE = np.array([-1.2, 0.9, -0.65])  # to the left of the probe and below
+TIP = np.array([2.7, -0.45, -0.15])  # from the camera
 
 
 def attempt(**changes):
@@ -49,7 +51,7 @@ def flight(make_truth):
             believed = truth.p_PD_B + np.array([0.0, *error(t)])
             truths.append(truth)
             solutions.append(solution(t, believed, exp(np.array(turn)) @ R_BD, valid(t), usable(t)))
-        return Flown(truths=truths, solutions=solutions, p_PN_B=NOSE, faults=faults)
+        return Flown(truths=truths, solutions=solutions, p_PN_B=NOSE, p_CP_B=TIP, faults=faults)
 
     return make
 
@@ -128,18 +130,24 @@ def test_a_roll_of_less_than_half_an_led_is_no_ambiguity(flight):
     assert cause(flight(**MISLED, turn=(np.radians(22.0), 0.0, 0.0))) == "navigation_error"
 
 
-def test_an_error_with_the_mirrored_attitude_is_an_ambiguity(flight):
-    """A drogue 6 degrees nose up, seen at the end along the line of the miss, and believed on the other side of it."""
-    tilt = np.radians(6.0)
-    sight = np.array([0.0, 0.0, 1.0])  # from a tip that is below the drogue, at the crossing
-    axis = exp(np.array([0.0, tilt, 0.0]))[:, 0]
-    mirrored = 2.0 * (axis @ sight) * sight - axis
-    assert mirrored @ axis < 0.0  # so seen, the two differ by more than a right angle: the last second decides
-    far = dict(
-        tip=lambda t: (0.0, -0.3 if t > END_S - 0.3 else 0.0), error=lambda t: (0.0, -0.3), attitude=(0, tilt, 0)
-    )
-    assert cause(flight(**far, turn=(0.0, -2.0 * tilt, 0.0))) == "ambiguity"
-    assert cause(flight(**far, turn=(0.0, -0.4 * tilt, 0.0))) == "navigation_error"
+@pytest.mark.parametrize("tilt_deg", [(6.0, 0.0), (-6.0, 0.0), (0.0, 6.0), (0.0, -6.0), (4.0, -8.0)])
+def test_an_error_with_the_mirrored_attitude_is_an_ambiguity(flight, tilt_deg):
+    """The ring's two images that look alike lie on both sides of the line from the camera, not of that from the tip."""
+    misled = flight(**MISLED, attitude=(0.0, *np.radians(tilt_deg)))
+    for share, expected in ((1.0, "ambiguity"), (0.3, "navigation_error")):
+        believed = [
+            replace(solution, R_BD=towards_mirror_image(truth, share))
+            for truth, solution in zip(misled.truths, misled.solutions, strict=True)
+        ]
+        assert cause(replace(misled, solutions=believed)) == expected
+
+
+def towards_mirror_image(truth, share):
+    """R_BD of the drogue turned, without a roll, by a share of the way to its mirror image about the camera's sight."""
+    R_BD, p_CD_B = truth.R_WB.T @ truth.R_WD, TIP + truth.p_PD_B
+    across = np.cross(R_BD[:, 0], p_CD_B) / np.linalg.norm(p_CD_B)
+    sine = np.linalg.norm(across)
+    return exp(share * 2.0 * np.arcsin(sine) * across / sine) @ R_BD
 
 
 @pytest.mark.parametrize(("lost_s", "expected"), [(0.49, "control_limit"), (0.51, "detection")])
@@ -216,19 +224,35 @@ def test_a_fault_is_named_where_it_can_have_brought_the_cause_about_and_acted_du
     assert cause(flight(faults=[DeadReel()]), outcome="given_up", reason="red light") == "fault"
 
 
+@pytest.mark.parametrize("outcome", ["given_up", "breakaway"])
+def test_a_fault_after_the_closest_approach_is_named_for_an_attempt_that_it_ended(flight, outcome):
+    blind = flight(**BEHIND, valid=lambda t: t < 3.2, faults=[CameraDropOut(start_s=3.2)])
+    assert cause(blind, outcome=outcome, decided_s=3.0, ended_s=END_S) == "fault"
+    assert cause(blind, outcome="miss", decided_s=3.0, ended_s=END_S) == "control_limit"  # that was over before
+    later = flight(**BEHIND, valid=lambda t: t < 3.2, faults=[CameraDropOut(start_s=4.1)])
+    assert cause(later, outcome=outcome, decided_s=3.0, ended_s=END_S) == "detection"
+
+
 def test_a_flight_has_the_cause_of_its_last_failed_attempt(flight):
     flown = flight()
     failed = [attempt(outcome="miss", cause="gust"), attempt(number=2, cause="bow_wave")]
     held = attempt(number=3, outcome="contact", radial_offset_m=0.05)
-    assert cause_of_flight([*failed, held], flown) == "bow_wave"
-    assert cause_of_flight([held], flown) == ""
+    assert cause_of_flight([*failed, held], flown, "abort") == "bow_wave"
+    assert cause_of_flight([held], flown, "abort") == ""
 
 
 def test_a_flight_without_an_attempt_was_never_steady_or_saw_nothing(flight):
-    assert cause_of_flight([], flight()) == "never_steady"
-    assert cause_of_flight([], flight(valid=lambda t: t < 3.0)) == "detection"
-    assert cause_of_flight([], flight(valid=lambda t: t > 3.0)) == "never_steady"  # it came to see in time
-    assert cause_of_flight([], flight(faults=[LedOff()])) == "fault"
+    assert cause_of_flight([], flight(), "abort") == "never_steady"
+    assert cause_of_flight([], flight(valid=lambda t: t < 3.0), "abort") == "detection"
+    assert cause_of_flight([], flight(valid=lambda t: t > 3.0), "abort") == "never_steady"  # it came to see in time
+    assert cause_of_flight([], flight(faults=[LedOff()]), "abort") == "fault"
+
+
+def test_a_flight_without_an_attempt_whose_simulation_broke_down_has_diverged_whatever_else_went_wrong(flight):
+    assert cause_of_flight([], flight(), "diverged") == "diverged"
+    blind = flight(tip=lambda t: (0.0, -25.0 * (t > 1.0)), valid=lambda t: False, faults=[LedOff()])
+    assert cause_of_flight([], blind, "diverged") == "diverged"
+    assert cause_of_flight([attempt(cause="gust")], flight(), "diverged") == "gust"  # it broke down after that attempt
 
 
 def test_a_receiver_that_falls_away_has_departed_whatever_else_went_wrong(flight):
@@ -236,9 +260,9 @@ def test_a_receiver_that_falls_away_has_departed_whatever_else_went_wrong(flight
     fallen = flight(tip=lambda t: (0.0, -25.0 * (t > 1.0)), error=lambda t: (0.0, -25.0))
     assert cause(fallen) == "departed"
     assert cause(fallen, outcome="timeout") == "departed"
-    assert cause_of_flight([], fallen) == "departed"
-    assert cause_of_flight([attempt(cause="gust")], fallen) == "departed"  # it departed after that attempt
-    assert cause_of_flight([attempt(outcome="contact", cause="")], fallen) == ""
+    assert cause_of_flight([], fallen, "abort") == "departed"
+    assert cause_of_flight([attempt(cause="gust")], fallen, "abort") == "departed"  # it departed after that attempt
+    assert cause_of_flight([attempt(outcome="contact", cause="")], fallen, "abort") == ""
 
 
 def test_an_attempt_that_ended_before_the_departure_has_its_own_cause(flight):
@@ -263,3 +287,9 @@ def test_the_nose_stands_in_the_plane_of_symmetry_ahead_of_the_centre_of_gravity
     """Probe's tip at (6.8, 0.4, 1.0) from the centre of gravity; the nose 1.2 m behind it, 0.05 m below that centre."""
     flown = flown_of(load_scenario("default"), hand_made.sheets.mounting, [], [])
     np.testing.assert_allclose(hand_made.sheets.mounting.p_BP + flown.p_PN_B, [5.6, 0.0, -0.05], atol=1e-12)
+
+
+def test_the_tip_is_where_the_mounting_has_it_from_the_camera(hand_made):
+    mounting = hand_made.sheets.mounting
+    flown = flown_of(load_scenario("default"), mounting, [], [])
+    np.testing.assert_allclose(mounting.p_BC + flown.p_CP_B, mounting.p_BP, atol=1e-12)

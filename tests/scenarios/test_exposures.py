@@ -13,16 +13,13 @@ SMALL = Window(500, 532, 900, 964)
 class Noting:
     """Stands where the camera stands; what it was asked for."""
 
-    def __init__(self):
-        self.asked = []
+    def __init__(self, latency_s=lambda frame: 0.005):
+        self.asked, self.latency_s = [], latency_s
 
     def expose(self, data, time_s, number, window, **how):
         self.asked.append((number, how))
         pixels = np.zeros(SMALL.shape, np.uint8)
         return CameraFrame(time_stamp_s=time_s, pixels=pixels, window=SMALL, exposure_s=20e-6, gain=1.0)
-
-    def latency_s(self, frame):
-        return 0.005
 
 
 def test_only_what_was_asked_for_is_passed_on():
@@ -32,6 +29,21 @@ def test_only_what_was_asked_for_is_passed_on():
     exposures.begin(None, 0.02, 1, SMALL, 500e-6)
     assert camera.asked == [(0, {}), (1, {"exposure_s": 500e-6})]
     assert exposures.delivered(0.004) is None and exposures.delivered(0.005).time_stamp_s == 0.0
+
+
+def test_a_late_transfer_delays_no_later_frame_for_good_where_camera_and_control_have_one_rate():
+    """The frame of 1.5 s takes three ticks more, and those behind it wait for it; a tick later they are in time."""
+    period_s, ages = 1.0 / 128.0, {}  # exact in binary
+    exposures = ExposuresInTurn(Noting(lambda frame: (4.5 if frame.time_stamp_s == 1.5 else 1.5) * period_s))
+    for tick in range(512):
+        exposures.begin(None, tick * period_s, tick, SMALL)
+        frame = exposures.delivered(tick * period_s)
+        ages[tick * period_s] = None if frame is None else tick - round(frame.time_stamp_s / period_s)
+    first = [ages[t] for t in ages if 2.0 * period_s <= t < 1.0]
+    late = [ages[1.5 + ticks * period_s] for ticks in (1, 2, 3, 4, 5, 6)]
+    assert set(first) == {2}
+    assert late == [2, None, None, None, 2, 2]
+    assert {ages[t] for t in ages if t > 2.0} == {2}
 
 
 @pytest.mark.slow

@@ -122,7 +122,7 @@ def test_flight_that_diverges_is_recorded_to_its_last_sound_tick(tmp_path, monke
 
     monkeypatch.setattr(World, "step", step)
     result = fly(truth_flight(), out=tmp_path / "out")
-    assert result.outcome == "diverged" and result.duration_s == pytest.approx(0.3)
+    assert result.outcome == result.cause == "diverged" and result.duration_s == pytest.approx(0.3)
     table = json.loads((tmp_path / "out" / "result.json").read_text())
     assert table["outcome"] == "diverged"
     assert (tmp_path / "out" / "flight.parquet").is_file()

@@ -10,6 +10,7 @@ from scipy.stats import chi2, norm
 
 from dockair.calibration import Camera, LedRing, Mounting
 from dockair.errors import DockairError
+from dockair.nav.navigator import NavigatorSettings
 from dockair.parameters import load_parameters
 from dockair.rotations import exp
 from dockair.scenarios.build_measured import SHEET, refuse_unmodelled
@@ -51,7 +52,8 @@ class Stand:
         self.leds = MeasuredLeds(
             parameters, SHEETS, self.built, response, self.model,
             rng=np.random.default_rng(seed), transfer=np.random.default_rng(1),
-            defects=SimpleNamespace(dirt=lambda cover: None), faults=Faults(faults, 8), **changes,
+            defects=SimpleNamespace(dirt=lambda cover: None), faults=Faults(faults, 8),
+            followed_s=NavigatorSettings().usable_age_s, **changes,
         )  # fmt: skip
         self.put(7.0)
 
@@ -148,6 +150,20 @@ def test_the_exposure_brings_the_metered_pixel_to_its_target_within_the_dead_ban
 @pytest.mark.parametrize(("dark", "left"), [((0, 2, 5), (1, 3, 4, 6, 7)), ((0, 2, 5, 7), (1, 3, 4, 6)), (range(5), ())])
 def test_dark_leds_are_not_named_and_too_few_are_no_ring(dark, left):
     assert tuple(Stand(faults=[LedOff(leds=tuple(dark))]).look().led_numbers) == left
+
+
+@pytest.mark.parametrize("left", [1, 2, 3])
+def test_leds_too_few_for_a_ring_are_named_while_one_is_followed_and_begin_none(left):
+    """For 0.5 s after the last that were named, as the navigation's belief does; then four are needed again."""
+    dark = tuple(range(left, 8))
+    faults = [LedOff(leds=dark, start_s=1.0), LedOff(start_s=1.2, stop_s=1.6), LedOff(start_s=2.0, stop_s=2.6)]
+    stand, counts = Stand(faults=faults), {}
+    for k in range(160):
+        counts[k] = len(stand.look(0.02 * k).led_numbers)
+    assert {counts[k] for k in range(50)} == {8}
+    assert {counts[k] for k in range(51, 60)} | {counts[k] for k in range(81, 100)} == {left}
+    assert {counts[k] for k in range(61, 80)} | {counts[k] for k in range(101, 160)} == {0}
+    assert len(Stand(faults=[LedOff(leds=dark)]).look().led_numbers) == 0
 
 
 def test_an_led_dimmed_below_the_faintest_level_is_not_seen_and_above_it_is():

@@ -11,10 +11,11 @@ import pytest
 
 from dockair.rotations import exp
 from dockair.scenarios import metrics, result
-from dockair.scenarios.causes import Flown
+from dockair.scenarios.causes import flown_of
 from dockair.scenarios.flight_log import FlightLog
 from dockair.scenarios.hold import hold_of
 from dockair.scenarios.referee import Referee
+from dockair.scenarios.schema import load_scenario
 
 
 def _log(flight, count: int) -> FlightLog:
@@ -27,7 +28,7 @@ def _log(flight, count: int) -> FlightLog:
 def _summary(flight, log: FlightLog, **changes):
     values = dict(
         scenario="hand_made", seed=3, outcome="timeout", referee=Referee(),
-        flown=Flown(truths=log.truths, solutions=log.solutions, p_PN_B=np.array([-1.2, 0.9, -0.65])), frames=log.frames,
+        flown=flown_of(load_scenario("default"), flight.sheets.mounting, log.truths, log.solutions), frames=log.frames,
         mounting=flight.sheets.mounting, sensing="camera", background="mujoco", wall_time_s=2.0, out_dir=None,
     )  # fmt: skip
     return result.summarise(**(values | changes))
