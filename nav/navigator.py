@@ -16,6 +16,7 @@ import numpy as np
 from dockair.calibration import LedRing, NavigationSheets
 from dockair.errors import DockairError
 from dockair.messages import CameraFrame, ImuSample, LedObservation, NavSolution, PodSignal, TankerAnnouncement
+from dockair.nav.frame_checks import FrameChecks, with_numbers
 from dockair.nav.fusion import FilterState, FusionSettings, RelativeFilter
 from dockair.nav.guidance.approach import Guidance, GuidanceSettings, RelativeState
 from dockair.nav.guidance.phases import Phase
@@ -97,6 +98,7 @@ class Navigator:
         self._tip = TipMotion(mounting.p_BP - mounting.p_BI, self._settings.tip_levelling_s)
         self._guidance = Guidance(self._settings.guidance, sheets.control_rate_hz)
         self._heading = None if self._settings.heading is None else OwnHeading(sheets, self._settings.heading)
+        self._checks = FrameChecks(1.0 / sheets.camera_rate_hz, buffer_s)
         self._points_D = sheets.ring.positions_D
         self._time_s = 0.0
         self._used_time_s = self._posed_time_s = self._begun_s = float("nan")
@@ -149,13 +151,18 @@ class Navigator:
 
     def _look(self, frame: CameraFrame | LedObservation) -> str:
         """Frame to named LEDs to belief; what became of it is the status."""
+        self._candidates_px = np.empty((0, 2))
+        clock_s = self._time_s if np.isfinite(self._filter.imu_time_s) else float("nan")
+        refused = self._checks.refused(frame, clock_s)
+        if refused is not None:
+            return self._nothing(refused)
         time_s = frame.time_stamp_s
         lost, nothing = self._lost(time_s), "ring not found"
         if isinstance(frame, CameraFrame):
             seen = self._finder.find(frame, followed=self._followed(time_s), lost=lost)
             self._candidates_px, nothing = self._finder.candidates_px, self._finder.status
         else:
-            seen = frame
+            seen = with_numbers(frame)
             self._candidates_px = seen.centroids_px
         if lost and len(seen.led_numbers) >= _POSE_LEDS:
             self._begin_again(seen)
@@ -280,7 +287,8 @@ class Navigator:
         sigma_lateral_m = largest_sigma(state.covariance[4:6, 4:6])
         aged_s = self._time_s - self._used_time_s
         known = is_finite(state.p_PD_B) and is_finite(state.rate_PD_B) and is_finite(state.covariance)
-        valid = known and sigma_lateral_m <= self._settings.usable_sigma_m and aged_s <= self._settings.usable_age_s
+        recent = -0.5 / self._sheets.control_rate_hz <= aged_s <= self._settings.usable_age_s
+        valid = known and sigma_lateral_m <= self._settings.usable_sigma_m and recent
         claim = self.contact_claim()
         contact_usable = valid and claim is not None and claim.usable
         self._note_basket(state, claim, usable=contact_usable)
