@@ -473,6 +473,7 @@ def test_a_drogue_that_is_struck_is_followed_again_after_a_few_refused_frames():
         world, filter_, taken = struck(seed, SETTINGS)
         assert taken.count(False) < SETTINGS.refusals_until_doubt
         assert all(taken[SETTINGS.refusals_until_doubt :])
+        assert 0.5 < filter_.doubted_s <= 0.6
         values.append(nees(*world.error(filter_)))
     assert_mean_nees(values, 9)  # what comes after is honest again
 

@@ -414,10 +414,15 @@ def test_a_drogue_that_is_struck_is_followed_on(render):
         return still(t) + np.array([0.0, 1.5 * max(t - 0.5, 0.0), 0.0])
 
     sky = Sky(render, path)
-    sky.run(0.5)
-    statuses = [sky.step().status for _ in range(30)]
+    assert sky.run(0.5).contact_usable
+    solutions = [sky.step() for _ in range(30)]
+    statuses = [s.status for s in solutions]
     assert statuses.count("ring not found") == 0
-    assert statuses[-10:] == ["pose used"] * 10
+    assert statuses[-10:] == ["pose used"] * 10 and solutions[-1].contact_usable
+    refused = [s.contact_usable for s in solutions if "refused" in s.status]
+    assert refused and not any(refused)
+    off_m = [np.abs(s.p_PD_B - path(s.time_stamp_s)).max() for s in solutions if s.contact_usable]
+    assert max(off_m) < 0.06  # two frames' way, until the first of them has arrived
 
 
 @pytest.mark.parametrize("search_anew_s", [2.0, np.inf])
@@ -808,3 +813,77 @@ def test_an_led_without_numbers_is_not_seen(field, number):
     seen = named(sky, range(8), imu[-1].time_stamp_s)
     getattr(seen, field)[:] = number
     assert sky.navigator.step(imu, seen).status == "ring not found"
+
+
+@pytest.mark.parametrize(
+    ("numbers", "bent_px", "status"),
+    [
+        (range(8), np.tile([0.0, 12.0], (8, 1)), "pose refused by the gate"),
+        (range(8), 4.0 * np.random.default_rng(1).normal(size=(8, 2)), "pose inconsistent"),
+        (range(2), np.tile([0.0, 40.0], (2, 1)), "LEDs refused by the gate"),
+    ],
+)
+def test_while_the_newest_frames_contradict_the_belief_contact_is_not_claimed(numbers, bent_px, status):
+    """A claim on the last pose would stand for 0.4 s more. The first pose that is used again makes it anew."""
+    sky = Sky(None, still)
+    for _ in range(500):
+        step_on_leds(sky, range(8))
+    assert sky.navigator.contact_claim().usable
+    imu = (*sky.imu(), *sky.imu())
+    seen = named(sky, numbers, imu[-1].time_stamp_s)
+    seen = replace(seen, centroids_px=seen.centroids_px + bent_px)
+    solution = sky.navigator.step(imu, seen)
+    assert solution.status == status and solution.valid and not solution.contact_usable
+    assert sky.navigator.contact_claim().doubts == (Doubt.INCONSISTENT,)
+    late = named(sky, range(8), imu[-1].time_stamp_s - 0.01)
+    assert sky.navigator.step(sky.imu(), late).status == "pose used"
+    assert sky.navigator.contact_claim().doubts == (Doubt.INCONSISTENT,)
+    assert step_on_leds(sky, range(8)).contact_usable
+
+
+@pytest.mark.parametrize("speed_m_s", [1.0, 1.5])
+@pytest.mark.parametrize("frames_after", [3, 4, 6, 8])
+def test_after_a_blow_the_claim_is_no_wider_than_the_beliefs_own(speed_m_s, frames_after):
+    """The drogue is struck sideways, and the camera goes out after some frames more."""
+
+    def path(t):
+        return still(t) + [0.0, speed_m_s * max(t - 5.0, 0.0), 0.0]
+
+    sky, over = Sky(None, path), []
+    for _ in range(500):
+        assert step_on_leds(sky, range(8)).status != "pose refused by the gate"
+    for tick in range(60):
+        out = tick >= 2 * frames_after
+        solution = sky.navigator.step(sky.imu(), None) if out else step_on_leds(sky, range(8))
+        off_m = np.hypot(*(solution.p_PD_B - path(solution.time_stamp_s))[1:])
+        if out and solution.contact_usable:
+            over.append(off_m / sky.navigator.contact_claim().levels.lateral_m)
+        assert not solution.contact_usable or off_m < 0.04
+    assert np.isfinite(sky.navigator._filter.doubted_s) and max(over, default=0.0) <= 1.0
+
+
+@pytest.mark.parametrize("missing", ["samples", "forces"])
+def test_a_push_that_was_not_felt_is_not_forgotten_when_the_imu_comes_back(missing):
+    """For 0.25 s, without frames, the receiver is pushed sideways with 2 m/s^2; then the IMU says that it rests."""
+    sky, aside = Sky(None, None), [0.0, 0.0]  # receiver's place and velocity to the left
+    sky.path = lambda _time_s: still(0.0) - [0.0, aside[0], 0.0]
+
+    def tick(*, pushed=False, seen=True):
+        push = 2.0 if pushed else 0.0
+        aside[0] += 0.01 * aside[1] + 0.5 * 1e-4 * push
+        aside[1] += 0.01 * push
+        felt = np.array([0.0, 0.0, 9.81]) if not pushed else np.full(3, np.nan)
+        imu = sky.imu(specific_force_m_s2=felt)
+        frame = named(sky, range(8), imu[-1].time_stamp_s) if seen and sky.tick % 2 == 0 else None
+        return sky.navigator.step(() if pushed and missing == "samples" else imu, frame)
+
+    for _ in range(600):
+        assert tick().time_stamp_s < 0.1 or sky.navigator.contact_claim().usable
+    levels = []
+    for k in range(38):
+        solution = tick(pushed=k < 25, seen=False)
+        levels.append(sky.navigator.contact_claim().levels.lateral_m)
+        off_m = np.hypot(*(solution.p_PD_B - sky.path(0.0))[1:])
+        assert not solution.contact_usable or off_m <= levels[-1]
+    assert min(levels[24:]) > ContactLimits().lateral_m
+    assert [tick().contact_usable for _ in range(3)][-1]
