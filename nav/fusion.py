@@ -272,10 +272,11 @@ class RelativeFilter:
             return False
         correction = self._corrected(before, frame)
         self._last = correction
-        if not correction.beliefs and self._refusals + 1 >= self._refusals_until_doubt:
+        is_pose = isinstance(frame, PoseEstimate)  # one or two LEDs may be clutter, to which doubt would give way
+        if is_pose and not correction.beliefs and self._refusals + 1 >= self._refusals_until_doubt:
             correction, doubted = self._corrected(self._widened(before), frame), True
         if not correction.beliefs:
-            self._refusals += 1
+            self._refusals += is_pose
             return False
         self._refusals = 0
         if doubted:

@@ -604,6 +604,24 @@ def test_single_leds_are_refused_by_the_gate_and_by_a_loose_filter():
         FusionSettings(coupling="tigth")
 
 
+@pytest.mark.parametrize("count", [1, 2])
+def test_however_often_single_leds_are_refused_the_belief_does_not_give_way_to_them(count):
+    """A glint has an LED's name, 40 px off, frame after frame; the next ring is neither doubted for it nor refused."""
+    world = World(sheets(5.0), SETTINGS, np.random.default_rng(69))
+    filter_ = RelativeFilter(world.sheets, SETTINGS)
+    for _ in fly(world, filter_, 0.3):
+        pass
+    for _ in range(3 * SETTINGS.refusals_until_doubt):
+        filter_.propagate([world.step()])
+        pixels = world.pixels(0.1)[:count] + [40.0, 0.0]
+        assert not filter_.update_leds(pixels, RING[:count], np.full(count, 0.1), world.time_s)
+    before, now = state_of(filter_, world.time_s), world.time_s
+    false_pose = solve(filter_, world.pixels(0.1) + [0.0, 12.0], now, 0.1)
+    assert not filter_.update(false_pose, now)
+    np.testing.assert_array_equal(state_of(filter_, now), before)
+    assert filter_.update(solve(filter_, world.pixels(0.1), now, 0.1), now) and filter_.doubted_s == -np.inf
+
+
 @pytest.mark.parametrize("gust_time_s", [0.0, -1.0, 0.005, float("nan")])
 def test_gusts_that_last_no_longer_than_a_step_are_refused(gust_time_s):
     with pytest.raises(DockairError, match=r"fusion\.gust_time_s"):
