@@ -83,7 +83,7 @@ class RelativeFilter:
             span_s=self._settings.buffer_s,
             interval_s=self._settings.node_interval_s,
         )
-        self._refusals, self._felt = 0, False
+        self._refusals, self._felt, self._doubted_s = 0, False, -math.inf
         self._last: Correction | None = None
         self._shown: tuple[Belief, Apparent] | None = None  # of the belief asked for last
 
@@ -91,6 +91,11 @@ class RelativeFilter:
     def imu_time_s(self) -> float:
         """Stamp of the newest sample taken; -inf before the first."""
         return self._record.newest_s
+
+    @property
+    def doubted_s(self) -> float:
+        """Stamp of the newest frame that was taken on a widened belief; -inf before the first."""
+        return self._doubted_s
 
     @property
     def innovation(self) -> tuple[float, int] | None:
@@ -195,6 +200,13 @@ class RelativeFilter:
         """(3,) mean specific force after `start_s` up to `end_s` [m/s^2]; NaN where none was felt."""
         return self._record.mean_force_B(start_s, end_s)
 
+    def felt(self, start_s: float, end_s: float) -> bool:
+        """Whether the receiver's motion was felt from a time to another, now: samples and their forces have no gap.
+
+        Where there never was a force, as of an IMU without accelerometers, none is asked for.
+        """
+        return self._record.is_unbroken(start_s, end_s, self._settings.longest_gap_s, forces=self._felt)
+
     def predicted_pose(self, time_s: float) -> tuple[Array, Array, Array]:
         """R_CD (3, 3), p_CD (3,) [m] that a frame would show, and their covariance (6, 6) of (phi, delta) in C."""
         seen = self._apparent(self._belief(time_s))
@@ -260,12 +272,15 @@ class RelativeFilter:
             return False
         correction = self._corrected(before, frame)
         self._last = correction
-        if not correction.beliefs and self._refusals + 1 >= self._refusals_until_doubt:
+        is_pose = isinstance(frame, PoseEstimate)  # one or two LEDs may be clutter, to which doubt would give way
+        if is_pose and not correction.beliefs and self._refusals + 1 >= self._refusals_until_doubt:
             correction, doubted = self._corrected(self._widened(before), frame), True
         if not correction.beliefs:
-            self._refusals += 1
+            self._refusals += is_pose
             return False
         self._refusals = 0
+        if doubted:
+            self._doubted_s = max(self._doubted_s, time_s)
         self._buffer.insert(Node(time_s, frame, correction.beliefs, doubted))
         return True
 

@@ -15,6 +15,7 @@ from dockair.messages import ImuSample
 from dockair.rotations import Array
 
 _FIRST_ROOM = 256  # samples; doubled when needed
+_STAMP_S = 1e-6  # to which stamps are even
 
 
 class Stamps:
@@ -105,6 +106,17 @@ class ImuRecord:
         """(3,) mean specific force of the samples after `start_s` up to `end_s`; NaN when any or all are none."""
         return _mean(self.times_s, self.forces_B, start_s, end_s)
 
+    def is_unbroken(self, start_s: float, end_s: float, longest_gap_s: float, *, forces: bool) -> bool:
+        """Whether samples came all the time from one moment to another.
+
+        Args:
+            start_s: the first moment.
+            end_s: the last one, at or after the newest sample.
+            longest_gap_s: without a sample, before the first and after the last one included.
+            forces: whether the specific force of every one has to be a number.
+        """
+        return bool(_is_unbroken(self.times_s, self.forces_B, start_s, end_s, longest_gap_s + _STAMP_S, forces))
+
     def _make_room(self) -> None:
         kept = self._end - self._first
         room = max(_FIRST_ROOM, 2 * kept)
@@ -153,3 +165,19 @@ def _mean(times: Array, values: Array, start_s: float, end_s: float) -> Array:
     for k in range(first + 1, stop):
         out += values[k]
     return out / (stop - first)
+
+
+@njit(cache=True, error_model="numpy")
+def _is_unbroken(
+    times: Array, forces: Array, start_s: float, end_s: float, longest_gap_s: float, with_forces: bool
+) -> bool:
+    """See `ImuRecord.is_unbroken`; the last sample at or before the first moment is one of them."""
+    before_s = start_s if len(times) else -np.inf
+    for k in range(max(int(np.searchsorted(times, start_s, side="right")) - 1, 0), len(times)):
+        if times[k] - before_s > longest_gap_s:
+            return False
+        for i in range(3):
+            if with_forces and not np.isfinite(forces[k, i]):
+                return False
+        before_s = times[k]
+    return end_s - before_s <= longest_gap_s

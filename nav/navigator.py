@@ -16,18 +16,19 @@ import numpy as np
 from dockair.calibration import LedRing, NavigationSheets
 from dockair.errors import DockairError
 from dockair.messages import CameraFrame, ImuSample, LedObservation, NavSolution, PodSignal, TankerAnnouncement
-from dockair.nav.fusion import FilterState, FusionSettings, RelativeFilter
+from dockair.nav.contact_watch import ContactWatch
+from dockair.nav.frame_checks import FrameChecks, with_numbers
+from dockair.nav.fusion import FusionSettings, RelativeFilter
 from dockair.nav.guidance.approach import Guidance, GuidanceSettings, RelativeState
 from dockair.nav.guidance.phases import Phase
 from dockair.nav.heading.own_heading import OwnHeading, OwnHeadingSettings
 from dockair.nav.identify.code import CodeSettings, code_of
 from dockair.nav.identify.perspective import SLOTS
 from dockair.nav.image.detect import DetectSettings
-from dockair.nav.integrity.coasting import CoastingError, CoastingSettings
-from dockair.nav.integrity.contact import ContactClaim, ContactLimits, usable_for_contact
+from dockair.nav.integrity.coasting import CoastingSettings
+from dockair.nav.integrity.contact import ContactClaim, ContactLimits
 from dockair.nav.integrity.fault_test import IntegritySettings
-from dockair.nav.integrity.monitor import Integrity, IntegrityStatus, check_integrity
-from dockair.nav.integrity.sensitivity import moved_by_places
+from dockair.nav.integrity.monitor import IntegrityStatus, check_integrity
 from dockair.nav.pose.estimate import PoseStatus, solve_pose
 from dockair.nav.pose.measurement import lines_of_sight_from_pixels
 from dockair.nav.pose.prior import AttitudePrior
@@ -97,14 +98,13 @@ class Navigator:
         self._tip = TipMotion(mounting.p_BP - mounting.p_BI, self._settings.tip_levelling_s)
         self._guidance = Guidance(self._settings.guidance, sheets.control_rate_hz)
         self._heading = None if self._settings.heading is None else OwnHeading(sheets, self._settings.heading)
+        self._checks = FrameChecks(1.0 / sheets.camera_rate_hz, buffer_s)
         self._points_D = sheets.ring.positions_D
         self._time_s = 0.0
-        self._used_time_s = self._posed_time_s = self._begun_s = float("nan")
-        self._looked_time_s = 0.0  # when the newest frame came
+        self._used_time_s = self._begun_s = float("nan")
+        self._looked_time_s = 0.0  # when the newest frame came that says something
         self._felt_time_s = 0.0
-        self._integrity: Integrity | None = None
-        self._learnt_m: Array = np.zeros(3)  # what its pose owes to the LEDs' places that are learnt, camera axes
-        self._coasting, self._in_basket = CoastingError(self._settings.coasting), False
+        self._contact = ContactWatch(sheets, self._filter, self._settings.contact, self._settings.coasting)
         self._status = self._finder.status
         self._candidates_px: Array = np.empty((0, 2))
         self._led_pixels_px: Array = np.full((len(self._points_D), 2), np.nan)
@@ -131,7 +131,7 @@ class Navigator:
         if np.isnan(self._begun_s):
             self._begun_s = self._time_s
         if frame is not None:
-            self._looked_time_s, self._status = self._time_s, self._look(frame)
+            self._status = self._look(frame)
         return self._solution()
 
     @property
@@ -150,13 +150,19 @@ class Navigator:
 
     def _look(self, frame: CameraFrame | LedObservation) -> str:
         """Frame to named LEDs to belief; what became of it is the status."""
+        self._candidates_px = np.empty((0, 2))
+        clock_s = self._time_s if np.isfinite(self._filter.imu_time_s) else float("nan")
+        refused = self._checks.refused(frame, clock_s)
+        if refused is not None:
+            return self._nothing(refused)
+        self._looked_time_s = self._time_s
         time_s = frame.time_stamp_s
         lost, nothing = self._lost(time_s), "ring not found"
         if isinstance(frame, CameraFrame):
             seen = self._finder.find(frame, followed=self._followed(time_s), lost=lost)
             self._candidates_px, nothing = self._finder.candidates_px, self._finder.status
         else:
-            seen = frame
+            seen = with_numbers(frame)
             self._candidates_px = seen.centroids_px
         if lost and len(seen.led_numbers) >= _POSE_LEDS:
             self._begin_again(seen)
@@ -169,7 +175,7 @@ class Navigator:
         )
         if pose.status is PoseStatus.CONVERGED:
             self._filter.begin_again(pose, seen.time_stamp_s)
-            self._in_basket = False
+            self._contact.found_again()
 
     def _nothing(self, status: str) -> str:
         self._led_pixels_px = np.full((len(self._points_D), 2), np.nan)
@@ -198,6 +204,7 @@ class Navigator:
             return f"pose {pose.status.value}"
         checked = check_integrity(pose, attitude, self._settings.integrity)
         if checked.status is IntegrityStatus.INCONSISTENT:
+            self._contact.contradicted(time_s)
             return f"pose {checked.status.value}"
         if checked.led is not None:
             self._led_pixels_px[named[checked.led]] = np.nan
@@ -207,12 +214,9 @@ class Navigator:
             seen.centroids_px[kept], self._points_D[named[kept]], self._sheets.camera, seen.sigma_px[kept]
         )
         if not self._filter.update(replace(checked.pose, measurement=sight), time_s):
+            self._contact.contradicted(time_s)
             return "pose refused by the gate"
-        if not time_s < self._posed_time_s:  # a late one corrects the belief, and the claim stays that of a newer
-            self._integrity, self._posed_time_s = checked, time_s
-            self._learnt_m = moved_by_places(checked.pose, self._points_D[named[kept]])[3:]
-            if self._coasting.due(time_s):
-                self._ask_coasting(time_s)
+        self._contact.used(checked, self._points_D[named[kept]], time_s)
         self._used_time_s = max(time_s, self._used_time_s)  # NaN before the first: the first of the two then
         return "pose used"
 
@@ -226,12 +230,6 @@ class Navigator:
         learnt_D = self._filter.led_points_D(time_s) - self._points_D
         return np.asarray(self._points_D + np.minimum(np.maximum(learnt_D, -most_m), most_m))
 
-    def _ask_coasting(self, time_s: float) -> None:
-        """Hold what had been foretold for a frame against what is believed with it."""
-        foretold_B, age_s = self._filter.foretold_p_PD_B(time_s, self._settings.coasting.horizon_s)
-        error_B = self._filter.p_PD_B(time_s) - foretold_B
-        self._coasting.take(self._sheets.mounting.R_BC.T @ error_B, age_s, time_s)
-
     def _attitude_known(self, leds: int, time_s: float, R_CD: Array, covariance: Array) -> AttitudePrior | None:
         """The attitude that is believed, where the LEDs of one frame are too few to test one another without it."""
         if leds >= self._settings.alone_leds or not self._followed(time_s):
@@ -244,47 +242,25 @@ class Navigator:
         if self._settings.fusion.coupling != "tight" or not self._followed(time_s):
             return "pose too few LEDs"
         if not self._filter.update_leds(seen.centroids_px, self._points_D[seen.led_numbers], seen.sigma_px, time_s):
+            self._contact.contradicted(time_s)
             return "LEDs refused by the gate"
         self._used_time_s = max(time_s, self._used_time_s)
         return "LEDs used"
 
     def contact_claim(self) -> ContactClaim | None:
         """Whether contact may be flown on the present belief, and why not; None before the first pose that was used."""
-        if self._integrity is None:
-            return None
-        offset_m = self._integrity.pose.p_CD - self._filter.predicted_pose(self._posed_time_s)[1]
-        age_s = self._time_s - self._posed_time_s
-        levels = self._integrity.levels.about(offset_m).about(self._learnt_m)  # what is learnt may be a fault
-        levels = self._coasting.added(levels, age_s, self._sigmas_to_ask_m())
-        return usable_for_contact(
-            self._integrity, age_s, self._settings.contact, levels=levels, in_basket=self._in_basket
-        )
-
-    def _sigmas_to_ask_m(self) -> Array:
-        """(3,) of the belief in camera axes [m]; 0 where what it foretold wrongly says all: with IMU, well followed."""
-        felt = self._time_s - self._filter.imu_time_s <= self._settings.fusion.longest_gap_s
-        if felt and self._coasting.is_of(self._posed_time_s):
-            return np.zeros(3)
-        covariance = self._filter.predicted_pose(self._time_s)[2]
-        return np.asarray(np.sqrt(np.diag(covariance)[3:]))
-
-    def _note_basket(self, state: FilterState, claim: ContactClaim | None, *, usable: bool) -> None:
-        """Note whether the tip is in the basket: it went in inside the rim, on a usable belief, and has stayed."""
-        p_DP, rim_m = -state.R_BD.T @ state.p_PD_B, 0.5 * self._sheets.ring.diameter_m
-        aside_m = float(np.hypot(p_DP[1], p_DP[2]))
-        stays = self._in_basket and p_DP[0] > 0.0 and aside_m <= rim_m
-        within = claim is not None and p_DP[0] > claim.levels.range_m
-        self._in_basket = bool(stays or (usable and within and aside_m <= rim_m - self._settings.contact.lateral_m))
+        return self._contact.claim(self._time_s)
 
     def _solution(self) -> NavSolution:
         state = self._filter.state(self._time_s)
         sigma_lateral_m = largest_sigma(state.covariance[4:6, 4:6])
         aged_s = self._time_s - self._used_time_s
         known = is_finite(state.p_PD_B) and is_finite(state.rate_PD_B) and is_finite(state.covariance)
-        valid = known and sigma_lateral_m <= self._settings.usable_sigma_m and aged_s <= self._settings.usable_age_s
+        recent = -0.5 / self._sheets.control_rate_hz <= aged_s <= self._settings.usable_age_s
+        valid = known and sigma_lateral_m <= self._settings.usable_sigma_m and recent
         claim = self.contact_claim()
         contact_usable = valid and claim is not None and claim.usable
-        self._note_basket(state, claim, usable=contact_usable)
+        self._contact.note_basket(state, claim, usable=contact_usable)
         w_WB_B = self._filter.rate_B(self._time_s)
         command = self._guidance.step(
             RelativeState(

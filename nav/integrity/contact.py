@@ -18,7 +18,7 @@ class Doubt(Enum):
 
     NO_POSE = "no pose"
     NOT_TESTED = "too few LEDs to test"
-    INCONSISTENT = "LEDs contradict one another"
+    INCONSISTENT = "LEDs contradict one another or the belief"
     RANGE = "protection level of range above its limit"
     LATERAL = "protection level across above its limit"
     AGE = "frame too old"
@@ -71,6 +71,7 @@ def usable_for_contact(
     *,
     levels: ProtectionLevels | None = None,
     in_basket: bool = False,
+    contradicted: bool = False,
 ) -> ContactClaim:
     """Return whether the fault test passed, both protection levels are below their limits, and the frame is recent.
 
@@ -81,7 +82,9 @@ def usable_for_contact(
         levels: those of another estimate, `integrity.levels.about(its offset)`, or of a later one,
             `CoastingError.added`; the frame's own if not given.
         in_basket: the tip has entered the basket, claimed usable then, and not left it: the basket holds it sideways,
-            so that the level across is not asked.
+            so that the level across is not asked, and the probe strikes the drogue there, so that a frame which
+            contradicts the belief is to be expected.
+        contradicted: a newer frame was refused: its LEDs contradict one another or the belief.
     """
     limits, levels = limits or ContactLimits(), levels or integrity.levels
     doubts = []
@@ -92,6 +95,8 @@ def usable_for_contact(
             doubts.append(Doubt.RANGE)
         if not (in_basket or levels.lateral_m <= limits.lateral_m):
             doubts.append(Doubt.LATERAL)
+    if contradicted and not in_basket and Doubt.INCONSISTENT not in doubts:
+        doubts.append(Doubt.INCONSISTENT)
     if not 0.0 <= age_s <= limits.age_s:
         doubts.append(Doubt.AGE)
     return ContactClaim(doubts=tuple(doubts), levels=levels)

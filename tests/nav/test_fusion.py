@@ -473,6 +473,7 @@ def test_a_drogue_that_is_struck_is_followed_again_after_a_few_refused_frames():
         world, filter_, taken = struck(seed, SETTINGS)
         assert taken.count(False) < SETTINGS.refusals_until_doubt
         assert all(taken[SETTINGS.refusals_until_doubt :])
+        assert 0.5 < filter_.doubted_s <= 0.6
         values.append(nees(*world.error(filter_)))
     assert_mean_nees(values, 9)  # what comes after is honest again
 
@@ -601,6 +602,24 @@ def test_single_leds_are_refused_by_the_gate_and_by_a_loose_filter():
         )
     with pytest.raises(DockairError, match="tight, loose"):
         FusionSettings(coupling="tigth")
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_however_often_single_leds_are_refused_the_belief_does_not_give_way_to_them(count):
+    """A glint has an LED's name, 40 px off, frame after frame; the next ring is neither doubted for it nor refused."""
+    world = World(sheets(5.0), SETTINGS, np.random.default_rng(69))
+    filter_ = RelativeFilter(world.sheets, SETTINGS)
+    for _ in fly(world, filter_, 0.3):
+        pass
+    for _ in range(3 * SETTINGS.refusals_until_doubt):
+        filter_.propagate([world.step()])
+        pixels = world.pixels(0.1)[:count] + [40.0, 0.0]
+        assert not filter_.update_leds(pixels, RING[:count], np.full(count, 0.1), world.time_s)
+    before, now = state_of(filter_, world.time_s), world.time_s
+    false_pose = solve(filter_, world.pixels(0.1) + [0.0, 12.0], now, 0.1)
+    assert not filter_.update(false_pose, now)
+    np.testing.assert_array_equal(state_of(filter_, now), before)
+    assert filter_.update(solve(filter_, world.pixels(0.1), now, 0.1), now) and filter_.doubted_s == -np.inf
 
 
 @pytest.mark.parametrize("gust_time_s", [0.0, -1.0, 0.005, float("nan")])

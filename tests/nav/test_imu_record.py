@@ -94,3 +94,28 @@ def test_a_stamp_that_leaps_needs_a_second_one():
     assert not stamps.believed(107.02, 5.02)
     assert stamps.believed(107.04, 5.02)
     assert not stamps.believed(np.nan, 107.04)
+
+
+def test_a_gap_between_samples_is_told_wherever_it_is():
+    """Samples at 0, 0.01, ..., 0.1 s and 0.15, ..., 0.2 s, of 0.1 rad/s and no force."""
+    kept, gap_s = record(), 0.02
+    assert not kept.is_unbroken(0.0, 0.01, gap_s, forces=False)
+    for k in (*range(11), *range(15, 21)):
+        kept.take(sample(0.01 * k))
+    assert kept.is_unbroken(0.15, 0.2, gap_s, forces=False)
+    assert kept.is_unbroken(0.155, 0.22, gap_s, forces=False)
+    assert not kept.is_unbroken(0.155, 0.221, gap_s, forces=False)  # at the end
+    assert not kept.is_unbroken(0.05, 0.2, gap_s, forces=False)  # in the middle
+    assert not kept.is_unbroken(0.1, 0.2, gap_s, forces=False)
+    assert not kept.is_unbroken(-0.03, 0.1, gap_s, forces=False)  # before the first
+    assert kept.is_unbroken(0.1, 0.2, 0.05, forces=False)
+
+
+@pytest.mark.parametrize(("start_s", "felt"), [(0.0, False), (0.05, False), (0.059, False), (0.06, True)])
+def test_a_force_that_is_no_number_is_a_gap_where_forces_are_asked_for(start_s, felt):
+    kept = record()
+    for k in range(11):
+        force = np.array([0.0, 0.0, np.nan if k == 5 else 9.8])
+        kept.take(replace(sample(0.01 * k), specific_force_m_s2=force))
+    assert kept.is_unbroken(start_s, 0.1, 0.02, forces=True) == felt
+    assert kept.is_unbroken(start_s, 0.1, 0.02, forces=False)

@@ -392,6 +392,14 @@ def test_a_frame_that_did_not_pass_is_a_doubt_whatever_its_levels(status, doubt)
     assert usable_for_contact(replace(near, status=status), 0.0).doubts == (doubt,)
 
 
+def test_a_newer_frame_that_contradicts_is_a_doubt_but_in_the_basket():
+    near = checked(pixels_at(*pose_at(2.0, 5.0), seed=9))
+    assert usable_for_contact(near, 0.1, contradicted=True).doubts == (Doubt.INCONSISTENT,)
+    assert usable_for_contact(near, 0.1, contradicted=True, in_basket=True).usable
+    inconsistent = replace(near, status=IntegrityStatus.INCONSISTENT)
+    assert usable_for_contact(inconsistent, 0.1, contradicted=True).doubts == (Doubt.INCONSISTENT,)
+
+
 @given(st.floats(0.0, 1.0), st.floats(0.0, 1.0), st.floats(0.0, 0.5), st.floats(0.0, 0.5))
 def test_a_larger_level_never_takes_a_doubt_away(along, across, more_along, more_across):
     near = checked(pixels_at(*pose_at(2.0, 5.0)))

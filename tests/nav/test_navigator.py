@@ -414,10 +414,15 @@ def test_a_drogue_that_is_struck_is_followed_on(render):
         return still(t) + np.array([0.0, 1.5 * max(t - 0.5, 0.0), 0.0])
 
     sky = Sky(render, path)
-    sky.run(0.5)
-    statuses = [sky.step().status for _ in range(30)]
+    assert sky.run(0.5).contact_usable
+    solutions = [sky.step() for _ in range(30)]
+    statuses = [s.status for s in solutions]
     assert statuses.count("ring not found") == 0
-    assert statuses[-10:] == ["pose used"] * 10
+    assert statuses[-10:] == ["pose used"] * 10 and solutions[-1].contact_usable
+    refused = [s.contact_usable for s in solutions if "refused" in s.status]
+    assert refused and not any(refused)
+    off_m = [np.abs(s.p_PD_B - path(s.time_stamp_s)).max() for s in solutions if s.contact_usable]
+    assert max(off_m) < 0.06  # two frames' way, until the first of them has arrived
 
 
 @pytest.mark.parametrize("search_anew_s", [2.0, np.inf])
@@ -557,7 +562,8 @@ def test_with_named_leds_a_lost_drogue_is_found_again(render):
     """The belief goes on with 3 m/s toward the lens and behind it."""
     sky = Sky(render, lambda t: still(t) - [3.0 * t, 0.0, 0.0] if t < 0.5 else np.array([6.0, -1.1, 0.5]))
     for _ in range(50):
-        assert step_on_leds(sky, range(8)) is not None
+        before = step_on_leds(sky, range(8))
+    assert before.valid
     for _ in range(400):
         step_on_leds(sky, ())
     assert sky.navigator._filter.state().p_PD_B[0] < 0.0
@@ -682,3 +688,202 @@ def test_a_code_that_is_the_same_turned_is_refused_before_the_first_frame():
         Navigator(sheets(LedRing(brightness=opposite)))
     Navigator(sheets(LedRing(brightness=opposite, angles_deg=UNEVEN.angles_deg)))
     Navigator(sheets(LedRing(brightness=(2.0,) * 8)))  # no code
+
+
+def drifting_from(start_s, speed_m_s=0.2):
+    return lambda t: still(t) + [0.0, speed_m_s * max(t - start_s, 0.0), 0.0]
+
+
+def assert_given_up(solutions):
+    """Frames that are none: the claim ends with its age, the state's validity 0.1 s later."""
+    assert {s.status for s in solutions} == {"frame stuck"}
+    assert not any(s.contact_usable for s in solutions[40:]) and not any(s.valid for s in solutions[52:])
+    assert not np.isfinite(solutions[-1].led_pixels_px).any() and len(solutions[-1].candidates_px) == 0
+
+
+def test_a_camera_that_hangs_is_believed_no_longer_than_one_that_is_out(render):
+    """It sends its last picture with new stamps while the drogue drifts off at 0.2 m/s."""
+    sky = Sky(render, drifting_from(0.6))
+    sky.run(0.6)
+    picture, solutions = sky.waiting[0], []
+    sky.step(camera=False)
+    for _ in range(100):
+        imu = sky.imu()
+        sent = replace(picture, time_stamp_s=imu[-1].time_stamp_s) if sky.tick % 2 == 0 else None
+        solutions.append(sky.navigator.step(imu, sent))
+    assert_given_up(solutions[1:])
+    sky.window = sky.sheets.camera.full_window
+    assert sky.run(0.5).valid
+
+
+def test_named_leds_that_come_again_to_the_last_bit_are_no_frame():
+    sky = Sky(None, drifting_from(3.0))
+    for _ in range(299):
+        step_on_leds(sky, range(8))
+    imu, solutions = sky.imu(), []
+    seen = named(sky, range(8), imu[-1].time_stamp_s)
+    assert sky.navigator.step(imu, seen).contact_usable
+    for _ in range(100):
+        imu = sky.imu()
+        sent = replace(seen, time_stamp_s=imu[-1].time_stamp_s) if sky.tick % 2 == 0 else None
+        solutions.append(sky.navigator.step(imu, sent))
+    assert_given_up(solutions[1:])
+    step_on_leds(sky, range(8))
+    assert step_on_leds(sky, range(8)).valid
+
+
+def assert_same(one, other):
+    for name in ("p_PD_B", "v_PD_B", "R_BD", "covariance", "frame_time_stamp_s"):
+        np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
+    assert (one.valid, one.contact_usable, one.window) == (other.valid, other.contact_usable, other.window)
+
+
+@pytest.mark.parametrize("count", [3, 8])
+@pytest.mark.parametrize("leap_s", [0.3, 0.6, 3.0, 100.0, 3600.0, np.nan, -0.5, -3600.0])
+def test_leds_with_a_stamp_that_leaps_are_no_frame(leap_s, count):
+    """The belief is not asked for that moment either: the way there would take as long as it is far."""
+    sky = Sky(None, drifting_from(0.5))
+    twin, asked = Navigator(sky.sheets), []
+    believed = sky.navigator._filter._belief
+    sky.navigator._filter._belief = lambda time_s: asked.append(time_s) or believed(time_s)
+    for tick in range(1, 200):
+        imu = sky.imu()
+        seen = named(sky, range(8), imu[-1].time_stamp_s) if tick % 2 == 0 else None
+        if tick == 100:
+            bad = named(sky, range(count), imu[-1].time_stamp_s + leap_s)
+            solution, seen = sky.navigator.step(imu, bad), None
+            assert solution.status == ("frame too old" if leap_s < 0.0 else "frame ahead of the clock")
+        else:
+            solution = sky.navigator.step(imu, seen)
+        assert_same(solution, twin.step(imu, seen))
+        assert tick < 60 or solution.contact_usable
+    assert max(asked) <= solution.time_stamp_s
+
+
+@pytest.mark.parametrize("leap_s", [0.3, 3600.0, -0.5])
+def test_a_picture_with_a_stamp_that_leaps_is_no_frame(render, leap_s):
+    sky, twin = (Sky(render, still, seed=5) for _ in range(2))
+    for each in (sky, twin):
+        each.run(0.5)
+    sky.waiting[0] = replace(sky.waiting[0], time_stamp_s=sky.waiting[0].time_stamp_s + leap_s)
+    twin.waiting.clear()
+    for _ in range(20):
+        solution = sky.step()
+        assert_same(solution, twin.step())
+        assert solution.valid
+
+
+def test_a_lost_drogue_is_not_looked_for_where_an_old_frame_shows_it():
+    sky = Sky(None, still)
+    for _ in range(50):
+        step_on_leds(sky, range(8))
+    for _ in range(400):
+        before = sky.navigator.step(sky.imu(), None)
+    after = sky.navigator.step(sky.imu(), named(sky, range(8), 2.6))
+    assert after.status == "frame too old" and not after.valid
+    assert np.abs(after.p_PD_B - before.p_PD_B).max() < 0.02
+
+
+def test_a_frame_of_a_time_that_has_not_come_is_no_reason_to_fly_on_the_state():
+    """It is taken, as the clocks of camera and IMU may differ; flown on is the state once the time has come."""
+    sky = Sky(None, still)
+    for _ in range(50):
+        step_on_leds(sky, range(8))
+    imu = sky.imu()
+    early = sky.navigator.step(imu, named(sky, range(8), imu[-1].time_stamp_s + 0.018))
+    assert early.status == "pose used" and early.frame_time_stamp_s > early.time_stamp_s
+    assert [early.valid, *(sky.navigator.step(sky.imu(), None).valid for _ in range(3))] == [False, False, True, True]
+
+
+@pytest.mark.parametrize(
+    ("field", "number"),
+    [("centroids_px", np.nan), ("centroids_px", np.inf), ("sigma_px", np.nan), ("sigma_px", 0.0), ("sigma_px", -0.1)],
+)
+def test_an_led_without_numbers_is_not_seen(field, number):
+    sky = Sky(None, still)
+    for _ in range(29):
+        step_on_leds(sky, range(8))
+    imu = sky.imu()
+    seen = named(sky, range(8), imu[-1].time_stamp_s)
+    getattr(seen, field)[3] = number
+    solution = sky.navigator.step(imu, seen)
+    assert solution.status == "pose used" and solution.contact_usable
+    assert np.flatnonzero(~np.isfinite(solution.led_pixels_px).all(axis=1)).tolist() == [3]
+    imu = (*sky.imu(), *sky.imu())
+    seen = named(sky, range(8), imu[-1].time_stamp_s)
+    getattr(seen, field)[:] = number
+    assert sky.navigator.step(imu, seen).status == "ring not found"
+
+
+@pytest.mark.parametrize(
+    ("numbers", "bent_px", "status"),
+    [
+        (range(8), np.tile([0.0, 12.0], (8, 1)), "pose refused by the gate"),
+        (range(8), 4.0 * np.random.default_rng(1).normal(size=(8, 2)), "pose inconsistent"),
+        (range(2), np.tile([0.0, 40.0], (2, 1)), "LEDs refused by the gate"),
+    ],
+)
+def test_while_the_newest_frames_contradict_the_belief_contact_is_not_claimed(numbers, bent_px, status):
+    """A claim on the last pose would stand for 0.4 s more. The first pose that is used again makes it anew."""
+    sky = Sky(None, still)
+    for _ in range(500):
+        step_on_leds(sky, range(8))
+    assert sky.navigator.contact_claim().usable
+    imu = (*sky.imu(), *sky.imu())
+    seen = named(sky, numbers, imu[-1].time_stamp_s)
+    seen = replace(seen, centroids_px=seen.centroids_px + bent_px)
+    solution = sky.navigator.step(imu, seen)
+    assert solution.status == status and solution.valid and not solution.contact_usable
+    assert sky.navigator.contact_claim().doubts == (Doubt.INCONSISTENT,)
+    late = named(sky, range(8), imu[-1].time_stamp_s - 0.01)
+    assert sky.navigator.step(sky.imu(), late).status == "pose used"
+    assert sky.navigator.contact_claim().doubts == (Doubt.INCONSISTENT,)
+    assert step_on_leds(sky, range(8)).contact_usable
+
+
+@pytest.mark.parametrize("speed_m_s", [1.0, 1.5])
+@pytest.mark.parametrize("frames_after", [3, 4, 6, 8])
+def test_after_a_blow_the_claim_is_no_wider_than_the_beliefs_own(speed_m_s, frames_after):
+    """The drogue is struck sideways, and the camera goes out after some frames more."""
+
+    def path(t):
+        return still(t) + [0.0, speed_m_s * max(t - 5.0, 0.0), 0.0]
+
+    sky, over = Sky(None, path), []
+    for _ in range(500):
+        assert step_on_leds(sky, range(8)).status != "pose refused by the gate"
+    for tick in range(60):
+        out = tick >= 2 * frames_after
+        solution = sky.navigator.step(sky.imu(), None) if out else step_on_leds(sky, range(8))
+        off_m = np.hypot(*(solution.p_PD_B - path(solution.time_stamp_s))[1:])
+        if out and solution.contact_usable:
+            over.append(off_m / sky.navigator.contact_claim().levels.lateral_m)
+        assert not solution.contact_usable or off_m < 0.04
+    assert np.isfinite(sky.navigator._filter.doubted_s) and max(over, default=0.0) <= 1.0
+
+
+@pytest.mark.parametrize("missing", ["samples", "forces"])
+def test_a_push_that_was_not_felt_is_not_forgotten_when_the_imu_comes_back(missing):
+    """For 0.25 s, without frames, the receiver is pushed sideways with 2 m/s^2; then the IMU says that it rests."""
+    sky, aside = Sky(None, None), [0.0, 0.0]  # receiver's place and velocity to the left
+    sky.path = lambda _time_s: still(0.0) - [0.0, aside[0], 0.0]
+
+    def tick(*, pushed=False, seen=True):
+        push = 2.0 if pushed else 0.0
+        aside[0] += 0.01 * aside[1] + 0.5 * 1e-4 * push
+        aside[1] += 0.01 * push
+        felt = np.array([0.0, 0.0, 9.81]) if not pushed else np.full(3, np.nan)
+        imu = sky.imu(specific_force_m_s2=felt)
+        frame = named(sky, range(8), imu[-1].time_stamp_s) if seen and sky.tick % 2 == 0 else None
+        return sky.navigator.step(() if pushed and missing == "samples" else imu, frame)
+
+    for _ in range(600):
+        assert tick().time_stamp_s < 0.1 or sky.navigator.contact_claim().usable
+    levels = []
+    for k in range(38):
+        solution = tick(pushed=k < 25, seen=False)
+        levels.append(sky.navigator.contact_claim().levels.lateral_m)
+        off_m = np.hypot(*(solution.p_PD_B - sky.path(0.0))[1:])
+        assert not solution.contact_usable or off_m <= levels[-1]
+    assert min(levels[24:]) > ContactLimits().lateral_m
+    assert [tick().contact_usable for _ in range(3)][-1]

@@ -1,0 +1,106 @@
+"""What may be claimed of the belief for contact, from frame to frame.
+
+The claim is that of the newest pose which was used (`integrity.contact`), about the belief as it is now, and wider by
+what the belief foretells wrongly while no frame comes (`integrity.coasting`). A newer frame that contradicts the belief
+or itself ends it, until a pose is used again; of a belief that had to be widened after a blow the covariance is asked.
+In the basket neither is so: it is the probe that strikes the drogue there, at no more than the closure speed.
+"""
+
+import numpy as np
+
+from dockair.calibration import NavigationSheets
+from dockair.nav.fusion import FilterState, RelativeFilter
+from dockair.nav.integrity.coasting import CoastingError, CoastingSettings
+from dockair.nav.integrity.contact import ContactClaim, ContactLimits, usable_for_contact
+from dockair.nav.integrity.monitor import Integrity
+from dockair.nav.integrity.sensitivity import moved_by_places
+from dockair.rotations import Array
+
+
+class ContactWatch:
+    """Keeps the newest pose's test, and what has become of the belief since.
+
+    Args:
+        sheets: mounting and ring.
+        belief: that the claim is about.
+        limits: alert limits.
+        coasting: how the belief is asked what it foretold.
+    """
+
+    def __init__(
+        self,
+        sheets: NavigationSheets,
+        belief: RelativeFilter,
+        limits: ContactLimits,
+        coasting: CoastingSettings,
+    ) -> None:
+        self._R_BC, self._rim_m = sheets.mounting.R_BC, 0.5 * sheets.ring.diameter_m
+        self._belief, self._limits = belief, limits
+        self._horizon_s, self._coasting = coasting.horizon_s, CoastingError(coasting)
+        self._integrity: Integrity | None = None
+        self._posed_time_s, self._contradicted_s = float("nan"), -np.inf
+        self._learnt_m: Array = np.zeros(3)  # what the pose owes to the LEDs' places that are learnt, camera axes
+        self._in_basket = False
+
+    def used(self, checked: Integrity, points_D: Array, time_s: float) -> None:
+        """Take note of a pose that has corrected the belief; a late one leaves the claim that of a newer.
+
+        Args:
+            checked: the pose and its test.
+            points_D: (n, 3) places of its LEDs by the sheet [m].
+            time_s: stamp of its frame.
+        """
+        if time_s < self._posed_time_s:
+            return
+        self._integrity, self._posed_time_s = checked, time_s
+        self._learnt_m = moved_by_places(checked.pose, points_D)[3:]
+        if self._coasting.due(time_s):
+            self._ask_coasting(time_s)
+
+    def contradicted(self, time_s: float) -> None:
+        """Take note of a frame of this stamp whose LEDs contradict the belief or one another."""
+        self._contradicted_s = max(time_s, self._contradicted_s)
+
+    def found_again(self) -> None:
+        """Take note that the belief begins anew, so that it does not know any more of the tip in the basket."""
+        self._in_basket = False
+
+    def claim(self, time_s: float) -> ContactClaim | None:
+        """Return whether contact may be flown on the belief of a time, and why not; None before the first pose."""
+        if self._integrity is None:
+            return None
+        offset_m = self._integrity.pose.p_CD - self._belief.predicted_pose(self._posed_time_s)[1]
+        age_s = time_s - self._posed_time_s
+        levels = self._integrity.levels.about(offset_m).about(self._learnt_m)  # what is learnt may be a fault
+        levels = self._coasting.added(levels, age_s, self._sigmas_to_ask_m(time_s))
+        return usable_for_contact(
+            self._integrity,
+            age_s,
+            self._limits,
+            levels=levels,
+            in_basket=self._in_basket,
+            contradicted=self._contradicted_s > self._posed_time_s,
+        )
+
+    def note_basket(self, state: FilterState, claim: ContactClaim | None, *, usable: bool) -> None:
+        """Note whether the tip is in the basket: it went in inside the rim, on a usable belief, and has stayed."""
+        p_DP = -state.R_BD.T @ state.p_PD_B
+        aside_m = float(np.hypot(p_DP[1], p_DP[2]))
+        stays = self._in_basket and p_DP[0] > 0.0 and aside_m <= self._rim_m
+        within = claim is not None and p_DP[0] > claim.levels.range_m
+        self._in_basket = bool(stays or (usable and within and aside_m <= self._rim_m - self._limits.lateral_m))
+
+    def _ask_coasting(self, time_s: float) -> None:
+        """Hold what had been foretold for a frame against what is believed with it."""
+        foretold_B, age_s = self._belief.foretold_p_PD_B(time_s, self._horizon_s)
+        error_B = self._belief.p_PD_B(time_s) - foretold_B
+        self._coasting.take(self._R_BC.T @ error_B, age_s, time_s)
+
+    def _sigmas_to_ask_m(self, time_s: float) -> Array:
+        """(3,) of the belief in camera axes [m]; 0 where what it foretold wrongly says all: with IMU, well followed."""
+        posed_s = self._posed_time_s
+        unstruck = self._in_basket or posed_s - self._belief.doubted_s > self._horizon_s
+        if unstruck and self._coasting.is_of(posed_s) and self._belief.felt(posed_s, time_s):
+            return np.zeros(3)
+        covariance = self._belief.predicted_pose(time_s)[2]
+        return np.asarray(np.sqrt(np.diag(covariance)[3:]))
