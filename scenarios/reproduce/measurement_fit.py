@@ -31,7 +31,9 @@ Fitted = dict[str, float]
 
 
 def fit(seen: Seen, sheet: MeasurementParameters, gain_dn_e: float, black_dn: float) -> Fitted:
-    """Return every number of the sheet but those that it defines itself (t_0, n_c, the lasting part's time).
+    """Return every number of the sheet but those that it defines itself.
+
+    These are t_0, n_c, the lasting part's time and the LEDs of a ring.
 
     Args:
         seen: what was measured.
@@ -47,7 +49,7 @@ def fit(seen: Seen, sheet: MeasurementParameters, gain_dn_e: float, black_dn: fl
     out |= _clipped(seen, sheet) | _errors(seen)
     out |= _seen(seen, texture_e, black_dn)
     out["texture_lasting_share"] = _lasting_share(seen, _part(seen, width_px * texture_e))
-    return out | _frames(seen, texture_e / out["texture_e"]) | _window(seen)
+    return out | _frames(seen, texture_e / out["texture_e"], sheet.ring_least) | _window(seen)
 
 
 def _spot(seen: Seen, sheet: MeasurementParameters, gain_dn_e: float, black_dn: float) -> Fitted:
@@ -139,20 +141,16 @@ def _lasting_share(seen: Seen, texture_part: Array) -> float:
     return float(np.clip(product / square, 0.0, 1.0)) if square > 0.0 else 0.0
 
 
-def _frames(seen: Seen, texture: Array) -> Fitted:
+def _frames(seen: Seen, texture: Array, ring_least: int) -> Fitted:
     """Shares in proportion to the texture (n,), in units of T_0: events over the sum of that."""
     could = seen.found & seen.ring
     numbers, first, inverse = np.unique(
         np.column_stack([seen.flight, seen.frame]), axis=0, return_index=True, return_inverse=True
     )
     leds = np.bincount(inverse.ravel(), weights=seen.found, minlength=len(numbers))
-    ring = seen.ring[first]
-    counts = [k for k in range(1, 9) if (leds == k).any() and ring[leds == k].mean() > 0.5]
-    least = min(counts, default=1)
-    enough = leds >= least
+    ring, enough = seen.ring[first], leds >= ring_least
     return {
         "unnamed_share": float((~seen.named[could]).sum() / texture[could].sum()),
-        "ring_least": least,
         "no_ring_share": float((~ring[enough]).sum() / texture[first][enough].sum()),
     }
 

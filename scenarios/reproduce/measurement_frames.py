@@ -34,7 +34,7 @@ class Seen:
 
     flight: NDArray[np.int64]
     frame: NDArray[np.int64]  #: of the flight
-    ring: Mask  #: the frame has one
+    ring: Mask  #: LEDs of the frame are named, all at once or one by one
     named: Mask
     led: NDArray[np.int64]
     depth_m: Array

@@ -28,7 +28,7 @@ _FEW = ((0, 2, 5), (0, 2, 5, 7), (0, 2, 3, 5, 7))
 
 def _drawn(flight: int, depth_m: float, frames: int, faults=(), depth_rate_m: float = 0.0) -> list[dict]:
     """Rows of the model's own observations, in the columns of the camera's."""
-    stand = Stand(DRAWN, faults, seed=flight)
+    stand, rng = Stand(DRAWN, faults, seed=flight), np.random.default_rng(flight)
     rows = []
     for k in range(frames):
         stand.put(depth_m + k * depth_rate_m)
@@ -41,14 +41,13 @@ def _drawn(flight: int, depth_m: float, frames: int, faults=(), depth_rate_m: fl
         texture = DRAWN.faintest_dn + DRAWN.faintest_dn_per_e * stand.leds.texture_e(exposure_s)
         for led in range(8):
             full, i = int((levels[led] == 255).sum()), at.get(led, -1)
-            bright = levels[led].max() - output_black(SHEETS.sensor) > 2.0 * texture  # found, if unnamed
+            least = (2.0 if at else 1.0) * texture  # of what is found, if unnamed: surely, or of a whole ring by half
+            bright = levels[led].max() - output_black(SHEETS.sensor) > least
             error = drawn.centroids_px[i] - view.pixels_px[led] if i >= 0 else np.full(2, np.nan)
             sigma = drawn.sigma_px[i] if i >= 0 else np.nan
             if i < 0 and bright:
-                error, sigma = (
-                    np.zeros(2),
-                    np.sqrt(stand.leds.variances(view.electrons, width_px, np.zeros(8, int), exposure_s)[0][led]),
-                )
+                sigma = np.sqrt(stand.leds.variances(view.electrons, width_px, np.zeros(8, int), exposure_s)[0][led])
+                error = DRAWN.error_over_sigma * sigma * rng.standard_normal(2)
             off = view.pixels_px[led] - np.round(view.pixels_px[led])
             rows.append({
                 "flight": flight, "frame": k, "ring": len(at) > 0, "named": i >= 0, "led": led,
@@ -80,11 +79,10 @@ def test_the_fit_gives_back_the_numbers_that_the_material_was_drawn_from(materia
         "spot_sigma_px": 0.02, "widening_share": 0.15, "sigma_floor_px": 0.05, "photon_factor": 0.02,
         "background_e": 0.05, "texture_e": 0.02, "texture_exponent": 0.02, "clipped_sigma_px": 0.01,
         "error_over_sigma": 0.05, "clipped_error_over_sigma": 0.12, "texture_lasting_share": 0.35,
-        "window_heights": 0.02, "window_margin_px": 0.1, "no_ring_share": 0.6, "stray_share": 0.6, "stray_px": 0.4,
+        "window_heights": 0.02, "window_margin_px": 0.1, "no_ring_share": 0.3, "stray_share": 0.6, "stray_px": 0.4,
     }  # fmt: skip
     for name, relative in within.items():
         assert found[name] == pytest.approx(getattr(DRAWN, name), rel=relative), name
-    assert found["ring_least"] == DRAWN.ring_least
 
 
 def test_a_model_is_compared_with_itself_without_a_difference(material):
