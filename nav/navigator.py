@@ -1,11 +1,11 @@
 """The stages in order: gyro and frame in, belief and command out.
 
-    frame ► ring_finder (detect ► identify ► track) ► pose ► integrity ► fusion ► guidance ► command
-    IMU   ─────────────────────────────────────────────────────────────────┘         ▲
-       └► tip_motion ────────────────────────────────────────────────────────────────┘
+    frame ► frame_checks ► ring_finder (detect ► identify ► track) ► pose ► integrity ► fusion ► guidance ► command
+    IMU   ────────────────────────────────────────────────────────────────────────────────┘         ▲
+       └► tip_motion ───────────────────────────────────────────────────────────────────────────────┘
 
 Only this file knows the order. What it knows of its hardware arrives as `NavigationSheets`. Named LEDs may come in the
-place of a frame; they go the same way from the pose on.
+place of a frame; they go the same way but for the ring_finder. What is claimed for contact is the `contact_watch`'s.
 """
 
 from collections.abc import Sequence
