@@ -63,7 +63,7 @@ def shoot(speed_m_s: float, offset_m: float, direction_deg: float, nose_down_deg
         referee.watch(truth)
         if truth.latched or truth.p_DP[0] > _BEYOND_M:
             break
-    outcome = referee.judge(truth, "approach", truth.time_s)
+    outcome = referee.judge(truth, "clear", truth.time_s)  # it has passed, or is held
     if outcome is None:
         raise RuntimeError("a flight that is over has an outcome")
     return Shot(
