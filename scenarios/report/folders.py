@@ -36,7 +36,7 @@ def read_campaigns(folders: Sequence[Path]) -> list[Campaign]:
         campaigns.append(Campaign(name=str(manifest["plan"]["name"]), manifest=manifest, rows=rows))
     _require_one_code(folders, campaigns)
     _refuse_namesakes(folders, campaigns)
-    _refuse_twins(campaigns)
+    _refuse_twins(folders, campaigns)
     return campaigns
 
 
@@ -82,14 +82,14 @@ def _refuse_namesakes(folders: Sequence[Path], campaigns: Sequence[Campaign]) ->
                     raise DockairError("FOLDER...", expected=expected, got=f"{before}, another scenario by {flown}")
 
 
-def _refuse_twins(campaigns: Sequence[Campaign]) -> None:
+def _refuse_twins(folders: Sequence[Path], campaigns: Sequence[Campaign]) -> None:
     """A flight that two campaigns have flown would count twice."""
-    seen: dict[tuple[str, int], str] = {}
-    for campaign in campaigns:
+    seen: dict[tuple[str, int], Path] = {}
+    for folder, campaign in zip(folders, campaigns, strict=True):
         for row in campaign.rows:
             flight = str(row["scenario_hash"]), int(row["seed"])
             if flight in seen:
                 expected = "campaigns without a flight in common"
-                got = f"{row['scenario']}, seed {row['seed']}, in {seen[flight]} and {campaign.name}"
+                got = f"{row['scenario']}, seed {row['seed']}, in {seen[flight]} and {folder}"
                 raise DockairError("FOLDER...", expected=expected, got=got)
-            seen[flight] = campaign.name
+            seen[flight] = folder

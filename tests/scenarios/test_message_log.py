@@ -161,5 +161,5 @@ def test_a_full_disk_reaches_the_flight(hand_made, tmp_path, monkeypatch):
 
 
 def test_a_folder_without_recording_says_what_is_missing(tmp_path):
-    with pytest.raises(DockairError, match=r"messages\.parquet: expected a flight recorded with --record"):
+    with pytest.raises(DockairError, match=r"messages\.parquet: expected a flight by camera, recorded with --record"):
         next(read_messages(tmp_path))
