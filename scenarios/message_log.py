@@ -261,7 +261,8 @@ def _message_row(
 def _existing(out_dir: Path, name: str) -> Path:
     path = out_dir / name
     if not path.is_file():
-        raise DockairError(str(path), expected="a flight by camera, recorded with --record window or full", got="no such file")
+        expected = "a flight by camera, recorded with --record window or full"
+        raise DockairError(str(path), expected=expected, got="no such file")
     return path
 
 
