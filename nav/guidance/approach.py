@@ -30,9 +30,10 @@ from dockair.nav.guidance.closure import Closure
 from dockair.nav.guidance.command_limits import CommandLimits
 from dockair.nav.guidance.controller import Controller, Sight, Wanted
 from dockair.nav.guidance.dead_reckoning import DeadReckoning
+from dockair.nav.guidance.evasion import Evasion
 from dockair.nav.guidance.guidance_settings import GuidanceSettings, RelativeState
 from dockair.nav.guidance.phase_clocks import PhaseClocks
-from dockair.nav.guidance.phases import Phase, PhaseLimits, Situation, next_phase, went_aside
+from dockair.nav.guidance.phases import Phase, PhaseLimits, Situation, next_phase
 from dockair.nav.guidance.pid import Pid
 from dockair.nav.guidance.predictive import Predictive
 from dockair.nav.guidance.stabilised_axes import StabilisedAxes
@@ -71,7 +72,8 @@ class Guidance:
         self._closure = Closure(settings.closing, *speeds, self._dt)
         self._clocks = PhaseClocks(self._dt)
         self._attempts, self._pushed_in_m = 0, 0.0
-        self._light_is_red = self._evades = False
+        self._light_is_red = self._is_evading = False
+        self._evasion = Evasion(settings, self._dt)
 
     def announce(self, announcement: TankerAnnouncement) -> None:
         """Take note of what the tanker is about to do."""
@@ -98,7 +100,10 @@ class Guidance:
         bearable = self._controller.bears_the_gusts
         self._reckoning.step(middle, self._controller.steady_drift_m_s, self._u, bearable=bearable)
         self._count(state, ring, rate, lateral_m)
-        self._change_phase(self._situation(state, ring, rate, coupling, lateral_m))
+        situation = self._situation(state, ring, rate, coupling, lateral_m)
+        before = self.phase
+        self._change_phase(situation)
+        self._is_evading = self._evasion.step(before, self.phase, situation)
         asked = self._follow(ring, lateral_m) if self._follows(state, ring) else self._hold_course(ring)
         self._u, self._u_dot = self._limits.step(self._u, self._u_dot, asked, patient=self._is_patient)
         self._controller.given(self._u, self._u_dot)
@@ -215,8 +220,7 @@ class Guidance:
         transition = next_phase(self.phase, self._settings.limits, situation)
         if transition is None:
             return
-        held = self.phase in (Phase.CONTACT, Phase.HOLD)
-        self.phase, self.phase_reason, self._evades = transition.to, transition.reason, False
+        self.phase, self.phase_reason = transition.to, transition.reason
         self._clocks.begin(self.phase)
         if self.phase is Phase.APPROACH:
             self._attempts, self._passed = self._attempts + 1, None
@@ -226,7 +230,6 @@ class Guidance:
         elif self.phase in (Phase.BACK_OFF, Phase.BREAKAWAY):
             if self._passed is not None and self._closure.committed:  # else it did not mean to meet the drogue
                 self._aim = self._settings.bow_wave.learnt(self._aim, self._passed)
-            self._evades = held and went_aside(self._settings.limits, situation)
             self._closure.begin()
             self._miss.forget()
 
@@ -235,11 +238,6 @@ class Guidance:
         clear = self.phase in (Phase.BACK_OFF, Phase.BREAKAWAY) and ring[0] > self._settings.limits.off_axis_range_m
         past = self.phase is Phase.APPROACH and self._clocks.inside_s > self._settings.funnel_s
         return state.usable and not past and not self._is_evading and (self.phase in _FOLLOWING or clear)
-
-    @property
-    def _is_evading(self) -> bool:
-        """Whether it goes down now, out of the way of a hose that may whip."""
-        return self._evades and self._clocks.in_phase_s < self._settings.evade_s
 
     def _aim_now(self) -> Array:
         """(2,) off the drogue's predicted place, left and up: what is learnt applies to contact."""

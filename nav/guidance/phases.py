@@ -121,12 +121,6 @@ def _left(limits: PhaseLimits, s: Situation) -> bool:
     return off or s.track_lost_s > limits.lost_s
 
 
-def went_aside(limits: PhaseLimits, s: Situation) -> bool:
-    """Off the probe and beside its line, or out of a view that frames go on to give: its hose may whip."""
-    out_of_view = s.track_lost_s > limits.lost_s and s.frame_age_s <= 0.5 * limits.lost_s
-    return out_of_view or s.beside_m > limits.rim_m
-
-
 def _far_enough(limits: PhaseLimits, s: Situation) -> bool:
     """Seen clear, or not for long; never with the drogue seen on the probe, where nobody may wait astern of it."""
     seen = s.unusable_s == 0.0

@@ -357,6 +357,25 @@ def test_from_a_drogue_that_came_off_the_probe_sideways_it_goes_down_for_a_momen
     assert abs(down[-1]) < 1.0
 
 
+def gone_down(where_later, **later):
+    """Lowest velocity up, of a receiver that goes back by a red light from a drogue that then comes off."""
+    guidance = Guidance(SETTINGS, RATE_HZ)
+    guidance.step(state([-DEPTH_M, 0.01, 0.0]))
+    guidance.phase = Phase.CONTACT
+    guidance.signal(PodSignal(time_stamp_s=0.0, red=True))
+    for _ in range(RATE_HZ // 2):
+        up = guidance.step(state([-DEPTH_M, 0.01, 0.0])).velocity_m_s[2]
+    assert guidance.phase is Phase.BACK_OFF and abs(up) < 0.2
+    return min(guidance.step(state(where_later, **later)).velocity_m_s[2] for _ in range(3 * RATE_HZ))
+
+
+def test_from_a_drogue_that_comes_off_sideways_on_the_way_back_it_goes_down_but_not_from_one_ahead():
+    assert gone_down([-DEPTH_M, 0.4, 0.3]) < -0.9 * SETTINGS.evade_speed_m_s
+    assert gone_down([0.5, 0.4, 0.0]) > -0.5
+    lost = {"usable": False, "age_s": 1.0, "frame_age_s": 0.0}
+    assert gone_down([-DEPTH_M, 0.01, 0.0], **lost) < -0.9 * SETTINGS.evade_speed_m_s
+
+
 @pytest.mark.parametrize("phase", [Phase.CONTACT, Phase.HOLD])
 @pytest.mark.parametrize("frames_come", [True, False])
 def test_from_a_drogue_that_went_out_of_view_on_the_probe_it_goes_down_but_not_from_a_camera_that_stopped(

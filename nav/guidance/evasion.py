@@ -1,0 +1,54 @@
+"""When the receiver goes down, out of the way of a hose that may whip.
+
+A drogue that comes off the probe sideways, or out of a view that frames go on to give, is on such a hose: as the phase
+ends in which the probe was held, or on the way back from it, as long as the drogue is not seen ahead of the tip. Where
+the camera itself stopped it may still be on the probe, and the receiver goes straight back.
+
+Not modelled: where the hose is; how long it whips.
+"""
+
+from dockair.nav.guidance.guidance_settings import GuidanceSettings
+from dockair.nav.guidance.phases import Phase, PhaseLimits, Situation
+
+_ON_PROBE = (Phase.CONTACT, Phase.HOLD)
+_GOING_BACK = (Phase.DISCONNECT, Phase.BACK_OFF, Phase.BREAKAWAY)
+
+
+class Evasion:
+    """Begins once after each contact at most, and lasts for a time.
+
+    Args:
+        settings: of the guidance.
+        step_s: control period.
+    """
+
+    def __init__(self, settings: GuidanceSettings, step_s: float) -> None:
+        self._limits, self._lasts_s, self._step_s = settings.limits, settings.evade_s, step_s
+        self._was_held, self._left_s = False, 0.0
+
+    def step(self, before: Phase, phase: Phase, situation: Situation) -> bool:
+        """Advance by one control tick, and return whether to go down now.
+
+        Args:
+            before: phase until now.
+            phase: that begins or goes on.
+            situation: that it was decided on.
+        """
+        if phase not in _GOING_BACK:
+            self._was_held, self._left_s = False, 0.0
+            return False
+        ends_hold = before in _ON_PROBE
+        self._was_held = self._was_held or ends_hold
+        self._left_s = max(self._left_s - self._step_s, 0.0)
+        if self._was_held and _comes_off_aside(self._limits, situation, ends_hold=ends_hold):
+            self._was_held, self._left_s = False, self._lasts_s
+        return self._left_s > 0.0
+
+
+def _comes_off_aside(limits: PhaseLimits, s: Situation, *, ends_hold: bool) -> bool:
+    out_of_view = s.track_lost_s > limits.lost_s and s.frame_age_s <= 0.5 * limits.lost_s
+    if ends_hold:
+        return out_of_view or s.beside_m > limits.rim_m
+    if out_of_view:  # since when the receiver may have gone back a little
+        return s.ring_ahead_m < limits.come_along_m
+    return s.beside_m > limits.rim_m and s.ring_ahead_m <= 0.0
