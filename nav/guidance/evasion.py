@@ -1,8 +1,9 @@
 """When the receiver goes down, out of the way of a hose that may whip.
 
 A drogue that comes off the probe sideways, or out of a view that frames go on to give, is on such a hose: as the phase
-ends in which the probe was held, or on the way back from it, as long as the drogue is not seen ahead of the tip. Where
-the camera itself stopped it may still be on the probe, and the receiver goes straight back.
+ends in which the probe was held or, where the pod's light is red, on the way back from it, before the drogue is ahead
+of the tip. On the way back before an amber light it is pulled off, and gusts may take it aside as it goes. Where the
+camera itself stopped it may still be on the probe, and the receiver goes straight back.
 
 Not modelled: where the hose is; how long it whips.
 """
@@ -49,6 +50,8 @@ def _comes_off_aside(limits: PhaseLimits, s: Situation, *, ends_hold: bool) -> b
     out_of_view = s.track_lost_s > limits.lost_s and s.frame_age_s <= 0.5 * limits.lost_s
     if ends_hold:
         return out_of_view or s.beside_m > limits.rim_m
+    if not s.light_is_red:
+        return False
     if out_of_view:  # since when the receiver may have gone back a little
         return s.ring_ahead_m < limits.come_along_m
     return s.beside_m > limits.rim_m and s.ring_ahead_m <= 0.0

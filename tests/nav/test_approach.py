@@ -376,6 +376,16 @@ def test_from_a_drogue_that_comes_off_sideways_on_the_way_back_it_goes_down_but_
     assert gone_down([-DEPTH_M, 0.01, 0.0], **lost) < -0.9 * SETTINGS.evade_speed_m_s
 
 
+def test_from_a_drogue_that_gusts_take_aside_as_it_is_pulled_off_it_goes_straight_back():
+    guidance = Guidance(SETTINGS, RATE_HZ)
+    guidance.step(state([-DEPTH_M, 0.01, 0.0]))
+    guidance.phase = Phase.HOLD
+    while guidance.phase is Phase.HOLD:
+        guidance.step(state([-DEPTH_M, 0.01, 0.0]))
+    assert guidance.phase is Phase.DISCONNECT
+    assert min(guidance.step(state([-0.1, 0.2, 0.3])).velocity_m_s[2] for _ in range(3 * RATE_HZ)) > -0.5
+
+
 @pytest.mark.parametrize("phase", [Phase.CONTACT, Phase.HOLD])
 @pytest.mark.parametrize("frames_come", [True, False])
 def test_from_a_drogue_that_went_out_of_view_on_the_probe_it_goes_down_but_not_from_a_camera_that_stopped(
