@@ -66,10 +66,12 @@ def prepare_output_folder(folder: Path) -> Path:
 
 def keep_flight(folder: Path) -> None:
     """Put the files of the flight that is over in the place of an earlier one's; other files stay."""
+    written = {path.name for path in (folder / _UNDER_WAY).iterdir()}
     for name in FLIGHT_FILES:
-        (folder / name).unlink(missing_ok=True)
-    for path in sorted((folder / _UNDER_WAY).iterdir()):
-        path.replace(folder / path.name)
+        if name in written:
+            (folder / _UNDER_WAY / name).replace(folder / name)
+        else:
+            (folder / name).unlink(missing_ok=True)
     forget_flight(folder)
 
 

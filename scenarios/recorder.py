@@ -71,6 +71,8 @@ class Recorder:
     def finish(self, flight: "Flight", outcome: Outcome, seed: int, wall_time_s: float) -> Result:
         """Return the result; with a folder, write result.json, flight.parquet, episode.rrd and flight.png there.
 
+        The messages have to be settled.
+
         Args:
             flight: that is over.
             outcome: of the referee.
@@ -92,7 +94,6 @@ class Recorder:
             out_dir=self._folder,
         )
         if self._folder is not None:
-            self.settle()
             self._write(flight, result, self._under_way)
             keep_flight(self._folder)
             self._finished = True

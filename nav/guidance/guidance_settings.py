@@ -104,6 +104,6 @@ class RelativeState:
     w_WB_B: Array  #: (3,) the body's angular velocity [rad/s]
     sigma_lateral_m: float  #: standard deviation of p_PD_B across the probe's line
     age_s: float = 0.0  #: since the newest frame that was used
-    frame_age_s: float = 0.0  #: since the newest frame, whatever it showed
+    frame_age_s: float = float("inf")  #: since the newest frame, whatever it showed; infinite where nobody says
     dv_WP_B: Array = field(default_factory=lambda: np.full(3, np.nan))
     #: (3,) what the tip's velocity is felt to have changed by since the last control tick [m/s]; NaN: not felt
