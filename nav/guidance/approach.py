@@ -70,7 +70,7 @@ class Guidance:
         self._station = np.array([settings.stand_off_m, 0.0, 0.0])
         speeds = settings.closure_speed_m_s, settings.closure_acceleration_m_s2
         self._closure = Closure(settings.closing, *speeds, self._dt)
-        self._clocks = PhaseClocks(self._dt)
+        self._clocks = PhaseClocks(self._dt, settings.limits)
         self._attempts, self._pushed_in_m = 0, 0.0
         self._light_is_red = self._is_evading = False
         self._evasion = Evasion(settings, self._dt)
@@ -144,8 +144,15 @@ class Guidance:
 
     def _count(self, state: RelativeState, ring: Array, rate: Array, lateral_m: float) -> None:
         """Count time and way in the phase that is flown."""
-        ring_ahead_m, steady = float(ring[0]), self._is_steady(state, float(ring[0]))
-        self._clocks.step(self.phase, state, ring_ahead_m, steady=steady, light_is_red=self._light_is_red)
+        ring_ahead_m = float(ring[0])
+        self._clocks.step(
+            self.phase,
+            state,
+            ring_ahead_m,
+            steady=self._is_steady(ring_ahead_m),
+            sure=state.usable and state.sigma_lateral_m < self._settings.limits.steady_sigma_m,
+            light_is_red=self._light_is_red,
+        )
         if self.phase is Phase.APPROACH:
             self._close(state, ring_ahead_m, -float(rate[0]))
         if ring_ahead_m > 0.0:
@@ -155,14 +162,12 @@ class Guidance:
         if self.phase in _TOUCHING:
             self._pushed_in_m += (self._u[0] - self._controller.steady_drift_m_s[0]) * self._dt
 
-    def _is_steady(self, state: RelativeState, ring_ahead_m: float) -> bool:
-        """Whether the receiver is where an approach may begin, and knows it."""
+    def _is_steady(self, ring_ahead_m: float) -> bool:
+        """Whether the receiver is where an approach may begin, as far as it knows."""
         limits = self._settings.limits
         return (
             self.phase is Phase.PRE_CONTACT
-            and state.usable
             and abs(ring_ahead_m - self._settings.stand_off_m) < limits.steady_along_m
-            and state.sigma_lateral_m < limits.steady_sigma_m
             and self._controller.bears_the_gusts
         )
 
@@ -193,6 +198,7 @@ class Guidance:
             time_s=clocks.time_s,
             in_phase_s=clocks.in_phase_s,
             steady_s=clocks.steady_s,
+            unsure_s=clocks.unsure_s,
             spread_m=self._miss.spread_m,
             radius_m=self._late * self._settings.closing.hopeful * self._settings.limits.capture_radius_m,
             waiting_s=self._closure.waiting_s,
@@ -208,6 +214,7 @@ class Guidance:
             lateral_m=lateral_m,
             entered_m=self._entered_m,
             frame_age_s=state.frame_age_s,
+            frames_stopped=clocks.frames_stopped,
             closing_m_s=-float(rate[0]),
             committed=self._closure.committed,
             pushed_in_m=self._pushed_in_m,

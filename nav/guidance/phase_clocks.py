@@ -1,7 +1,9 @@
 """For how long what decides the next phase has lasted, s."""
 
+import math
+
 from dockair.nav.guidance.guidance_settings import RelativeState
-from dockair.nav.guidance.phases import Phase
+from dockair.nav.guidance.phases import Phase, PhaseLimits
 
 
 class PhaseClocks:
@@ -9,20 +11,23 @@ class PhaseClocks:
 
     Args:
         step_s: control period.
+        limits: from when on a drogue is lost, and frames have stopped.
     """
 
-    def __init__(self, step_s: float) -> None:
-        self._step_s = step_s
-        self._has_seen = False
+    def __init__(self, step_s: float, limits: PhaseLimits) -> None:
+        self._step_s, self._limits = step_s, limits
+        self._has_seen, self._age_s = False, math.inf
         self.time_s = 0.0  #: since the guidance began
         self.in_phase_s = 0.0  #: since the phase began
-        self.steady_s = 0.0  #: steady astern of the drogue
+        self.steady_s = 0.0  #: steady astern of the drogue; stands still while its place is not known well
+        self.unsure_s = 0.0  #: the drogue's place has not been known well
         self.patient_s = 0.0  #: waiting for a calm moment, astern or in the approach
         self.unusable_s = 0.0  #: the relative state has been unusable, once it has been usable
         self.track_lost_s = 0.0  #: the same, or since the newest frame that was used, whichever is longer
         self.blind_s = 0.0  #: unusable beyond that for which it has been usable
         self.doubtful_s = 0.0  #: the integrity monitor has not claimed that contact may be flown
         self.inside_s = 0.0  #: the tip has been past the ring's plane
+        self.frames_stopped = False  #: and none that has come since was used
 
     def begin(self, phase: Phase) -> None:
         """Begin a phase."""
@@ -31,7 +36,7 @@ class PhaseClocks:
             self.inside_s = 0.0
 
     def step(
-        self, phase: Phase, state: RelativeState, ring_ahead_m: float, *, steady: bool, light_is_red: bool
+        self, phase: Phase, state: RelativeState, ring_ahead_m: float, *, steady: bool, sure: bool, light_is_red: bool
     ) -> None:
         """Advance by one control tick.
 
@@ -39,14 +44,19 @@ class PhaseClocks:
             phase: that is flown.
             state: relative state now.
             ring_ahead_m: ring centre ahead of the probe's tip.
-            steady: whether the receiver is steady astern of the drogue.
+            steady: whether the receiver is steady astern of the drogue, as far as it knows.
+            sure: whether it knows the drogue's place well.
             light_is_red: of the pod.
         """
         dt = self._step_s
         self.time_s += dt
         self.in_phase_s += dt
         self._see(state)
-        self.steady_s = self.steady_s + dt if steady else 0.0
+        self.unsure_s = 0.0 if sure else self.unsure_s + dt
+        if not steady or self.unsure_s > self._limits.lost_s:
+            self.steady_s = 0.0
+        elif sure:
+            self.steady_s += dt
         if phase not in (Phase.PRE_CONTACT, Phase.APPROACH):
             self.patient_s = 0.0
         elif not light_is_red:  # who waits for amber has not waited for a calm moment
@@ -60,4 +70,7 @@ class PhaseClocks:
         self.unusable_s = self.unusable_s + dt if self._has_seen and not state.usable else 0.0
         self.track_lost_s = max(self.unusable_s, state.age_s if self._has_seen else 0.0)
         self.blind_s = max(self.blind_s + (dt if self.unusable_s > 0.0 else -dt), 0.0)
+        stop = self._limits.frames_stop_s < state.frame_age_s < math.inf  # infinite where nobody says
+        self.frames_stopped = stop or (self.frames_stopped and state.age_s >= self._age_s)
+        self._age_s = state.age_s
         self.doubtful_s = 0.0 if state.contact_usable else self.doubtful_s + dt

@@ -42,6 +42,7 @@ class PhaseLimits:
     inside_s: float = 1.0  # assumed: the way from the ring to the coupling takes 0.2 s
     coupling_reached_m: float = 0.05  # assumed: the coupling takes the tip within 0.03 m, the range errs by 0.02 m
     come_along_m: float = 0.2  # assumed: a drogue farther ahead of the tip than this, or behind it, is not held by it
+    frames_stop_s: float = 0.1  # assumed: camera out; the belief of a drogue that is pushed runs off by 0.2 m in 0.17 s
     take_in_m: float = 1.5  # inside the refuelling range 0.5-6 m (KDC-10 procedures)
     taken_in: float = 0.9  # of that way when holding begins: the receiver comes to rest on the remaining tenth
     hold_s: float = 5.0  # assumed: long enough to see that the drogue stays on the probe
@@ -68,7 +69,8 @@ class Situation:
 
     time_s: float  #: since the guidance began
     in_phase_s: float  #: since the phase began
-    steady_s: float  #: time for which the receiver has been steady astern of the drogue
+    steady_s: float  #: time for which the receiver has been steady astern of the drogue, but for moments of not knowing
+    unsure_s: float  #: time for which it has not known the drogue's place well
     spread_m: float  #: root mean square of the error across over the last swing
     radius_m: float  #: what that may be, after so much waiting
     waiting_s: float  #: time for which the approach has stood still for want of a good moment
@@ -84,6 +86,7 @@ class Situation:
     lateral_m: float  #: ring centre off the probe's line
     entered_m: float  #: the same where the tip came past the ring's plane, 0 before it
     frame_age_s: float  #: since the newest frame, whatever it showed
+    frames_stopped: bool  #: for `frames_stop_s` or longer, and none that has come since was used
     closing_m_s: float  #: rate at which `ring_ahead_m` shrinks
     committed: bool  #: too near to be called back
     pushed_in_m: float  #: way flown toward the tanker since the coupling was reached
@@ -117,8 +120,9 @@ def _beside(limits: PhaseLimits, s: Situation) -> bool:
 
 
 def _left(limits: PhaseLimits, s: Situation) -> bool:
+    """Off the probe, or lost. That the probe pushes it only frames tell; without them the belief passes through it."""
     off = abs(s.ahead_m) > limits.come_along_m or s.beside_m > limits.rim_m
-    return off or s.track_lost_s > limits.lost_s
+    return (off and not s.frames_stopped) or s.track_lost_s > limits.lost_s
 
 
 def _far_enough(limits: PhaseLimits, s: Situation) -> bool:
@@ -166,6 +170,7 @@ TRANSITIONS: dict[Phase, tuple[Transition, ...]] = {
             "steady",
             lambda limits, s: (
                 s.steady_s > 0.0  # now, if for no longer
+                and s.unsure_s == 0.0
                 and s.steady_s >= limits.stabilise_s
                 and s.spread_m <= s.radius_m
                 and not s.light_is_red

@@ -405,6 +405,19 @@ def test_from_a_drogue_that_went_out_of_view_on_the_probe_it_goes_down_but_not_f
     assert frames_come or min(down) > -0.5
 
 
+@pytest.mark.parametrize(("frames_come", "following"), [(True, Phase.BACK_OFF), (False, Phase.CONTACT)])
+def test_a_contact_that_falls_into_a_drop_out_of_the_camera_is_no_miss(frames_come, following):
+    """The belief alone, which knows of no probe that pushes, has the tip pass through the drogue."""
+    guidance = Guidance(SETTINGS, RATE_HZ)
+    guidance.step(state([-DEPTH_M, 0.0, 0.0]))
+    guidance.phase = Phase.CONTACT
+    for k in range(int(0.3 * RATE_HZ)):
+        age_s = k / RATE_HZ
+        where = [-DEPTH_M - SETTINGS.closure_speed_m_s * age_s, 0.0, 0.0]
+        guidance.step(state(where, age_s=age_s, frame_age_s=0.0 if frames_come else age_s))
+    assert guidance.phase is following
+
+
 @pytest.mark.parametrize("phase", [Phase.DISCONNECT, Phase.BACK_OFF, Phase.BREAKAWAY])
 def test_who_sees_the_drogue_stay_on_the_probe_goes_on_backing_off_as_slowly_as_before(phase):
     guidance = Guidance(SETTINGS, RATE_HZ)

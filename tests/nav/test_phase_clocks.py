@@ -7,9 +7,10 @@ import pytest
 
 from dockair.nav.guidance.guidance_settings import RelativeState
 from dockair.nav.guidance.phase_clocks import PhaseClocks
-from dockair.nav.guidance.phases import Phase
+from dockair.nav.guidance.phases import Phase, PhaseLimits
 
 STEP_S = 0.5  # exact in binary
+LIMITS = PhaseLimits(lost_s=1.0, frames_stop_s=0.75)
 SEEN = RelativeState(
     p_PD_B=np.array([4.0, 0.0, 0.0]),
     rate_PD_B=np.zeros(3),
@@ -32,25 +33,26 @@ def after(clocks, *steps):
             state,
             keys.get("ring_ahead_m", 4.0),
             steady=keys.get("steady", False),
+            sure=keys.get("sure", True),
             light_is_red=keys.get("light_is_red", False),
         )
     return clocks
 
 
 def test_a_drogue_never_seen_is_not_lost():
-    clocks = after(PhaseClocks(STEP_S), *[(Phase.JOIN_UP, UNSEEN, {})] * 4)
+    clocks = after(PhaseClocks(STEP_S, LIMITS), *[(Phase.JOIN_UP, UNSEEN, {})] * 4)
     assert clocks.unusable_s == clocks.track_lost_s == clocks.blind_s == 0.0
     assert clocks.doubtful_s == clocks.time_s == clocks.in_phase_s == 2.0
 
 
 def test_a_drogue_out_of_view_is_lost_since_its_newest_frame():
     old = dataclasses.replace(UNSEEN, age_s=3.0)
-    clocks = after(PhaseClocks(STEP_S), (Phase.APPROACH, SEEN, {}), (Phase.APPROACH, old, {}))
+    clocks = after(PhaseClocks(STEP_S, LIMITS), (Phase.APPROACH, SEEN, {}), (Phase.APPROACH, old, {}))
     assert clocks.unusable_s == 0.5 and clocks.track_lost_s == 3.0
 
 
 def test_a_glimpse_ends_what_is_lost_and_takes_back_a_tick_of_what_is_blind():
-    clocks = after(PhaseClocks(STEP_S), (Phase.APPROACH, SEEN, {}), *[(Phase.APPROACH, UNSEEN, {})] * 4)
+    clocks = after(PhaseClocks(STEP_S, LIMITS), (Phase.APPROACH, SEEN, {}), *[(Phase.APPROACH, UNSEEN, {})] * 4)
     assert clocks.blind_s == clocks.unusable_s == 2.0
     after(clocks, (Phase.APPROACH, SEEN, {}))
     assert clocks.unusable_s == clocks.track_lost_s == clocks.doubtful_s == 0.0
@@ -59,7 +61,7 @@ def test_a_glimpse_ends_what_is_lost_and_takes_back_a_tick_of_what_is_blind():
 
 def test_patience_lasts_through_astern_and_approach_but_not_in_front_of_a_red_light():
     astern, closing = (Phase.PRE_CONTACT, SEEN, {}), (Phase.APPROACH, SEEN, {})
-    clocks = after(PhaseClocks(STEP_S), astern, closing, (Phase.PRE_CONTACT, SEEN, {"light_is_red": True}))
+    clocks = after(PhaseClocks(STEP_S, LIMITS), astern, closing, (Phase.PRE_CONTACT, SEEN, {"light_is_red": True}))
     assert clocks.patient_s == 1.0
     after(clocks, (Phase.BACK_OFF, SEEN, {}))
     assert clocks.patient_s == 0.0
@@ -67,13 +69,42 @@ def test_patience_lasts_through_astern_and_approach_but_not_in_front_of_a_red_li
 
 def test_steadiness_begins_anew_where_it_is_broken():
     still, moving = (Phase.PRE_CONTACT, SEEN, {"steady": True}), (Phase.PRE_CONTACT, SEEN, {})
-    assert after(PhaseClocks(STEP_S), still, still).steady_s == 1.0
-    assert after(PhaseClocks(STEP_S), still, still, moving, still).steady_s == 0.5
+    assert after(PhaseClocks(STEP_S, LIMITS), still, still).steady_s == 1.0
+    assert after(PhaseClocks(STEP_S, LIMITS), still, still, moving, still).steady_s == 0.5
+
+
+def test_a_moment_of_not_knowing_the_place_stops_steadiness_and_a_longer_one_ends_it():
+    """A camera that drops out for 0.3 s every 2.5 s would keep the receiver astern for ever."""
+    still = (Phase.PRE_CONTACT, SEEN, {"steady": True})
+    unsure, unsure_moving = (still[0], SEEN, {"steady": True, "sure": False}), (still[0], SEEN, {"sure": False})
+    clocks = after(PhaseClocks(STEP_S, LIMITS), still, still, unsure, unsure)
+    assert clocks.steady_s == 1.0 and clocks.unsure_s == 1.0
+    after(clocks, still)
+    assert clocks.steady_s == 1.5 and clocks.unsure_s == 0.0
+    assert after(clocks, unsure, unsure, unsure).steady_s == 0.0
+    assert after(PhaseClocks(STEP_S, LIMITS), still, still, unsure_moving).steady_s == 0.0
+
+
+def test_frames_have_stopped_until_one_is_used_again():
+    def camera(frame_age_s, age_s):
+        return Phase.HOLD, dataclasses.replace(SEEN, age_s=age_s, frame_age_s=frame_age_s), {}
+
+    clocks = after(PhaseClocks(STEP_S, LIMITS), camera(0.0, 0.2), camera(0.5, 0.7))
+    assert not clocks.frames_stopped
+    assert after(clocks, camera(1.0, 1.2)).frames_stopped
+    assert after(clocks, camera(0.0, 1.7)).frames_stopped  # it came and was not used
+    assert not after(clocks, camera(0.0, 0.2)).frames_stopped
+
+
+def test_frames_that_come_and_are_not_used_or_that_nobody_counts_have_not_stopped():
+    for frame_age_s in (0.0, np.inf):
+        unused = [(Phase.HOLD, dataclasses.replace(SEEN, age_s=0.5 * k, frame_age_s=frame_age_s), {}) for k in range(6)]
+        assert not after(PhaseClocks(STEP_S, LIMITS), *unused).frames_stopped
 
 
 @pytest.mark.parametrize(("to", "inside_s"), [(Phase.APPROACH, 0.0), (Phase.CONTACT, 1.0)])
 def test_a_phase_begins_at_zero_and_an_approach_outside(to, inside_s):
-    clocks = after(PhaseClocks(STEP_S), *[(Phase.APPROACH, SEEN, {"ring_ahead_m": 0.0})] * 2)
+    clocks = after(PhaseClocks(STEP_S, LIMITS), *[(Phase.APPROACH, SEEN, {"ring_ahead_m": 0.0})] * 2)
     assert clocks.inside_s == clocks.in_phase_s == 1.0
     clocks.begin(to)
     assert clocks.in_phase_s == 0.0 and clocks.inside_s == inside_s and clocks.time_s == 1.0
@@ -81,4 +112,4 @@ def test_a_phase_begins_at_zero_and_an_approach_outside(to, inside_s):
 
 def test_the_time_past_the_ring_s_plane_ends_before_it():
     inside, outside = ((Phase.APPROACH, SEEN, {"ring_ahead_m": x}) for x in (-0.1, 0.1))
-    assert after(PhaseClocks(STEP_S), inside, outside).inside_s == 0.0
+    assert after(PhaseClocks(STEP_S, LIMITS), inside, outside).inside_s == 0.0

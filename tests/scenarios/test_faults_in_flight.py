@@ -3,7 +3,7 @@
 import pytest
 
 from dockair.messages import CameraFrame, ImuSample
-from dockair.scenarios.loop import Flight
+from dockair.scenarios.loop import Flight, fly
 from dockair.scenarios.schema import load_scenario
 
 FAULTS = [
@@ -63,6 +63,18 @@ def test_the_pods_red_light_calls_an_approach_back_and_lets_none_begin(start_s, 
     finally:
         flight.close()
     assert [reason for reason in found if reason in ("steady", "red light", "coupling reached")] == reasons
+
+
+@pytest.mark.parametrize("name", ["camera_dropouts", "camera_hangs"])
+def test_contact_that_falls_into_a_gap_of_the_camera_is_made_at_the_first_attempt(name):
+    """Not by waiting until the last gap is over, 29.8 s, nor given up as the belief runs off through the drogue."""
+    scenario = load_scenario(name, {"camera.sensing": "measurements"})
+    result = fly(scenario, 9)  # contact at 9.56 s; no frame from 9.5 to 9.8 s
+    begun = {entry.phase: entry.begun_s for entry in result.timeline}
+    gaps = [(fault.start_s, fault.stop_s) for fault in scenario.faults]
+    assert any(start_s < begun["contact"] < stop_s for start_s, stop_s in gaps)
+    assert (result.outcome, result.attempts, result.unsafe) == ("contact", 1, ())
+    assert result.contact.radial_offset_m < 0.05
 
 
 def test_reel_that_the_scenario_kills_holds_the_hose_from_then_on():
