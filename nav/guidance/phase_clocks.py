@@ -53,7 +53,9 @@ class PhaseClocks:
         self.in_phase_s += dt
         self._see(state)
         self.unsure_s = 0.0 if sure else self.unsure_s + dt
-        if not steady or self.unsure_s > self._limits.lost_s:
+        # What a gap costs here it would cost in the basket, too, from where nobody can be called back.
+        claim_lost_in_gap = self.frames_stopped and not state.contact_usable
+        if not steady or claim_lost_in_gap or self.unsure_s > self._limits.lost_s:
             self.steady_s = 0.0
         elif sure:
             self.steady_s += dt

@@ -85,6 +85,16 @@ def test_a_moment_of_not_knowing_the_place_stops_steadiness_and_a_longer_one_end
     assert after(PhaseClocks(STEP_S, LIMITS), still, still, unsure_moving).steady_s == 0.0
 
 
+def test_a_gap_that_costs_the_claim_of_contact_ends_steadiness():
+    """In the basket it would cost it, too; a frame that is refused does not, for the next is there at once."""
+    still = (Phase.PRE_CONTACT, SEEN, {"steady": True})
+    gap, refused = (
+        (still[0], dataclasses.replace(SEEN, contact_usable=False, frame_age_s=s), {"steady": True}) for s in (1.0, 0.0)
+    )
+    assert after(PhaseClocks(STEP_S, LIMITS), still, still, refused).steady_s == 1.5
+    assert after(PhaseClocks(STEP_S, LIMITS), still, still, gap).steady_s == 0.0
+
+
 def test_frames_have_stopped_until_one_is_used_again():
     def camera(frame_age_s, age_s):
         return Phase.HOLD, dataclasses.replace(SEEN, age_s=age_s, frame_age_s=frame_age_s), {}
