@@ -1,6 +1,6 @@
 """What the claim of contact is worth while the camera is out, in gusts of three strengths.
 
-`camera_dropouts` flown on measured LEDs from station to the basket: 0.3 s without a frame every 2.5 s. At every tick of
+`camera_dropouts` flown on measured LEDs from station to the basket: 0.3 s without a frame every 2.2 s. At every tick of
 the last metres, by the age of the last frame: how often contact is claimed, how far the belief is off across the
 camera's axis and along it, and how often it is off by more than an alert limit while contact is claimed.
 """
