@@ -74,7 +74,9 @@ class RelativeFilter:
         self._refusals_until_doubt = refusals_until_doubt(self._settings, sheets.camera_rate_hz)
         self._motion = motion_of(self._settings, sheets.gyro)
         self._record = ImuRecord(sheets.mounting, sheets.gyro, self._settings.saturated_share)
-        self._imu_stamps, self._frame_stamps = Stamps(self._settings.leap_s), Stamps(self._settings.leap_s)
+        slowest_s = 2.0 / sheets.control_rate_hz  # two periods of an IMU that is no faster than control
+        self._imu_stamps = Stamps(max(self._settings.imu_leap_s, slowest_s))
+        self._frame_stamps = Stamps(self._settings.leap_s)
         self._buffer = BeliefBuffer(
             self._record,
             self._motion,

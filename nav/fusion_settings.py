@@ -70,7 +70,8 @@ class FusionSettings:
     doubt_position_sigma_m: float = 0.08
     doubt_attitude_sigma_rad: float = 0.1
     buffer_s: float = 0.45  # how late a frame may be; the belief is asked what it foretold 0.3 s before a late one
-    leap_s: float = 1.0  # how far ahead of all others a stamp is believed without a second one
+    leap_s: float = 1.0  # how far ahead of all others a frame's stamp is believed without a second one
+    imu_leap_s: float = 0.1  # the same of a sample: it sets the time that all else is held against
     node_interval_s: float = 0.02  # between beliefs kept to begin at when a frame is late; a frame's period
     longest_gap_s: float = 0.02  # between samples of acceleration: a receiver does not change it much sooner
     longest_step_s: float = 0.01  # of Eq. (2) of `belief_motion`: the swing's period is 300 of them

@@ -760,6 +760,21 @@ def test_leds_with_a_stamp_that_leaps_are_no_frame(leap_s, count):
     assert max(asked) <= solution.time_stamp_s
 
 
+@pytest.mark.parametrize("leap_s", [0.15, 0.9, 3.0, 3600.0, np.nan, -0.5])
+def test_a_sample_with_a_stamp_that_leaps_is_as_if_it_had_not_come(leap_s):
+    """It would set the navigation's clock forward, and all that comes until then would be too old."""
+    sky = Sky(None, drifting_from(0.5))
+    twin = Navigator(sky.sheets)
+    for tick in range(1, 200):
+        imu = sky.imu()
+        seen = named(sky, range(8), imu[-1].time_stamp_s) if tick % 2 == 0 else None
+        sent, whole = imu, imu
+        if tick == 100:
+            stamp_s = imu[-1].time_stamp_s + leap_s
+            sent, whole = (*imu[:-1], replace(imu[-1], time_stamp_s=stamp_s)), imu[:-1]
+        assert_same(sky.navigator.step(sent, seen), twin.step(whole, seen))
+
+
 @pytest.mark.parametrize("leap_s", [0.3, 3600.0, -0.5])
 def test_a_picture_with_a_stamp_that_leaps_is_no_frame(render, leap_s):
     sky, twin = (Sky(render, still, seed=5) for _ in range(2))
