@@ -26,7 +26,7 @@ looked for anywhere, as if nothing were known; its numbers are right up to the s
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -38,12 +38,17 @@ from dockair.nav.fusion import RelativeFilter
 from dockair.nav.identify.code import CodeSettings, code_of
 from dockair.nav.identify.perspective import SLOTS
 from dockair.nav.identify.prior import ring_from_leds
-from dockair.nav.identify.ring import Identification, IdentificationStatus, identify
+from dockair.nav.identify.result import Identification, IdentificationStatus, nothing
+from dockair.nav.identify.ring import IdentifySettings, identify
 from dockair.nav.image.detect import Blobs, DetectSettings, detect
 from dockair.nav.track import RingTracker, TrackSettings
 from dockair.rotations import Array
 
 _NONE: NDArray[np.int64] = np.empty(0, np.int64)
+_BY_SHEET = IdentifySettings()
+#: LEDs where the sheet has them, and off by twice its tolerance. Near the basket one that is off by four sigma is left
+#: out of its ring, and what makes it an outlier makes impostors of the others.
+_PLACED = (_BY_SHEET, replace(_BY_SHEET, ring_sigma=2.0 * _BY_SHEET.ring_sigma))
 _NEIGHBOURHOOD_RADII, _UNSEEN = 1.6, 0.2  # of `chance`: where clutter is counted, and blobs more than were seen
 
 
@@ -182,10 +187,16 @@ class RingFinder:
         return window if rows > 0 and columns > 0 and window != camera.full_window else None
 
     def _identified(self, blobs: Blobs, **expected: Any) -> Identification:
-        return identify(
-            blobs.centroids_px, camera=self._sheets.camera, ring=self._sheets.ring, code=self._code,
-            brightness=blobs.flux, **expected,
-        )  # fmt: skip
+        """The ring by LEDs in their places, or else, where that leaves doubt, by LEDs farther off them."""
+        found = nothing(IdentificationStatus.NOT_FOUND)
+        for settings in _PLACED:
+            found = identify(
+                blobs.centroids_px, settings=settings, camera=self._sheets.camera, ring=self._sheets.ring,
+                code=self._code, brightness=blobs.flux, **expected,
+            )  # fmt: skip
+            if found.status is not IdentificationStatus.AMBIGUOUS:
+                return found
+        return found
 
     def _look_for_roll(self, blobs: Blobs, expected_rad: float, time_s: float) -> float:
         """Roll of the ring where the belief has it, however it is rolled; the expected one if there is no ring.

@@ -738,6 +738,21 @@ def assert_same(one, other):
     assert (one.valid, one.contact_usable, one.window) == (other.valid, other.contact_usable, other.window)
 
 
+@pytest.mark.parametrize("seed", [0, 14])
+def test_in_the_basket_a_ring_of_leds_off_by_twice_their_tolerance_is_found(render, seed):
+    """By the sheet some are outliers there (1 mm is 1.2 px), which makes impostors of the others.
+
+    A drogue that the coupling had stopped was then not found again until the receiver had gone back for 7 s.
+    """
+    where = np.array([-0.3, 0.02, -0.01])
+    sky = Sky(render, lambda _time_s: where, seed=2)
+    sky.sheets = replace(sky.sheets, start=replace(sky.sheets.start, p_PD_B=where, sigma_p_m=np.full(3, 0.05)))
+    sky.navigator = Navigator(sky.sheets)
+    sky.misplaced_D[:, 1:] = 6e-4 * np.random.default_rng(seed).standard_normal((8, 2))
+    sky.run(0.1)
+    assert {(sky.step(), sky.navigator._finder.status)[1] for _ in range(50)} == {"ring found"}
+
+
 @pytest.mark.parametrize("count", [3, 8])
 @pytest.mark.parametrize("leap_s", [0.3, 0.6, 3.0, 100.0, 3600.0, np.nan, -0.5, -3600.0])
 def test_leds_with_a_stamp_that_leaps_are_no_frame(leap_s, count):
