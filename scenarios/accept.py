@@ -4,6 +4,7 @@ Of a campaign's rows (one a flight: dockair/scenarios/campaign) a flight that cr
 Where no rate is asked for, every flight has to show what one flight must.
 """
 
+import json
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -20,6 +21,7 @@ OutcomeName = Literal["contact", "miss", "rim_strike", "abort", "collision", "ti
 
 Row = Mapping[str, Any]
 _Rate = Annotated[float | None, Field(ge=0.0, le=1.0)]
+_REFUELLED = "refuelled"  # the guidance's reason to end a hold
 _UNTOUCHED = ("abort", "miss")  # outcomes of a flight that ended clear without having touched anything
 
 
@@ -33,6 +35,7 @@ class Accept(Table):
     #: Part of a campaign's flights whose first attempt ended in a contact inside the limits.
     first_attempt_rate_min: _Rate = None
     success_rate_min: _Rate = None  #: part of the flights with such a contact in any of their attempts
+    refuelled_rate_min: _Rate = None  #: part of the flights that held the probe until they had refuelled
     #: Part of the flights that ended in such a contact, or went away without touching, with nothing unsafe.
     clean_rate_min: _Rate = None
     closure_rate_min: _Rate = None  #: part of the contacts whose speed lies between the two closure speeds
@@ -147,15 +150,24 @@ def is_clean(row: Row) -> bool:
     return not row["error"] and not row["unsafe"] and bool(row["success"] or row["outcome"] in _UNTOUCHED)
 
 
+def has_refuelled(row: Row) -> bool:
+    """Return whether a hold was flown to its end, and fuel came: of a contact that is called back neither is so."""
+    if row["error"] or not (row.get("fuel_kg") or 0.0) > 0.0:
+        return False
+    return any(entry["reason"] == _REFUELLED for entry in json.loads(row.get("timeline") or "[]") or ())
+
+
 #: Key -> what it counts, and whether a row counts.
 _RATES: dict[str, tuple[str, Callable[[Row], bool]]] = {
     "first_attempt_rate_min": ("contacts at the first attempt", lambda row: not row["error"] and row["first_attempt"]),
     "success_rate_min": ("contacts in any attempt", lambda row: not row["error"] and row["success"]),
+    "refuelled_rate_min": ("refuelled flights", has_refuelled),
     "clean_rate_min": ("contacts or clean departures", is_clean),
 }
 _IN_WORDS = {
     "first_attempt_rate_min": "at the first attempt",
     "success_rate_min": "within all",
+    "refuelled_rate_min": "refuelled",
     "clean_rate_min": "contact or clean departure",
 }
 

@@ -120,7 +120,8 @@ def show_campaign(table: Mapping[str, Any]) -> None:
     """Print what `dockair campaign --json` would."""
     console = plain_console()
     shown = Table(box=None, padding=(0, 1))
-    for heading in ("scenario", "sensing", "first attempt", "success", "offset", "closing", "unsafe", "errors"):
+    shares = {"first attempt": "first_attempt", "success": "success", "refuelled": "refuelled"}
+    for heading in ("scenario", "sensing", *shares, "offset", "closing", "unsafe", "errors"):
         shown.add_column(heading, no_wrap=True)
     crew = _crew_columns(table["groups"])
     for name in crew:
@@ -132,7 +133,7 @@ def show_campaign(table: Mapping[str, Any]) -> None:
         offset, speed = group["radial_offset_m"], group["closure_speed_m_s"]
         shown.add_row(
             *(group["scenario"], group["sensing"]),
-            *(_share(group[name], group["flights"]) for name in ("first_attempt", "success")),
+            *(_share(group[name], group["flights"]) for name in shares.values()),
             f"{offset['median']:.3f} m" if offset else "",
             f"{speed['min']:.2f}-{speed['max']:.2f} m/s" if speed else "",
             *(str(group[name]) if group[name] else "" for name in ("unsafe", "errors")),

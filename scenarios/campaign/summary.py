@@ -38,6 +38,7 @@ def _group(group: Group, claimed: Accept | None) -> dict[str, Any]:
         "independent": group.independent,
         "first_attempt": _share(group.first_attempt),
         "success": _share(group.success),
+        "refuelled": _share(group.refuelled),
         "outcomes": dict(Counter(row["outcome"] for row in group.rows).most_common()),
         "causes": dict(group.causes),
         "causes_of_flights_without_attempt": dict(group.causes_without_attempt),

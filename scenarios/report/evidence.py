@@ -50,6 +50,7 @@ def _group(group: Group, groups: Sequence[Group]) -> dict[str, Any]:
         "errors": len(group.failed_to_fly),
         "first_attempt": _share(group.first_attempt),
         "success": _share(group.success),
+        "refuelled": _share(group.refuelled),
         "inside_capture_radius": _share(group.inside_capture_radius),
         "closing_1_0_to_1_5_m_s": _share(group.in_closing_band),
         "radial_offset_median_m": _quantile(group.offsets_m, 0.5),

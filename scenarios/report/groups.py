@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from dockair.rotations import Array
+from dockair.scenarios.accept import has_refuelled
 from dockair.scenarios.campaign.row import SET
 from dockair.scenarios.crew_tables import OUR_NAVIGATOR
 from dockair.scenarios.statistics import wilson_interval
@@ -146,6 +147,11 @@ class Group:
     def success(self) -> Share:
         """Contact inside the limits at any attempt."""
         return Share(sum(bool(row["success"]) for row in self.flown), len(self.rows))
+
+    @property
+    def refuelled(self) -> Share:
+        """Flights that held the probe in the coupling until they had refuelled."""
+        return Share(sum(map(has_refuelled, self.rows)), len(self.rows))
 
     @cached_property
     def contacts(self) -> list[Row]:

@@ -3,7 +3,7 @@
 import pytest
 
 from dockair.errors import DockairError
-from dockair.scenarios.accept import Accept, is_clean
+from dockair.scenarios.accept import Accept, has_refuelled, is_clean
 
 
 def row(seed=0, **changes):
@@ -32,6 +32,23 @@ def test_a_contact_in_a_later_attempt_counts_for_the_one_rate_and_not_for_the_ot
     later = rows(1, 1, {"first_attempt": False})
     accept = Accept(first_attempt_rate_min=1.0, success_rate_min=1.0)
     assert accept.judge(later) == ["contacts at the first attempt 1 of 2, wanted at least 100 %"]
+
+
+@pytest.mark.parametrize(
+    ("change", "refuelled"),
+    [
+        ({"fuel_kg": 116.0, "timeline": '[{"phase": "disconnect", "begun_s": 16.8, "reason": "refuelled"}]'}, True),
+        ({"fuel_kg": 0.0, "timeline": '[{"phase": "disconnect", "begun_s": 16.8, "reason": "refuelled"}]'}, False),
+        ({"fuel_kg": 69.0, "timeline": '[{"phase": "back_off", "begun_s": 10.7, "reason": "not come along"}]'}, False),
+        ({"fuel_kg": None, "timeline": "[]"}, False),
+        ({}, False),  # a table of before there was a time line
+        (CRASHED, False),
+    ],
+)
+def test_who_docks_and_is_called_back_has_not_refuelled(change, refuelled):
+    assert has_refuelled(row(**change)) == refuelled
+    lines = Accept(success_rate_min=0.0, refuelled_rate_min=1.0).judge([row(**change)])
+    assert lines == ([] if refuelled else ["refuelled flights 0 of 1, wanted at least 100 %"])
 
 
 def test_a_flight_that_crashed_counts_as_flown_without_success():

@@ -29,6 +29,7 @@ def test_whoever_is_to_dock_is_held_to_the_limits_of_service_practice(name):
     accept = load_scenario(name).accept
     assert (accept.outcome, accept.radial_offset_max_m) == ("contact", 0.15)
     assert (accept.closure_speed_min_m_s, accept.closure_speed_max_m_s, accept.closure_rate_min) == (1.0, 1.5, 0.95)
+    assert accept.refuelled_rate_min == (None if name == "dead_reel_unnoticed" else 0.95)
     assert accept.first_attempt_rate_min >= 0.7 and accept.success_rate_min >= max(accept.first_attempt_rate_min, 0.95)
 
 
