@@ -32,6 +32,7 @@ _FIGURES = {
     "contact.angle_deg": ("probe against drogue axis", "deg", 1),
     "hold.duration_s": ("held for", "s", 1),
     "hold.take_in_max_m": ("hose taken in", "m", 2),
+    "fuel_kg": ("fuel taken on", "kg", 0),
     "nav.range_rmse_m": ("navigation, range error (RMS)", "m", 4),
     "nav.lateral_rmse_m": ("navigation, lateral error (RMS)", "m", 4),
     "nav.availability": ("navigation, valid", "of the time", 3),
