@@ -3,7 +3,8 @@
 Two predictions of the ring exist. The belief's, which knows range, attitude and gyro, says where each LED should be; a
 ring that is not there is looked for within a radius about. The track's, which knows the image and the gyro, makes the
 window. When they disagree, that is when no ring is found and the window does not even show where the belief has its
-LEDs, the track gives way and the full frame is read. Whether what was found is believed is the filter's gate's to say.
+LEDs, the track gives way and the full frame is read. A ring that is AMBIGUOUS with LEDs where the sheet has them is
+looked for once more with twice their tolerance. Whether what was found is believed is the filter's gate's to say.
 
 Which LED is which follows from the ring's roll: the track's, which knows how fast the ring turns, as long as that tells
 one numbering from the next, then the belief's. While nothing is tracked (at first, after a loss) the ring is looked for
