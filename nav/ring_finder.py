@@ -39,17 +39,16 @@ from dockair.nav.fusion import RelativeFilter
 from dockair.nav.identify.code import CodeSettings, code_of
 from dockair.nav.identify.perspective import SLOTS
 from dockair.nav.identify.prior import ring_from_leds
-from dockair.nav.identify.result import Identification, IdentificationStatus, nothing
-from dockair.nav.identify.ring import IdentifySettings, identify
+from dockair.nav.identify.ring import Identification, IdentificationStatus, IdentifySettings, identify
 from dockair.nav.image.detect import Blobs, DetectSettings, detect
 from dockair.nav.track import RingTracker, TrackSettings
 from dockair.rotations import Array
 
 _NONE: NDArray[np.int64] = np.empty(0, np.int64)
 _BY_SHEET = IdentifySettings()
-#: LEDs where the sheet has them, and off by twice its tolerance. Near the basket one that is off by four sigma is left
-#: out of its ring, and what makes it an outlier makes impostors of the others.
-_PLACED = (_BY_SHEET, replace(_BY_SHEET, ring_sigma=2.0 * _BY_SHEET.ring_sigma))
+#: LEDs off by twice the sheet's tolerance. Near the basket one that is off by four sigma is left out of its ring, and
+#: what makes it an outlier makes impostors of the others.
+_MISPLACED = replace(_BY_SHEET, ring_sigma=2.0 * _BY_SHEET.ring_sigma)
 _NEIGHBOURHOOD_RADII, _UNSEEN = 1.6, 0.2  # of `chance`: where clutter is counted, and blobs more than were seen
 
 
@@ -189,15 +188,15 @@ class RingFinder:
 
     def _identified(self, blobs: Blobs, **expected: Any) -> Identification:
         """The ring by LEDs in their places, or else, where that leaves doubt, by LEDs farther off them."""
-        found = nothing(IdentificationStatus.NOT_FOUND)
-        for settings in _PLACED:
-            found = identify(
-                blobs.centroids_px, settings=settings, camera=self._sheets.camera, ring=self._sheets.ring,
-                code=self._code, brightness=blobs.flux, **expected,
-            )  # fmt: skip
-            if found.status is not IdentificationStatus.AMBIGUOUS:
-                return found
-        return found
+        found = self._identified_by(_BY_SHEET, blobs, **expected)
+        doubt = found.status is IdentificationStatus.AMBIGUOUS
+        return self._identified_by(_MISPLACED, blobs, **expected) if doubt else found
+
+    def _identified_by(self, settings: IdentifySettings, blobs: Blobs, **expected: Any) -> Identification:
+        return identify(
+            blobs.centroids_px, settings=settings, camera=self._sheets.camera, ring=self._sheets.ring,
+            code=self._code, brightness=blobs.flux, **expected,
+        )  # fmt: skip
 
     def _look_for_roll(self, blobs: Blobs, expected_rad: float, time_s: float) -> float:
         """Roll of the ring where the belief has it, however it is rolled; the expected one if there is no ring.

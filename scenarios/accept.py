@@ -12,6 +12,7 @@ import numpy as np
 from pydantic import Field
 
 from dockair.errors import DockairError
+from dockair.nav.guidance.phases import REFUELLED
 from dockair.scenarios.table import Table
 
 if TYPE_CHECKING:
@@ -21,7 +22,6 @@ OutcomeName = Literal["contact", "miss", "rim_strike", "abort", "collision", "ti
 
 Row = Mapping[str, Any]
 _Rate = Annotated[float | None, Field(ge=0.0, le=1.0)]
-_REFUELLED = "refuelled"  # the guidance's reason to end a hold
 _UNTOUCHED = ("abort", "miss")  # outcomes of a flight that ended clear without having touched anything
 
 
@@ -154,7 +154,7 @@ def has_refuelled(row: Row) -> bool:
     """Return whether a hold was flown to its end, and fuel came: of a contact that is called back neither is so."""
     if row["error"] or not (row.get("fuel_kg") or 0.0) > 0.0:
         return False
-    return any(entry["reason"] == _REFUELLED for entry in json.loads(row.get("timeline") or "[]") or ())
+    return any(entry["reason"] == REFUELLED for entry in json.loads(row.get("timeline") or "[]") or ())
 
 
 #: Key -> what it counts, and whether a row counts.

@@ -25,6 +25,9 @@ class Phase(Enum):
     CLEAR = "clear"
 
 
+REFUELLED = "refuelled"  #: the reason to end a hold that was flown to its end
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PhaseLimits:
     """When one phase gives way to the next. Defaults: service procedures, or assumed where marked."""
@@ -202,7 +205,7 @@ TRANSITIONS: dict[Phase, tuple[Transition, ...]] = {
     Phase.HOLD: (
         Transition(Phase.BREAKAWAY, "drogue has left the probe", _left),
         Transition(Phase.DISCONNECT, "red light", lambda limits, s: s.light_is_red),
-        Transition(Phase.DISCONNECT, "refuelled", lambda limits, s: s.in_phase_s >= limits.hold_s),
+        Transition(Phase.DISCONNECT, REFUELLED, lambda limits, s: s.in_phase_s >= limits.hold_s),
     ),
     Phase.DISCONNECT: (Transition(Phase.CLEAR, "drogue well ahead", _far_enough),),
     Phase.BACK_OFF: _AWAY,
