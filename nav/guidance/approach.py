@@ -61,7 +61,8 @@ class Guidance:
         self._u: Array = np.zeros(3)
         self._u_dot: Array = np.zeros(3)
         self._path = AnnouncedPath(settings.path)
-        self._turned: Array = np.zeros((2, 3))  # n x p of Eq. (1) and its rate
+        self._place: Array = np.zeros(3)  # p of Eq. (1), reckoned while nobody sees the drogue
+        self._turned: Array = np.zeros((2, 3))  # n x p and its rate
         self._commanded: Array = np.zeros(3)  # Eq. (1)
         self._aim: Array = np.zeros(2)
         self._reckoning = DeadReckoning(settings, self._dt)
@@ -112,7 +113,11 @@ class Guidance:
     def _follow_path(self, state: RelativeState, ring: Array, rate: Array) -> None:
         """Go on with the announced path, and learn from the drogue what it leaves."""
         if state.usable:
-            self._turned = np.array([self._axes.turned(ring), self._axes.turned(rate)])
+            self._place = ring
+        elif self.phase not in _TOUCHING:  # on the probe it stays where it was seen
+            self._place = self._reckoning.place_m
+        going = rate if state.usable else np.zeros(3)
+        self._turned = np.array([self._axes.turned(self._place), self._axes.turned(going)])
         pushed = self._closure.committed  # a drogue in the bow wave says nothing about the path
         learns = state.usable and self.phase in _FOLLOWING and not pushed
         left = float((rate + self._turned[0] + self._commanded) @ self._axes.left_N)
@@ -324,7 +329,7 @@ class Guidance:
         if path.is_announced:
             u = u + path.left_m_s * axes.left_N - self._turned[0]
             u_dot = u_dot + path.left_m_s2 * axes.left_N - self._turned[1]
-            self._commanded = u
+        self._commanded = u
         R_BN = axes.R_NB.T
         return ReceiverCommand(
             velocity_m_s=R_BN @ u,

@@ -5,7 +5,8 @@ the drogue has been followed over its last swing,
 
     miss^2 = |e|^2 exp(-2 t_go / T_e) + mean of |e|^2 over the swing                                      (1)
 
-and the receiver, once it closes at c, comes to rest not before
+(where it decides, 1.5 s before contact, e is forgotten but for a fortieth, and the mean is what counts), and the
+receiver, once it closes at c, comes to rest not before
 
     d = c tau + c^2 / (2 a)                                                                               (2)
 

@@ -25,7 +25,7 @@ class DeadReckoning:
 
     def __init__(self, settings: GuidanceSettings, step_s: float) -> None:
         self._settings, self._step_s = settings, step_s
-        self._place_m: Array = np.zeros(3)
+        self.place_m: Array = np.zeros(3)  #: (3,) p
         self._most_m_s = settings.unseen_drift_m_s
 
     def step(self, middle_m: Array | None, drift_m_s: Array, u_m_s: Array, *, bearable: bool) -> None:
@@ -39,9 +39,9 @@ class DeadReckoning:
         """
         self._most_m_s = self._settings.unseen_drift_m_s if bearable else self._settings.unseen_drift_in_gusts_m_s
         if middle_m is not None:
-            self._place_m = middle_m
+            self.place_m = middle_m
         else:
-            self._place_m = self._place_m + (self.believed(drift_m_s) - u_m_s) * self._step_s
+            self.place_m = self.place_m + (self.believed(drift_m_s) - u_m_s) * self._step_s
 
     def believed(self, drift_m_s: Array) -> Array:
         """(3,) of a drift that was learnt, what may be believed out of view: it may be half a swing, or a gust's."""
@@ -50,7 +50,7 @@ class DeadReckoning:
     def astern_m_s(self) -> Array:
         """(3,) velocity across to get astern of the drogue; none beside it."""
         s, across = self._settings, np.zeros(3)
-        if self._place_m[0] > s.limits.off_axis_range_m:
+        if self.place_m[0] > s.limits.off_axis_range_m:
             most = s.back_off_speed_m_s
-            across[1:] = np.clip(s.reckoned_gain_1_s * self._place_m[1:], -most, most)
+            across[1:] = np.clip(s.reckoned_gain_1_s * self.place_m[1:], -most, most)
         return across

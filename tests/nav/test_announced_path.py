@@ -1,6 +1,7 @@
 """The path that was announced, what the tanker's own is learnt to differ by, and what guidance makes of it."""
 
 from collections import deque
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -272,3 +273,38 @@ def test_what_a_tip_feels_once_a_turn_is_announced_is_not_flown_against():
         near = _astern(0.1, felt)
         commands.append(np.array([guidance.step(near).velocity_m_s for _ in range(100)]))
     np.testing.assert_array_equal(*commands)
+
+
+def test_a_drogue_out_of_view_turns_with_the_tanker_where_it_is_reckoned_and_no_longer_than_that():
+    """Eq. (1) of `approach`, n x p: the receiver falls back from 4 m to 10 m in the turn; then the tanker rolls out."""
+    guidance = Guidance(GuidanceSettings(), 100)
+    guidance.announce(_said(starts_s=0.0, entry_s=0.1))
+    guidance.announce(_said(starts_s=20.0, entry_s=0.1, turn=0.0))
+    seen = _astern(0.0)
+    for _ in range(200):
+        guidance.step(seen)
+    unseen = replace(seen, usable=False, contact_usable=False)
+    for _ in range(800):
+        guidance.step(unseen)
+    ahead_m = guidance._reckoning.place_m[0]
+    assert 9.0 < ahead_m < 12.0
+    np.testing.assert_allclose(guidance._turned[0], guidance._axes.turned(guidance._reckoning.place_m), atol=1e-3)
+    assert np.hypot(*guidance._turned[0, 1:]) == pytest.approx(TURN * ahead_m, rel=0.05)
+    for _ in range(1100):
+        guidance.step(unseen)
+    np.testing.assert_array_equal(guidance._turned, np.zeros((2, 3)))
+
+
+def test_what_is_learnt_of_the_path_begins_with_what_was_commanded_before_it_was_announced():
+    """A drogue that stays where it is while the receiver is told to go left goes left as fast."""
+    guidance = Guidance(GuidanceSettings(), 100)
+    beside = _astern(1.0)
+    for _ in range(100):
+        command = guidance.step(beside)
+    guidance.announce(_said(starts_s=30.0))
+    learnt = []
+    for _ in range(2):
+        guidance.step(beside)
+        learnt.append(guidance._path.left_m_s)
+    assert command.velocity_m_s[1] > 0.1
+    assert learnt[0] > 0.4 * learnt[1] > 0.0
