@@ -27,7 +27,7 @@ from dockair.scenarios.exact_json import name_of
 from dockair.scenarios.measured_leds import MeasuredLeds
 from dockair.scenarios.message_log import NavigatorRecipe
 from dockair.scenarios.mounting_parameters import MountingParameters
-from dockair.scenarios.nominal_sheets import nominal_sheets
+from dockair.scenarios.nominal_sheets import nominal_ring, nominal_sheets
 from dockair.scenarios.schema import Scenario
 from dockair.scenarios.truth_navigation import TruthNavigator
 from dockair.sim.air.atmosphere import Air, standard_atmosphere
@@ -64,6 +64,7 @@ RESPONSE_S = {  # delay of the probe's tip forward, left, up, behind a command a
 #: perfect navigation).
 STRAYING_LIMIT_M_S = {"fighter": 0.5, "unmanned": 0.0}
 COMMANDED = 0.95  # of the accelerations that the flight control flies: what it cut off would be missing in guidance
+FRAMES_STOP = 2.5  # periods of a slow camera without a frame: one that is late is no failure
 STAND_OFF_M = 4.0  # pre-contact: procedures say 3-5 m behind the drogue
 SUN_OVERHEAD = np.array([0.0, 0.0, 1.0])  # lights the scene of a scenario without Sun
 
@@ -176,7 +177,7 @@ def build(scenario: Scenario, seed: int) -> Parts:
 
 def guidance_settings(scenario: Scenario) -> GuidanceSettings:
     """Return the guidance that the scenario asks for, with what the nominal sheets say of the receiver."""
-    g, duration_s = scenario.guidance, scenario.flight.duration_s
+    g, duration_s, nominal = scenario.guidance, scenario.flight.duration_s, GuidanceSettings()
     density = standard_atmosphere(scenario.flight.altitude_m).density_kg_m3
     pressure_pa = 0.5 * density * scenario.flight.airspeed_m_s**2
     mounting = load_parameters(scenario.hardware.receiver_sheet("mounting"), MountingParameters)
@@ -185,6 +186,8 @@ def guidance_settings(scenario: Scenario) -> GuidanceSettings:
     x, y, z = (float(value) for value in source_B - mounting.probe_tip_m)
     control = load_parameters(scenario.hardware.receiver_sheet("flight_control"), FlightControlParameters)
     limits = PhaseLimits(
+        rim_m=0.5 * nominal_ring(scenario).diameter_m,
+        frames_stop_s=max(nominal.limits.frames_stop_s, FRAMES_STOP / scenario.rates.camera_hz),
         attempts_max=g.attempts_max,
         slot_s=duration_s - ATTEMPT_S if duration_s >= 2.0 * ATTEMPT_S else float("inf"),
         stabilise_s=g.stabilise_s,
@@ -194,7 +197,6 @@ def guidance_settings(scenario: Scenario) -> GuidanceSettings:
     )
     acceleration_limit = _commanded(control.acceleration_limit_m_s2)
     push = BowWavePush(source_from_tip_m=(x, y, z), radius_m=bow_wave.radius_m).at_pressure(pressure_pa)
-    nominal = GuidanceSettings()
     return GuidanceSettings(
         controller=g.controller,
         stand_off_m=STAND_OFF_M,

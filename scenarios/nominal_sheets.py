@@ -35,7 +35,7 @@ def nominal_sheets(scenario: Scenario, world: WorldParameters, imu: ImuParameter
         world: flight condition and place of the hose's exit.
         imu: whose data sheet is told.
     """
-    camera, ring = scenario.hardware.camera, scenario.hardware.ring
+    camera = scenario.hardware.camera
     start = StartGeometry(
         p_PD_B=scenario.start.p_PD_B,
         sigma_p_m=scenario.start.sigma_p_m,
@@ -44,7 +44,7 @@ def nominal_sheets(scenario: Scenario, world: WorldParameters, imu: ImuParameter
     )
     return NavigationSheets(
         camera=Camera() if camera is None else Camera.from_toml(camera),
-        ring=LedRing() if ring is None else LedRing.from_toml(ring),
+        ring=nominal_ring(scenario),
         mounting=world.mounting,
         start=start,
         gyro=_gyro_sheet(imu, scenario.rates.gyro_hz),
@@ -52,6 +52,12 @@ def nominal_sheets(scenario: Scenario, world: WorldParameters, imu: ImuParameter
         control_rate_hz=scenario.rates.control_hz,
         coupling_depth_m=world.coupling.depth_m,
     )
+
+
+def nominal_ring(scenario: Scenario) -> LedRing:
+    """Return the ring's sheet."""
+    ring = scenario.hardware.ring
+    return LedRing() if ring is None else LedRing.from_toml(ring)
 
 
 def nominal_attitude(scenario: Scenario, world: WorldParameters) -> Array:

@@ -83,6 +83,20 @@ def test_guidance_takes_the_scenarios_figures():
     assert settings.stand_off_m == 4.0
 
 
+def test_guidance_knows_the_rim_of_the_ring_that_is_flown(tmp_path):
+    """As the referee and the claim of contact do: between two rims a tip is in the basket of one of them."""
+    ring = tmp_path / "ring.toml"
+    ring.write_text("diameter_m = 0.6\ncount = 8\n")
+    assert guidance_settings(load_scenario("default")).limits.rim_m == 0.25
+    assert guidance_settings(load_scenario("default", {"hardware.ring": str(ring)})).limits.rim_m == 0.3
+
+
+@pytest.mark.parametrize(("camera_hz", "stop_s"), [(50, 0.1), (25, 0.1), (10, 0.25), (5, 0.5)])
+def test_a_slow_cameras_frames_have_not_stopped_between_two_of_them(camera_hz, stop_s):
+    limits = guidance_settings(load_scenario("default", {"rates.camera_hz": camera_hz})).limits
+    assert limits.frames_stop_s == pytest.approx(stop_s)
+
+
 def test_guidance_knows_how_a_hose_swings_at_the_speed_and_height_of_the_flight():
     fast, slow = (guidance_settings(load_scenario(name)).predictive.swing for name in ("default", "slow_set"))
     assert fast.modes[0].frequency_hz[1] == pytest.approx(0.345, rel=1e-3)
