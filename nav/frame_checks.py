@@ -37,9 +37,12 @@ class FrameChecks:
 
         Args:
             frame: as it arrived.
-            now_s: the navigation's time; NaN before the first sample of the IMU, when there is no clock to ask.
+            now_s: the navigation's time; NaN before the first sample of the IMU, when a stamp could be anything, and
+                would be the one that all later frames are held against.
         """
         time_s = frame.time_stamp_s
+        if math.isnan(now_s):
+            return "no clock"
         if not math.isfinite(time_s) or time_s - now_s > self._ahead_s:
             return "frame ahead of the clock"
         if now_s - time_s > self._buffer_s:

@@ -48,7 +48,6 @@ class FilterState:
     p_PD_B: Array  #: (3,) ring centre from the probe's tip [m]
     v_PD_B: Array  #: (3,) velocity of the ring centre less that of the probe's tip, not seen from turning axes [m/s]
     rate_PD_B: Array  #: (3,) d/dt of p_PD_B in body axes [m/s]
-    gyro_bias_B: Array  #: (3,) [rad/s]
     covariance: Array  #: (9, 9) of (phi, p_PD_B, v_PD_B): R_BD <- exp(phi) R_BD [rad, m, m/s]
 
 
@@ -188,7 +187,6 @@ class RelativeFilter:
             p_PD_B=belief.p_ID - r,
             v_PD_B=v,
             rate_PD_B=rate,
-            gyro_bias_B=belief.bias.copy(),
             covariance=covariance,
         )
 
@@ -207,7 +205,7 @@ class RelativeFilter:
 
         Where there never was a force, as of an IMU without accelerometers, none is asked for.
         """
-        return self._record.is_unbroken(start_s, end_s, self._settings.longest_gap_s, forces=self._felt)
+        return self._record.is_unbroken(start_s, end_s, self._motion.longest_gap_s, forces=self._felt)
 
     def predicted_pose(self, time_s: float) -> tuple[Array, Array, Array]:
         """R_CD (3, 3), p_CD (3,) [m] that a frame would show, and their covariance (6, 6) of (phi, delta) in C."""

@@ -116,6 +116,11 @@ def refusals_until_doubt(settings: FusionSettings, camera_rate_hz: float) -> int
     return math.ceil(settings.refusals_until_doubt * max(camera_rate_hz / _SETTINGS_AT_HZ, 1.0))
 
 
+def longest_gap_s(settings: FusionSettings, gyro: GyroSheet) -> float:
+    """Return how far apart two samples of acceleration may be: of a slow IMU, a period and a half."""
+    return max(settings.longest_gap_s, 1.5 / gyro.rate_hz)
+
+
 def motion_of(settings: FusionSettings, gyro: GyroSheet) -> Motion:
     """Return what the kernel takes."""
     omega = 2.0 * np.pi * np.array([0.0, *settings.swing_frequency_hz])
@@ -138,7 +143,7 @@ def motion_of(settings: FusionSettings, gyro: GyroSheet) -> Motion:
         scale2=2.0 * gyro.scale_factor_sigma**2 * settings.manoeuvre_s,
         held_turn2=held2 / settings.held_rate_time_s**2,
         held_most2=2.0 * held2 * settings.held_rate_time_s,
-        longest_gap_s=settings.longest_gap_s,
+        longest_gap_s=longest_gap_s(settings, gyro),
         longest_step_s=settings.longest_step_s,
     )
 

@@ -26,7 +26,7 @@ class Stamps:
     """
 
     def __init__(self, leap_s: float) -> None:
-        self._leap_s, self.newest_s, self._doubtful_s = leap_s, -np.inf, np.nan
+        self._leap_s, self._doubtful_s = leap_s, np.nan
 
     def believed(self, time_s: float, newest_s: float) -> bool:
         """Whether a stamp is, where the newest of all that is known is `newest_s` (-inf: nothing)."""
@@ -34,7 +34,6 @@ class Stamps:
         again = 0.0 < time_s - self._doubtful_s <= self._leap_s
         if math.isfinite(time_s) and (near or again):
             self._doubtful_s = np.nan
-            self.newest_s = max(self.newest_s, time_s)
             return True
         self._doubtful_s = time_s
         return False

@@ -188,9 +188,10 @@ class Navigator:
         self._led_pixels_px[named] = seen.centroids_px
         R_CD, p_CD, covariance = self._filter.predicted_pose(time_s)
         attitude = self._attitude_known(len(named), time_s, R_CD, covariance)
-        few = len(named) < _POSE_LEDS
-        if few and (attitude is None or len(named) < _LEAST_POSE_LEDS or self._settings.fusion.coupling != "tight"):
-            return self._use_few(seen)  # a loose filter would take the attitude for new
+        tight = self._settings.fusion.coupling == "tight"
+        few = len(named) < (_POSE_LEDS if tight else self._settings.alone_leds)
+        if few and (attitude is None or len(named) < _LEAST_POSE_LEDS or not tight):
+            return self._use_few(seen)  # a loose filter would take the believed attitude of fewer for new
         misplaced_px = self._sheets.camera.focal_length_px * self._settings.led_position_sigma_m / p_CD[0]
         pose = solve_pose(
             seen.centroids_px,

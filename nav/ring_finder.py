@@ -14,9 +14,9 @@ another roll is turned by the difference. A code that contradicts the numbers of
 that the track is lost and the code read again.
 
 Four LEDs make a ring, fewer do not. While the belief follows the drogue, single blobs are named by it: one that lies
-alone in the gate of one LED, g sigma of belief and centroid about where it should be, and in no other's gate. With
-rho blobs a square pixel that are in no gate, counted within 1.6 radii as for a ring (`chance`), clutter gets a wrong
-name in at most
+alone in the gate of one LED, g sigma of belief and of the sharpest centroid about where it should be, and in no
+other's. With rho blobs a square pixel that are in no gate, counted within 1.6 radii as for a ring (`chance`), clutter
+gets a wrong name in at most
 
     rho (sum of the gates' areas)                                                                     (1)
 

@@ -763,3 +763,23 @@ def test_a_faster_camera_says_no_more_of_the_leds_places_in_a_second_and_a_blow_
     shares, refusals = zip(*at.values(), strict=True)
     np.testing.assert_allclose(shares, SETTINGS.led_place_share * 50)
     assert refusals == (3, 3, 11)
+
+
+@pytest.mark.parametrize(("rate_hz", "seconds"), [(25, 0.06), (50, 0.03), (100, 0.02), (500, 0.02)])
+def test_a_slow_imus_samples_are_no_gaps_and_one_left_out_is(rate_hz, seconds):
+    """With stamps off by 10 us, as a data sheet has them."""
+    gyro = replace(GYRO, rate_hz=rate_hz)
+    asked = replace(sheets(6.0), gyro=gyro)
+    assert motion_of(SETTINGS, gyro).longest_gap_s == pytest.approx(seconds)
+    left_out = max(1, round(1.5 * seconds * rate_hz) - 1)
+    for gap, whole in ((0, True), (left_out, False)):
+        relative, rng = RelativeFilter(asked, SETTINGS), np.random.default_rng(rate_hz)
+        ticks = [*range(rate_hz), *range(rate_hz + gap, rate_hz + gap + 3)]
+        for k in ticks:
+            sample = ImuSample(
+                time_stamp_s=k / rate_hz + 1e-5 * rng.uniform(-1.0, 1.0),
+                angular_rate_rad_s=np.zeros(3),
+                specific_force_m_s2=-GRAVITY_N,
+            )
+            relative.propagate([sample])
+        assert relative.felt(relative.imu_time_s - 0.3, relative.imu_time_s) == whole

@@ -10,6 +10,7 @@ from scipy.stats import binom
 from dockair.calibration import Camera, GyroSheet, LedRing, Mounting, NavigationSheets, StartGeometry
 from dockair.errors import DockairError
 from dockair.messages import CameraFrame, ImuSample, LedObservation, Window
+from dockair.nav.fusion_settings import FusionSettings
 from dockair.nav.integrity.coasting import CoastingSettings
 from dockair.nav.integrity.contact import ContactLimits, Doubt
 from dockair.nav.navigator import Navigator, NavigatorSettings
@@ -917,3 +918,32 @@ def test_a_push_that_was_not_felt_is_not_forgotten_when_the_imu_comes_back(missi
         assert not solution.contact_usable or off_m <= levels[-1]
     assert min(levels[24:]) > ContactLimits().lateral_m
     assert [tick().contact_usable for _ in range(3)][-1]
+
+
+def test_a_frame_that_comes_before_the_imu_has_a_clock_to_be_held_against_is_none():
+    """Stamped 50 s ahead it would be the newest for 50 s, and every later frame older than it."""
+    sky = Sky(None, still)
+    twin = Navigator(sky.sheets)
+    early = named(sky, range(8), 50.0)
+    assert sky.navigator.step((), early).status == "no clock"
+    twin.step((), None)
+    for tick in range(100):
+        imu = sky.imu()
+        seen = named(sky, range(8), imu[-1].time_stamp_s) if tick % 2 == 0 else None
+        solution = sky.navigator.step(imu, seen)
+        twin_solution = twin.step(imu, seen)
+    assert_same(solution, twin_solution)
+    assert solution.contact_usable
+
+
+@pytest.mark.parametrize(("coupling", "least"), [("tight", 4), ("loose", 6)])
+def test_a_loose_filter_takes_no_pose_that_leans_on_its_own_attitude(coupling, least):
+    """Fewer than six LEDs are tested with the attitude believed, which would be averaged with itself."""
+    sky = Sky(None, still)
+    fusion = FusionSettings(coupling=coupling)
+    sky.navigator = Navigator(sky.sheets, NavigatorSettings(fusion=fusion))
+    for _ in range(60):
+        step_on_leds(sky, range(8))
+    for count in (4, 5, 6):
+        status = [step_on_leds(sky, range(count)).status for _ in range(4)][-1]
+        assert status == ("pose used" if count >= least else "pose too few LEDs"), count
