@@ -259,7 +259,7 @@ class GyroSheet:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class NavigationSheets:
-    """Everything the navigation is given at construction; there is no other way in but the two sensor messages."""
+    """Everything the navigation is given at construction; there is no other way in but the messages of `messages`."""
 
     camera: Camera
     ring: LedRing

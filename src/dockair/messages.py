@@ -8,6 +8,7 @@
 | ReceiverCommand | nav        | sim flight control  | control rate    | B     |
 | NavSolution     | nav        | loop, log, gymnasium| control rate    | B, C  |
 | TankerAnnouncement | sim tanker | nav, if it listens | before a change |    |
+| PodSignal       | sim pod light | nav, if it looks | at a change     |       |
 
 A test freezes the fields of the two sensor messages: no LED index, visibility, pose or gust may ever enter them. All
 stamps and times are on one clock, that of the flight. Pixels are (u, v), u to the right and v down, counted on the full
