@@ -62,7 +62,7 @@ def read_toml(path: Path) -> dict[str, Any]:
     """
     try:
         return tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (ValueError, RecursionError) as error:  # not TOML, not UTF-8; a number of 5000 digits, brackets 1000 deep
         raise DockairError(str(path), expected="TOML", got=str(error)) from None
     except OSError as error:
         raise DockairError(str(path), expected="a file that can be read", got=error.strerror) from None
@@ -72,6 +72,6 @@ def toml_value(text: str) -> object:
     """Return the value that a text of the command line means."""
     try:
         table = tomllib.loads(f"value = {text}")
-    except tomllib.TOMLDecodeError:
+    except (ValueError, RecursionError):
         return text  # a shell has eaten the quotes, or a name that needs none
     return table["value"] if len(table) == 1 else text

@@ -101,6 +101,15 @@ def test_bytes_that_are_not_text_are_refused(tmp_path):
         load_scenario(path)
 
 
+@pytest.mark.parametrize("value", ["9" * 5000, "[" * 5000 + "]" * 5000])
+def test_what_python_s_reader_of_toml_itself_cannot_bear_is_refused(scenario_file, value):
+    """It raises another ValueError of so many digits, and a RecursionError of so many brackets."""
+    with pytest.raises(DockairError, match=r"mine\.toml: expected TOML"):
+        load_scenario(scenario_file(f'name = "mine"\nseed = {value}'))
+    with pytest.raises(DockairError, match="--set seed: expected an integer"):
+        load_scenario("default", {"seed": value})
+
+
 @pytest.mark.parametrize("missing", ["none.toml", "folder/none.toml", Path("default")])
 def test_a_missing_file_is_named(missing):
     with pytest.raises(DockairError, match="none.toml|default") as caught:
