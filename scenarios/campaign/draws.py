@@ -12,7 +12,7 @@ latin_hypercube: of n points each of the n equal slices of every coordinate hold
 
 import itertools
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -91,17 +91,18 @@ class Draw(Table):
         return low * math.exp(u * math.log(high / low)) if self.log else low + u * (high - low)
 
 
-def grid(draws: Mapping[str, Draw], most: int) -> list[Point]:
+def grid(draws: Mapping[str, Draw], most: int, place: Callable[[str], str] = str) -> list[Point]:
     """Return every combination; one empty point where nothing is drawn.
 
     Args:
         draws: by dotted key.
         most: combinations that are not refused.
+        place: from a key of the plan to where it was written.
     """
-    axes = [draw.on_grid(f'draw."{key}"') for key, draw in draws.items()]
+    axes = [draw.on_grid(place(f'draw."{key}"')) for key, draw in draws.items()]
     count = math.prod(map(len, axes))
     if count > most:
-        raise DockairError("draw", expected=f"a grid of up to {most} points", got=count)
+        raise DockairError(place("draw"), expected=f"a grid of up to {most} points", got=count)
     return [dict(zip(draws, values, strict=True)) for values in itertools.product(*axes)]
 
 

@@ -57,7 +57,7 @@ def points_of(source: PlanFile, seeds: Sequence[int]) -> list[tuple[Point, Seque
         points = samples(draws, plan.sampler, len(seeds), plan.draw_seed)
         return [(point, [seed]) for point, seed in zip(points, seeds, strict=True)]
     if plan.sampler == "grid":
-        points = grid(draws, MOST_JOBS)
+        points = grid(draws, MOST_JOBS, source.place)
         _refuse_twin_points(points, source.place("draw"), "values that differ")
     else:
         points = samples(draws, plan.sampler, plan.draws or 1, plan.draw_seed)

@@ -294,6 +294,10 @@ def test_every_packaged_plan_can_be_flown_and_says_what_for(name):
             'scenarios = ["default"]\nsampler = "grid"\n[draw."turbulence.sigma_m_s"]\nvalues = [0.1, 0.2, 0.1]',
             "p.toml: draw: expected values that differ, got 'turbulence.sigma_m_s = 0.1 2 times'",
         ),
+        (
+            'scenarios = ["default"]\nsampler = "grid"\n[draw."turbulence.sigma_m_s"]\nlow = 0.1\nhigh = 1.0',
+            'p.toml: draw."turbulence.sigma_m_s": expected values, or low, high and points: the plan is a grid',
+        ),
         ("scenarios = [", "p.toml: expected TOML"),
     ],
 )
