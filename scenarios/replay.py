@@ -13,6 +13,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Sequence
+from contextlib import redirect_stdout
 from dataclasses import asdict, dataclass
 from importlib.abc import MetaPathFinder
 from importlib.machinery import ModuleSpec
@@ -157,7 +158,8 @@ def main(arguments: Sequence[str]) -> int:
         sys.stderr.write("usage: python -m dockair.scenarios.replay OUT\n")
         return 2
     try:
-        report = replay_in_this_process(arguments[0])
+        with redirect_stdout(sys.stderr):  # whatever a navigator of one's own prints
+            report = replay_in_this_process(arguments[0])
     except DockairError as error:
         sys.stderr.write(f"{error}\n")
         return error.exit_code

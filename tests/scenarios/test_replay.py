@@ -121,6 +121,11 @@ def test_a_navigator_that_reads_the_simulator_cannot_be_replayed(record, imports
         replay(record(imports=imports))
 
 
+def test_a_navigator_may_print(record):
+    """The report of the replaying process is on stdout."""
+    assert replay(record(imports="print('hello')")).identical
+
+
 def test_the_replaying_process_refuses_to_start_with_a_simulator_loaded(record):
     out = record()
     code = f"import mujoco, sys; from dockair.scenarios.replay import main; sys.exit(main([{str(out)!r}]))"
