@@ -265,6 +265,8 @@ def main() -> None:
     try:
         status = app(standalone_mode=False)
         sys.stdout.flush()
+        if status == 130:  # typer makes a status of Ctrl-C
+            print("dockair: stopped", file=sys.stderr)
     except DockairError as error:
         print(f"dockair: {error}", file=sys.stderr)
         sys.exit(error.exit_code)

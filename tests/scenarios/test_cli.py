@@ -255,7 +255,7 @@ def test_interrupting_a_flight_is_no_traceback(command, flights, monkeypatch):
     monkeypatch.setitem(sys.modules, "dockair.scenarios.loop", SimpleNamespace(fly=fly))
     status, _, err = command("fly")
     assert status == 130
-    assert "Traceback" not in err
+    assert err == "dockair: stopped\n"
 
 
 def test_a_full_disk_is_one_line_and_status_three(command, flights, monkeypatch):
