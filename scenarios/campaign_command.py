@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from dockair.scenarios.cli_options import Json, Settings, overrides, print_json
+from dockair.scenarios.cli_options import Json, Settings, overrides, print_json, stdout_kept
 
 
 class Sampler(Enum):
@@ -46,10 +46,11 @@ def campaign(
     source = PlanFile(plan, changes | ({} if seeds is None else {"seeds": seeds}), overrides(settings))
     folder = out or default_folder(source.plan.name)
     if dry:
-        planned = dry_run(source, folder).to_dict()
+        with stdout_kept(as_json):
+            planned = dry_run(source, folder).to_dict()
         print_json(planned) if as_json else show_dry_run(planned)
         return
-    with CampaignProgress() as progress:
+    with stdout_kept(as_json), CampaignProgress() as progress:
         over = run(
             source,
             folder,

@@ -20,7 +20,7 @@ import dockair
 from dockair.errors import DockairError
 from dockair.scenarios.allan_command import allan
 from dockair.scenarios.campaign_command import campaign
-from dockair.scenarios.cli_options import Json, ScenarioName, Seed, Settings, overrides, print_json
+from dockair.scenarios.cli_options import Json, ScenarioName, Seed, Settings, overrides, print_json, stdout_kept
 from dockair.scenarios.design_ring_command import design_ring
 from dockair.scenarios.report_command import report
 
@@ -78,7 +78,7 @@ def fly(
     check_output_folder(folder)
     from dockair.scenarios.loop import fly as fly_scenario
 
-    with FlightProgress(chosen.flight.duration_s) as progress:
+    with stdout_kept(as_json), FlightProgress(chosen.flight.duration_s) as progress:
         result = fly_scenario(chosen, seed, folder, record=record.value, progress=progress, overlap=True)
     contact = result.contact
     offset, speed = (contact.radial_offset_m, contact.closure_speed_m_s) if contact else (None, None)
@@ -206,7 +206,7 @@ def bench(
 
     chosen = load_scenario(scenario, overrides(settings))
     if subject is not BenchSubject.FLIGHT:
-        with show_working(f"measuring: {subject.value}"):
+        with stdout_kept(as_json), show_working(f"measuring: {subject.value}"):
             figures = bench_stages(subject.value, chosen)
         if as_json:
             print_json(figures)
@@ -214,7 +214,8 @@ def bench(
             show_stages_bench(figures)
         return
     _require_background(chosen)
-    report = bench_scenario(chosen, seconds)
+    with stdout_kept(as_json):
+        report = bench_scenario(chosen, seconds)
     if as_json:
         print_json(report.to_json())
     else:

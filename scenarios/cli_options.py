@@ -1,6 +1,8 @@
 """What the commands of the command line have in common: options, and how one JSON object is printed."""
 
 import json
+import sys
+from contextlib import AbstractContextManager, nullcontext, redirect_stdout
 from typing import Annotated, Any
 
 import typer
@@ -31,6 +33,11 @@ def overrides(settings: list[str] | None) -> dict[str, str]:
         found.pop(key.strip(), None)  # the later holds, also against another key that says the same thing
         found[key.strip()] = value.strip()
     return found
+
+
+def stdout_kept(as_json: bool) -> AbstractContextManager[object]:
+    """Keep stdout for the one object: whatever a navigator of one's own prints meanwhile goes to stderr."""
+    return redirect_stdout(sys.stderr) if as_json else nullcontext()
 
 
 def print_json(table: Any) -> None:

@@ -171,6 +171,20 @@ def test_json_is_one_object_on_stdout_and_nothing_else(command, flights):
     assert "approach" in err
 
 
+def test_what_a_navigator_prints_is_not_among_the_json(command, flights, monkeypatch):
+    stand_in = sys.modules["dockair.scenarios.loop"].fly
+
+    def fly(*given, **options):
+        sys.stdout.write("hello\n")
+        return stand_in(*given, **options)
+
+    monkeypatch.setitem(sys.modules, "dockair.scenarios.loop", SimpleNamespace(fly=fly))
+    _, out, err = command("fly", "--json")
+    assert json.loads(out)["outcome"] == "contact"
+    assert "hello" in err
+    assert command("fly")[1].startswith("hello")
+
+
 @pytest.mark.parametrize("outcome", ["miss", "rim_strike", "abort", "collision", "timeout"])
 def test_the_exit_status_is_zero_whatever_the_outcome(command, flights, monkeypatch, outcome):
     def fly(scenario, seed, out, *, record, progress, overlap):
