@@ -73,12 +73,20 @@ class Accept(Table):
         return ", ".join(parts)
 
     def shortfalls(
-        self, outcome: str, radial_offset_m: float | None, closure_speed_m_s: float | None, unsafe: Sequence[str] = ()
+        self,
+        outcome: str,
+        radial_offset_m: float | None,
+        closure_speed_m_s: float | None,
+        unsafe: Sequence[str] = (),
+        *,
+        refuelled: bool = True,
     ) -> list[str]:
         """Return a line for each figure that one flight did not reach; the two figures are None without contact."""
         lines = [f"unsafe: {what}" for what in unsafe]
         if self.outcome is not None and outcome != self.outcome:
             lines.append(f"outcome {outcome}, wanted {self.outcome}")
+        if self.refuelled_rate_min and outcome == "contact" and not refuelled:
+            lines.append("docked, and has not refuelled")
         offset_max_m, speed_max_m_s = self.radial_offset_max_m, self.closure_speed_max_m_s
         if self.clean_rate_min is not None and self.outcome is None:
             if outcome not in ("contact", *_UNTOUCHED):
@@ -151,10 +159,14 @@ def is_clean(row: Row) -> bool:
 
 
 def has_refuelled(row: Row) -> bool:
+    """Return whether a flight that did not crash has refuelled."""
+    reasons = [entry["reason"] for entry in json.loads(row.get("timeline") or "[]") or ()]
+    return not row["error"] and was_refuelled(row.get("fuel_kg") or 0.0, reasons)
+
+
+def was_refuelled(fuel_kg: float, reasons: Sequence[str]) -> bool:
     """Return whether a hold was flown to its end, and fuel came: of a contact that is called back neither is so."""
-    if row["error"] or not (row.get("fuel_kg") or 0.0) > 0.0:
-        return False
-    return any(entry["reason"] == REFUELLED for entry in json.loads(row.get("timeline") or "[]") or ())
+    return fuel_kg > 0.0 and REFUELLED in reasons
 
 
 #: Key -> what it counts, and whether a row counts.

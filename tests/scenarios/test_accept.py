@@ -134,6 +134,14 @@ def test_what_was_unsafe_in_one_flight_is_a_shortfall_of_any_scenario():
     assert Accept().shortfalls("contact", 0.1, 1.2, ("touch at 2.70 m/s",)) == ["unsafe: touch at 2.70 m/s"]
 
 
+def test_one_flight_that_docks_and_does_not_refuel_is_not_as_claimed_where_that_is_asked_for():
+    asked = Accept(outcome="contact", refuelled_rate_min=0.95)
+    assert asked.shortfalls("contact", 0.1, 1.2, refuelled=True) == []
+    assert asked.shortfalls("contact", 0.1, 1.2, refuelled=False) == ["docked, and has not refuelled"]
+    assert asked.shortfalls("abort", None, None, refuelled=False) == ["outcome abort, wanted contact"]
+    assert Accept(outcome="contact").shortfalls("contact", 0.1, 1.2, refuelled=False) == []
+
+
 def test_one_flight_that_is_asked_to_be_clean_is_held_to_it():
     clean = Accept(clean_rate_min=1.0)
     for outcome in ("abort", "miss"):
