@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from dockair.errors import DockairError
 from dockair.scenarios.toml_files import TomlFiles, read_toml, toml_value
 
@@ -35,7 +37,7 @@ class ScenarioFile:
 
     Args:
         name_or_path: a name in the library, or the path of a TOML file.
-        settings: dotted key -> value instead of the file's; strings are read as TOML values.
+        settings: dotted key -> value instead of the file's; strings are read as TOML values, numpy's as Python's.
 
     Attributes:
         table: keys and values, not checked.
@@ -51,7 +53,7 @@ class ScenarioFile:
         self.table = read_toml(path)
         _resolve_hardware(self.table, path.parent)
         for key, value in settings.items():
-            _set(self.table, key, toml_value(value) if isinstance(value, str) else value)
+            _set(self.table, key, toml_value(value) if isinstance(value, str) else _plain(value))
 
     def place(self, where: str) -> str:
         """Return where a dotted key was written: `--set key`, or file and key."""
@@ -67,6 +69,17 @@ def _resolve_hardware(table: dict[str, Any], folder: Path) -> None:
     if isinstance(hardware, dict):
         paths = {key: hardware[key] for key in _PATHS if isinstance(hardware.get(key), str)}
         hardware.update({key: str(folder / path) for key, path in paths.items()})
+
+
+def _plain(value: Any) -> Any:
+    """Return a value with Python's numbers and lists for numpy's: what is drawn at random is numpy's."""
+    if isinstance(value, np.generic | np.ndarray):
+        return value.tolist()
+    if isinstance(value, list | tuple):
+        return [_plain(entry) for entry in value]
+    if isinstance(value, dict):
+        return {key: _plain(entry) for key, entry in value.items()}
+    return value
 
 
 def _set(table: dict[str, Any], key: str, value: object) -> None:

@@ -163,6 +163,25 @@ def test_settings_may_be_values_instead_of_text():
     assert load_scenario("default", {"seed": 7, "start.sigma_m": [0.1, 0.2, 0.3]}).start.sigma_m == (0.1, 0.2, 0.3)
 
 
+def test_settings_may_be_numpys_values():
+    """What is drawn for a flight is: `rng.integers(1, 4)`, `rng.uniform(0.0, 0.3, 3)`."""
+    drawn = {
+        "guidance.attempts_max": np.int64(2), "navigation.heading": np.bool_(False),
+        "start.sigma_m": np.array([0.1, 0.2, 0.3]), "turbulence.sigma_m_s": np.float64(0.4),
+        "faults": [{"kind": "led_off", "leds": np.array([3]), "start_s": np.float64(2.0)}],
+    }  # fmt: skip
+    scenario = load_scenario("default", drawn)
+    assert (scenario.guidance.attempts_max, scenario.start.sigma_m) == (2, (0.1, 0.2, 0.3))
+    assert type(scenario.turbulence.sigma_m_s) is float
+    assert (scenario.faults[0].leds, scenario.faults[0].start_s) == ((3,), 2.0)
+
+
+def test_a_table_among_the_settings_is_left_as_it_was_given():
+    start = {"left_m": 1.0}
+    assert load_scenario("default", {"start": start, "start.aft_m": 6.0}).start.aft_m == 6.0
+    assert start == {"left_m": 1.0}
+
+
 def test_a_word_needs_no_quotes_in_a_setting():
     assert load_scenario("default", {"navigation.navigator": "truth"}).navigation.is_truth
     assert load_scenario("default", {"navigation.navigator": '"truth"'}).navigation.is_truth
