@@ -21,7 +21,7 @@ _ARRAYS: dict[str, tuple[int | str, ...]] = {
     "candidates_px": ("n", 2),
     "led_pixels_px": (8, 2),
 }
-_WHILE_VALID = ("p_PD_B", "v_PD_B", "R_BD")  # are finite then
+_WHILE_VALID = ("p_PD_B", "v_PD_B")  # are finite then
 _TEXTS = ("phase", "status", "phase_reason")
 _FLAGS = ("valid", "contact_usable")
 _NUMBERS = ("frame_time_stamp_s", "heading_rad", "heading_sigma_rad")  # or NaN
@@ -57,9 +57,8 @@ def check_answer(name: str, answer: NavSolution) -> None:
         check(field, value, partial(_has_shape, shape=shape), f"an array {_in_words(shape)}")
         if answer.valid and field in _WHILE_VALID:
             check(field, value, lambda value: bool(np.isfinite(value).all()), "finite numbers while valid")
-    if answer.valid:
-        R = answer.R_BD
-        check("R_BD", R, lambda R: bool((np.abs(R @ R.T - np.eye(3)) < _ORTHONORMAL).all()), "a rotation")
+    # the log and the environments write it as quaternion and as rotation vector, whatever `valid` says
+    check("R_BD", answer.R_BD, _is_rotation, "a rotation, also while not valid")
     variances = np.diag(answer.covariance)
     check("covariance", variances, lambda value: not (value < 0.0).any(), "no variance below 0")
     check("window", answer.window, _is_window, "a Window of whole numbers, or None")
@@ -87,6 +86,12 @@ def _has_shape(value: Any, shape: tuple[int | str, ...]) -> bool:
 
 def _is_vector(value: Any) -> bool:
     return _has_shape(value, (3,)) and bool(np.isfinite(value).all())
+
+
+def _is_rotation(R: Any) -> bool:
+    if not np.isfinite(R).all():
+        return False
+    return bool((np.abs(R @ R.T - np.eye(3)) < _ORTHONORMAL).all()) and float(np.linalg.det(R)) > 0.0  # no reflection
 
 
 def _is_window(value: Any) -> bool:

@@ -99,7 +99,7 @@ class NavSolution:
     #: (3,) velocity of the ring centre less that of the probe's tip, body axes, not seen from turning axes [m/s]:
     #: d/dt of p_PD_B is v_PD_B - w_WB_B x p_PD_B.
     v_PD_B: Array
-    R_BD: Array  #: (3, 3) drogue axes in body axes
+    R_BD: Array  #: (3, 3) drogue axes in body axes: a rotation, also while not valid
     covariance: Array  #: (9, 9) of (phi, p_PD_B, v_PD_B): R_BD <- exp(phi) R_BD [rad, m, m/s]
     command: ReceiverCommand
     window: Window | None  #: what the camera should read next; None for the full frame
