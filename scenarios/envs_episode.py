@@ -234,6 +234,11 @@ class Episodes(gymnasium.Env[Obs, NDArray[np.float32]], Generic[Obs]):
         if scenario.flight.duration_s <= tick_s:
             expected = f"more than the one control tick that reset flies, {tick_s:g} s"
             raise DockairError("flight.duration_s", expected=expected, got=scenario.flight.duration_s)
+        sensing = scenario.camera.sensing
+        if "camera.sensing" in options.get("set", {}) and self.sensing not in (None, sensing):
+            # a scenario's own gives way to the environment's; what is asked for here would be ignored without a word
+            expected = f'"{self.sensing}", which this environment is made for'
+            raise DockairError("options.set: camera.sensing", expected=expected, got=sensing)
         return self.with_sensing(scenario)
 
     def with_sensing(self, scenario: Scenario) -> Scenario:

@@ -33,6 +33,9 @@ def scenario_from(options: Mapping[str, Any], source: str | Path | Scenario) -> 
         raise DockairError("options", expected="a known key", got=unknown[0], exists=_EXISTS)
     source, settings = options.get("scenario", source), options.get("set", {})
     _check_dictionary("options.set", settings, "a dictionary of dotted key -> value")
+    if "seed" in settings:  # a scenario's own is where `dockair fly` begins; an environment draws
+        expected = 'the option "seed" in its place, or reset(seed=...)'
+        raise DockairError("options.set: seed", expected=expected, got=_said(settings["seed"]))
     if not isinstance(source, (str, Path, Scenario)):
         raise DockairError("scenario", expected="a name, a path or a Scenario", got=_said(source))
     if not isinstance(source, Scenario):

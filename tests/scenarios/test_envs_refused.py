@@ -70,6 +70,7 @@ WRONG_OPTIONS = [
     ({"seed": -1}, "options.seed: expected an integer from 0 on, got -1"),
     ({"seed": 2.9}, "options.seed: expected an integer from 0 on, got 2.9"),
     ({"seed": "x"}, "options.seed: expected an integer from 0 on, got 'x'"),
+    ({"set": {"seed": 5}}, 'options.set: seed: expected the option "seed" in its place, or reset(seed=...), got 5'),
     ({"set": {"navigation.navigator": "nosuch:Class"} | MEASURED}, "nosuch:Class: expected"),
     ({"set": {"flight.duration_s": 0.01}}, "flight.duration_s: expected more than the one control tick that reset"),
 ]
@@ -229,3 +230,12 @@ def test_what_only_the_camera_as_built_does_not_measure_is_refused_likewise(monk
     monkeypatch.setattr(envs_episode, "Flight", refuse)
     with pytest.raises(DockairError, match="^scenario: expected dockair/Dock-v0 in place of .*: the scenario has it$"):
         DockFastEnv().reset(seed=0)
+
+
+@pytest.mark.parametrize(("made", "own", "other"), [
+    (DockFastEnv, "measurements", "frames"), (DockPixelsEnv, "frames", "measurements"),
+])  # fmt: skip
+def test_another_sensing_than_the_environments_own_is_refused_and_its_own_is_not(made, own, other):
+    assert made().chosen_scenario({"set": {"camera.sensing": own}}).camera.sensing == own
+    with pytest.raises(DockairError, match=rf'^options\.set: camera\.sensing: expected "{own}", .*, got \'{other}\'$'):
+        made().reset(options={"set": {"camera.sensing": other}})
