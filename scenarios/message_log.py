@@ -40,6 +40,7 @@ from dockair.scenarios.plug_in import make_navigator, navigator_class_of
 
 QUEUE_TICKS = 200  # ticks waiting for the encoder; at 50 frames/s of 2.2 MB full frames at most 220 MB
 ROW_GROUP_TICKS = 100
+_LATER_COLUMNS = {"announcement", "pod_signal"}  # which recordings of before do not have
 MESSAGES, ESTIMATES, NAVIGATOR = "messages.parquet", "estimates.parquet", "navigator.json"
 #: Sensor noise has no patterns to look back for: Huffman coding alone is smaller and quicker than a search.
 _PNG = [cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PNG_STRATEGY_HUFFMAN_ONLY]
@@ -93,9 +94,14 @@ class NavigatorRecipe:
     @classmethod
     def read(cls, out_dir: Path) -> Self:
         """Read `navigator.json`."""
-        table = json.loads(_existing(out_dir, NAVIGATOR).read_text(encoding="utf-8"))
-        sheets, settings = decode(table["sheets"]), decode(table["settings"])
-        return cls(class_name=table["navigator"], sheets=sheets, settings=settings)
+        path = _existing(out_dir, NAVIGATOR)
+        try:
+            table = json.loads(path.read_text(encoding="utf-8"))
+            sheets, settings = decode(table["sheets"]), decode(table["settings"])
+            return cls(class_name=table["navigator"], sheets=sheets, settings=settings)
+        except (ValueError, TypeError, KeyError) as error:  # no JSON, or not what was written there
+            got = f"{type(error).__name__}: {error}"
+            raise DockairError(str(path), expected="a navigator as a flight records it", got=got) from None
 
 
 def code_fingerprint() -> str:
@@ -274,12 +280,22 @@ def read_messages(out_dir: str | Path, *, pixels: bool = True) -> Iterator[TickM
         pixels: decode the frames; without, `frame.pixels` is empty and only `png` holds them.
 
     Raises:
-        DockairError: nothing was recorded there.
+        DockairError: nothing was recorded there, or what is there is damaged.
     """
-    with pq.ParquetFile(_existing(Path(out_dir), MESSAGES)) as file:
-        for group in range(file.num_row_groups):
-            for row in file.read_row_group(group).to_pylist():
-                yield _tick_from_row(row, pixels)
+    for row in _rows(Path(out_dir), MESSAGES, set(_MESSAGE_SCHEMA.names) - _LATER_COLUMNS):
+        yield _tick_from_row(row, pixels)
+
+
+def _rows(out_dir: Path, name: str, needed: set[str]) -> Iterator[dict[str, Any]]:
+    path, expected = _existing(out_dir, name), "a whole table as a flight records it"
+    try:
+        with pq.ParquetFile(path) as file:
+            if missing := sorted(needed - set(file.schema_arrow.names)):
+                raise DockairError(str(path), expected=expected, got=f"none with the column {missing[0]}")
+            for group in range(file.num_row_groups):
+                yield from file.read_row_group(group).to_pylist()
+    except (pa.ArrowException, OSError) as error:  # cut off, or of another kind
+        raise DockairError(str(path), expected=expected, got=str(error).partition("\n")[0]) from None
 
 
 def _tick_from_row(row: dict[str, Any], pixels: bool) -> TickMessages:
@@ -323,9 +339,7 @@ def read_estimates(out_dir: str | Path) -> Iterator[dict[str, Array | str]]:
     """Yield the recorded answer of each control tick as `estimate_row` gives it.
 
     Raises:
-        DockairError: nothing was recorded there.
+        DockairError: nothing was recorded there, or what is there is damaged.
     """
-    with pq.ParquetFile(_existing(Path(out_dir), ESTIMATES)) as file:
-        for group in range(file.num_row_groups):
-            for row in file.read_row_group(group).to_pylist():
-                yield {name: v if isinstance(v, str) else np.array(v, np.float64) for name, v in row.items()}
+    for row in _rows(Path(out_dir), ESTIMATES, set()):  # a field that was not there yet is a difference
+        yield {name: v if isinstance(v, str) else np.array(v, np.float64) for name, v in row.items()}

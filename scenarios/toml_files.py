@@ -61,7 +61,7 @@ def read_toml(path: Path) -> dict[str, Any]:
         DockairError: not TOML, or not to be read.
     """
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        return tomllib.loads(path.read_text(encoding="utf-8-sig"))  # some editors begin a file with a byte order mark
     except (ValueError, RecursionError) as error:  # not TOML, not UTF-8; a number of 5000 digits, brackets 1000 deep
         raise DockairError(str(path), expected="TOML", got=str(error)) from None
     except OSError as error:

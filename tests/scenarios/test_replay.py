@@ -1,6 +1,7 @@
 """A replay gives the flight's estimates bit for bit, or says where it does not, and no simulator can help it."""
 
 import json
+import re
 import subprocess
 import sys
 import textwrap
@@ -12,7 +13,7 @@ import pytest
 
 from dockair.errors import DockairError
 from dockair.scenarios.message_log import ESTIMATES, MESSAGES, NAVIGATOR, MessageLog, NavigatorRecipe
-from dockair.scenarios.replay import FORBIDDEN, replay, same_bits
+from dockair.scenarios.replay import FORBIDDEN, replay, replay_in_this_process, same_bits
 
 SUMS = '''
 import numpy as np
@@ -106,6 +107,30 @@ def test_a_recording_that_was_cut_off_is_refused(record):
     pq.write_table(pq.read_table(out / ESTIMATES).slice(0, 39), out / ESTIMATES)
     with pytest.raises(DockairError, match="cut-off recording"):
         replay(out)
+
+
+@pytest.mark.parametrize(
+    ("name", "damage", "got"),
+    [
+        (NAVIGATOR, lambda whole: b"{}", "KeyError: 'sheets'"),
+        (NAVIGATOR, lambda whole: b"[]", "TypeError: list indices"),
+        (NAVIGATOR, lambda whole: whole[: len(whole) // 2], "JSONDecodeError"),
+        (MESSAGES, lambda whole: whole[: len(whole) // 2], "Parquet magic bytes not found"),
+        (ESTIMATES, lambda whole: whole[: len(whole) // 2], "Parquet magic bytes not found"),
+    ],
+)
+def test_a_damaged_recording_is_refused_with_the_name_of_the_file(record, name, damage, got):
+    out = record()
+    (out / name).write_bytes(damage((out / name).read_bytes()))
+    with pytest.raises(DockairError, match=f"{name}: expected a .*{re.escape(got)}"):
+        replay_in_this_process(out)
+
+
+def test_a_table_of_another_kind_in_the_place_of_the_messages_is_refused(record):
+    out = record()
+    (out / MESSAGES).write_bytes((out / ESTIMATES).read_bytes())
+    with pytest.raises(DockairError, match=f"{MESSAGES}: expected a whole table .* accelerometer_specific_force"):
+        replay_in_this_process(out)
 
 
 @pytest.mark.parametrize(

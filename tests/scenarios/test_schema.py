@@ -94,6 +94,10 @@ def test_what_is_not_toml_is_refused_with_its_line(scenario_file):
         load_scenario(scenario_file('name = "mine"\nseed 3\n'))
 
 
+def test_a_file_may_begin_with_a_byte_order_mark_as_some_editors_write_it(scenario_file):
+    assert load_scenario(scenario_file('\ufeffname = "mine"\nseed = 3\n')).seed == 3
+
+
 def test_bytes_that_are_not_text_are_refused(tmp_path):
     path = tmp_path / "mine.toml"
     path.write_bytes(b"name = '\xff'")
