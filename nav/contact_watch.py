@@ -1,9 +1,15 @@
 """What may be claimed of the belief for contact, from frame to frame.
 
-The claim is that of the newest pose which was used (`integrity.contact`), about the belief as it is now, and wider by
-what the belief foretells wrongly while no frame comes (`integrity.coasting`). A newer frame that contradicts the belief
-or itself ends it, until a pose is used again; of a belief that had to be widened after a blow the covariance is asked.
-In the basket neither is so: it is the probe that strikes the drogue there, at no more than the closure speed.
+The claim is that of the newest pose which was tested (`integrity.contact`), about the belief as it is now, and wider by
+what the belief foretells wrongly while no frame comes (`integrity.coasting`). A pose that the filter's gate refuses is
+one, too: close in a few hundredths of a pixel are refused, which are tenths of a millimetre. If the drogue has been
+struck it has gone the way d to that pose since the last frame that was used, in the time t, and goes on,
+
+    the belief is off by d (1 + age / t)                                                                  (1)
+
+A newer frame that contradicts itself ends the claim, until a pose is tested again; of a belief that had to be widened
+after a blow the covariance is asked. In the basket neither is so: it is the probe that strikes the drogue there, at no
+more than the closure speed.
 """
 
 import numpy as np
@@ -18,7 +24,7 @@ from dockair.rotations import Array
 
 
 class ContactWatch:
-    """Keeps the newest pose's test, and what has become of the belief since.
+    """Keeps the newest test of a pose, and what has become of the belief since.
 
     Args:
         sheets: mounting and ring.
@@ -38,7 +44,8 @@ class ContactWatch:
         self._belief, self._limits = belief, limits
         self._horizon_s, self._coasting = coasting.horizon_s, CoastingError(coasting)
         self._integrity: Integrity | None = None
-        self._posed_time_s, self._contradicted_s = float("nan"), -np.inf
+        self._posed_time_s = self._used_time_s = float("nan")
+        self._contradicted_s = -np.inf
         self._learnt_m: Array = np.zeros(3)  # what the pose owes to the LEDs' places that are learnt, camera axes
         self._in_basket = False
 
@@ -50,15 +57,27 @@ class ContactWatch:
             points_D: (n, 3) places of its LEDs by the sheet [m].
             time_s: stamp of its frame.
         """
-        if time_s < self._posed_time_s:
+        if not self._tested(checked, points_D, time_s):
             return
-        self._integrity, self._posed_time_s = checked, time_s
-        self._learnt_m = moved_by_places(checked.pose, points_D)[3:]
+        self._used_time_s = time_s
         if self._coasting.due(time_s):
             self._ask_coasting(time_s)
 
+    def refused(self, checked: Integrity, points_D: Array, time_s: float) -> None:
+        """Take note of a pose that passed its own test and has not corrected the belief; arguments as of `used`."""
+        if self._integrity is not None:  # before the first that was used there is no belief to claim anything of
+            self._tested(checked, points_D, time_s)
+
+    def _tested(self, checked: Integrity, points_D: Array, time_s: float) -> bool:
+        """Make a pose the one that is claimed by, unless there is a newer one."""
+        if time_s < self._posed_time_s:
+            return False
+        self._integrity, self._posed_time_s = checked, time_s
+        self._learnt_m = moved_by_places(checked.pose, points_D)[3:]
+        return True
+
     def contradicted(self, time_s: float) -> None:
-        """Take note of a frame of this stamp whose LEDs contradict the belief or one another."""
+        """Take note of a frame whose LEDs contradict one another or, too few for a pose, the belief."""
         self._contradicted_s = max(time_s, self._contradicted_s)
 
     def found_again(self) -> None:
@@ -71,6 +90,8 @@ class ContactWatch:
             return None
         offset_m = self._integrity.pose.p_CD - self._belief.predicted_pose(self._posed_time_s)[1]
         age_s = time_s - self._posed_time_s
+        if self._posed_time_s > self._used_time_s:
+            offset_m = offset_m * (1.0 + age_s / (self._posed_time_s - self._used_time_s))  # Eq. (1)
         levels = self._integrity.levels.about(offset_m).about(self._learnt_m)  # what is learnt may be a fault
         levels = self._coasting.added(levels, age_s, self._sigmas_to_ask_m(time_s))
         return usable_for_contact(

@@ -215,7 +215,7 @@ class Navigator:
             seen.centroids_px[kept], self._points_D[named[kept]], self._sheets.camera, seen.sigma_px[kept]
         )
         if not self._filter.update(replace(checked.pose, measurement=sight), time_s):
-            self._contact.contradicted(time_s)
+            self._contact.refused(checked, self._points_D[named[kept]], time_s)
             return "pose refused by the gate"
         self._contact.used(checked, self._points_D[named[kept]], time_s)
         self._used_time_s = max(time_s, self._used_time_s)  # NaN before the first: the first of the two then
