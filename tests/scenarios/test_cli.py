@@ -5,6 +5,7 @@ import json
 import os
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -16,6 +17,7 @@ from rich.text import Text
 from dockair.errors import DockairError, MachineError
 from dockair.scenarios import cli, doctor
 from dockair.scenarios.cli_options import overrides
+from dockair.scenarios.flight_profile import PhaseEntry
 from dockair.scenarios.metrics import NavigationFigures
 from dockair.scenarios.output_folder import keep_flight, prepare_output_folder
 from dockair.scenarios.referee import Contact
@@ -50,7 +52,7 @@ def a_result(scenario, seed, out, **changes) -> Result:
         "contact": Contact(time_s=9.87, radial_offset_m=0.042, closure_speed_m_s=1.23, angle_deg=2.5),
         "hold": None,
         "disconnect": None,
-        "fuel_kg": 0.0,
+        "fuel_kg": 110.0,
         "collided_with": "",
         "sensing": scenario.sensing,
         "truth_navigation": scenario.navigation.is_truth,
@@ -61,7 +63,7 @@ def a_result(scenario, seed, out, **changes) -> Result:
         "real_time_factor": 0.25,
         "wall_time_s": 80.0,
         "versions": {"dockair": "0.1.0"},
-        "timeline": (),
+        "timeline": (PhaseEntry(phase="disconnect", begun_s=16.8, reason="refuelled"),),
         "nav_by_range": (),
         "out_dir": str(out),
     }
@@ -150,6 +152,15 @@ def test_flying_writes_to_a_folder_named_after_scenario_and_seed(command, flight
     for figure in ("contact", "0.042", "1.23", "9.87", "out/still_air-3/result.json", "as the scenario claims"):
         assert figure in out
     assert "range   5.00 m" in err
+
+
+def test_a_flight_that_docks_and_is_called_back_is_not_as_claimed(command, flights, monkeypatch):
+    called_back = partial(
+        a_result, fuel_kg=69.0, timeline=(PhaseEntry(phase="back_off", begun_s=11.0, reason="a miss"),)
+    )
+    monkeypatch.setitem(globals(), "a_result", called_back)
+    _, out, _ = command("fly", "still_air", "--seed", "3")
+    assert "docked, and has not refuelled" in out and "as the scenario claims" not in out
 
 
 def test_flying_without_a_name_flies_the_default_scenario_with_its_own_seed(command, flights):
