@@ -7,9 +7,9 @@ struck it has gone the way d to that pose since the last frame that was used, in
 
     the belief is off by d (1 + age / t)                                                                  (1)
 
-A newer frame that contradicts itself ends the claim, until a pose is tested again; of a belief that had to be widened
-after a blow the covariance is asked. In the basket neither is so: it is the probe that strikes the drogue there, at no
-more than the closure speed.
+Where that is more than some millimetres (`refused_m`), or a newer frame contradicts itself, the claim ends until a pose
+is tested again; of a belief that had to be widened after a blow the covariance is asked. In the basket neither is so:
+it is the probe that strikes the drogue there, at no more than the closure speed.
 """
 
 import numpy as np
@@ -90,8 +90,10 @@ class ContactWatch:
             return None
         offset_m = self._integrity.pose.p_CD - self._belief.predicted_pose(self._posed_time_s)[1]
         age_s = time_s - self._posed_time_s
+        contradicted = self._contradicted_s > self._posed_time_s
         if self._posed_time_s > self._used_time_s:
             offset_m = offset_m * (1.0 + age_s / (self._posed_time_s - self._used_time_s))  # Eq. (1)
+            contradicted |= bool(np.linalg.norm(offset_m) > self._limits.refused_m)
         levels = self._integrity.levels.about(offset_m).about(self._learnt_m)  # what is learnt may be a fault
         levels = self._coasting.added(levels, age_s, self._sigmas_to_ask_m(time_s))
         return usable_for_contact(
@@ -100,7 +102,7 @@ class ContactWatch:
             self._limits,
             levels=levels,
             in_basket=self._in_basket,
-            contradicted=self._contradicted_s > self._posed_time_s,
+            contradicted=contradicted,
         )
 
     def note_basket(self, state: FilterState, claim: ContactClaim | None, *, usable: bool) -> None:

@@ -416,18 +416,14 @@ def test_a_drogue_that_is_struck_is_followed_on(render):
 
     sky = Sky(render, path)
     assert sky.run(0.5).contact_usable
-    solutions, refused = [], []
-    for _ in range(30):
-        solutions.append(sky.step())
-        if "refused" in solutions[-1].status:  # the drogue goes on until the next frame: Eq. (1) of `contact_watch`
-            off_m = np.hypot(*(solutions[-1].p_PD_B - path(solutions[-1].time_stamp_s))[1:])
-            refused.append(off_m / sky.navigator.contact_claim().levels.lateral_m)
+    solutions = [sky.step() for _ in range(30)]
     statuses = [s.status for s in solutions]
     assert statuses.count("ring not found") == 0
     assert statuses[-10:] == ["pose used"] * 10 and solutions[-1].contact_usable
-    assert 0.8 < max(refused) < 1.0
+    refused = [s.contact_usable for s in solutions if "refused" in s.status]
+    assert refused and not any(refused)
     off_m = [np.abs(s.p_PD_B - path(s.time_stamp_s)).max() for s in solutions if s.contact_usable]
-    assert max(off_m) < ContactLimits().lateral_m
+    assert max(off_m) < 0.06  # two frames' way, until the first of them has arrived
 
 
 @pytest.mark.parametrize("search_anew_s", [2.0, np.inf])
@@ -851,14 +847,14 @@ def test_an_led_without_numbers_is_not_seen(field, number):
 
 
 @pytest.mark.parametrize(
-    ("numbers", "bent_px", "status", "doubt"),
+    ("numbers", "bent_px", "status"),
     [
-        (range(8), np.tile([0.0, 50.0], (8, 1)), "pose refused by the gate", Doubt.LATERAL),
-        (range(8), 4.0 * np.random.default_rng(1).normal(size=(8, 2)), "pose inconsistent", Doubt.INCONSISTENT),
-        (range(2), np.tile([0.0, 40.0], (2, 1)), "LEDs refused by the gate", Doubt.INCONSISTENT),
+        (range(8), np.tile([0.0, 12.0], (8, 1)), "pose refused by the gate"),
+        (range(8), 4.0 * np.random.default_rng(1).normal(size=(8, 2)), "pose inconsistent"),
+        (range(2), np.tile([0.0, 40.0], (2, 1)), "LEDs refused by the gate"),
     ],
 )
-def test_while_the_newest_frames_contradict_the_belief_contact_is_not_claimed(numbers, bent_px, status, doubt):
+def test_while_the_newest_frames_contradict_the_belief_contact_is_not_claimed(numbers, bent_px, status):
     """A claim on the last pose would stand for 0.4 s more. The first pose that is used again makes it anew."""
     sky = Sky(None, still)
     for _ in range(500):
@@ -869,16 +865,16 @@ def test_while_the_newest_frames_contradict_the_belief_contact_is_not_claimed(nu
     seen = replace(seen, centroids_px=seen.centroids_px + bent_px)
     solution = sky.navigator.step(imu, seen)
     assert solution.status == status and solution.valid and not solution.contact_usable
-    assert sky.navigator.contact_claim().doubts == (doubt,)
+    assert sky.navigator.contact_claim().doubts == (Doubt.INCONSISTENT,)
     late = named(sky, range(8), imu[-1].time_stamp_s - 0.01)
     assert sky.navigator.step(sky.imu(), late).status == "pose used"
-    assert sky.navigator.contact_claim().doubts == (doubt,)
+    assert sky.navigator.contact_claim().doubts == (Doubt.INCONSISTENT,)
     assert step_on_leds(sky, range(8)).contact_usable
 
 
-@pytest.mark.parametrize("bent_px", [3.0, 4.0, 8.0])
+@pytest.mark.parametrize("bent_px", [3.0, 3.5, 4.0])
 def test_a_pose_that_is_refused_for_millimetres_says_that_the_belief_is_off_by_no_more(bent_px):
-    """Contacts with a belief 3 mm off had been made on a solution marked unusable, by camera one in eighty."""
+    """By camera one contact in eighty had been made on a solution marked unusable, the belief some millimetres off."""
     sky = Sky(None, still)
     for _ in range(500):
         step_on_leds(sky, range(8))
@@ -910,9 +906,7 @@ def test_after_a_blow_the_claim_is_no_wider_than_the_beliefs_own(speed_m_s, fram
         off_m = np.hypot(*(solution.p_PD_B - path(solution.time_stamp_s))[1:])
         if out and solution.contact_usable:
             over.append(off_m / sky.navigator.contact_claim().levels.lateral_m)
-        if solution.contact_usable:
-            refused = "refused" in solution.status
-            assert off_m < (sky.navigator.contact_claim().levels.lateral_m if refused else 0.04)
+        assert not solution.contact_usable or off_m < 0.04
     assert np.isfinite(sky.navigator._filter.doubted_s) and max(over, default=0.0) <= 1.0
 
 
