@@ -191,13 +191,12 @@ class Navigator:
         tight = self._settings.fusion.coupling == "tight"
         few = len(named) < (_POSE_LEDS if tight else self._settings.alone_leds)
         if few and (attitude is None or len(named) < _LEAST_POSE_LEDS or not tight):
-            return self._use_few(seen)  # a loose filter would take the believed attitude of fewer for new
-        misplaced_px = self._sheets.camera.focal_length_px * self._settings.led_position_sigma_m / p_CD[0]
+            return self._use_few(seen, R_CD, p_CD)  # a loose filter would take the believed attitude of fewer for new
         pose = solve_pose(
             seen.centroids_px,
             self._believed_points_D(time_s)[named],
             self._sheets.camera,
-            sigma_px=np.hypot(seen.sigma_px, misplaced_px),
+            sigma_px=np.hypot(seen.sigma_px, self._misplaced_px(p_CD)),
             initial=(R_CD, p_CD),
             prior=attitude if few else None,
         )
@@ -210,9 +209,11 @@ class Navigator:
         if checked.led is not None:
             self._led_pixels_px[named[checked.led]] = np.nan
         kept = np.arange(len(named)) != (-1 if checked.led is None else checked.led)
-        # the filter carries the LEDs' places itself, so that only what is new in every frame counts as noise
         sight = lines_of_sight_from_pixels(
-            seen.centroids_px[kept], self._points_D[named[kept]], self._sheets.camera, seen.sigma_px[kept]
+            seen.centroids_px[kept],
+            self._points_D[named[kept]],
+            self._sheets.camera,
+            self._unlearnt_px(seen, R_CD, p_CD)[kept],
         )
         if not self._filter.update(replace(checked.pose, measurement=sight), time_s):
             self._contact.refused(checked, self._points_D[named[kept]], time_s)
@@ -220,6 +221,21 @@ class Navigator:
         self._contact.used(checked, self._points_D[named[kept]], time_s)
         self._used_time_s = max(time_s, self._used_time_s)  # NaN before the first: the first of the two then
         return "pose used"
+
+    def _misplaced_px(self, p_CD: Array) -> float:
+        """What an LED's place on the ring, as built, moves its image by across the line of sight, one sigma [px]."""
+        return float(self._sheets.camera.focal_length_px * self._settings.led_position_sigma_m / p_CD[0])
+
+    def _unlearnt_px(self, seen: LedObservation, R_CD: Array, p_CD: Array) -> Array:
+        """(n,) sigma of the LEDs' images for the filter: the centroid's, and of the LED's place what it cannot learn [px].
+
+        It carries the places in the ring's plane itself, and takes no LED to be out of it. One that is shows the more
+        the farther it is from the drogue's axis as the camera sees it: next to nothing at 5 m, and ten sigmas of the
+        centroid at the ring.
+        """
+        arm_D = self._points_D[seen.led_numbers] + R_CD.T @ p_CD
+        slope = np.hypot(arm_D[:, 1], arm_D[:, 2]) / np.abs(arm_D[:, 0])
+        return np.asarray(np.hypot(seen.sigma_px, self._misplaced_px(p_CD) * slope))
 
     def _believed_points_D(self, time_s: float) -> Array:
         """(count, 3) places of the LEDs as far as the belief has learnt them, for a frame that tests itself [m].
@@ -237,12 +253,13 @@ class Navigator:
             return None
         return AttitudePrior(R_CD=R_CD, information=np.linalg.inv(covariance[:3, :3]))
 
-    def _use_few(self, seen: LedObservation) -> str:
+    def _use_few(self, seen: LedObservation, R_CD: Array, p_CD: Array) -> str:
         """LEDs too few for a pose correct a belief that follows the drogue, and begin none."""
         time_s = seen.time_stamp_s
         if self._settings.fusion.coupling != "tight" or not self._followed(time_s):
             return "pose too few LEDs"
-        if not self._filter.update_leds(seen.centroids_px, self._points_D[seen.led_numbers], seen.sigma_px, time_s):
+        sigma_px = self._unlearnt_px(seen, R_CD, p_CD)
+        if not self._filter.update_leds(seen.centroids_px, self._points_D[seen.led_numbers], sigma_px, time_s):
             self._contact.contradicted(time_s)
             return "LEDs refused by the gate"
         self._used_time_s = max(time_s, self._used_time_s)
