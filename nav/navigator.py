@@ -227,11 +227,10 @@ class Navigator:
         return float(self._sheets.camera.focal_length_px * self._settings.led_position_sigma_m / p_CD[0])
 
     def _unlearnt_px(self, seen: LedObservation, R_CD: Array, p_CD: Array) -> Array:
-        """(n,) sigma of the LEDs' images for the filter: the centroid's, and of the LED's place what it cannot learn [px].
+        """(n,) sigma of the LEDs' images for the filter: the centroid's, and that of what it does not learn [px].
 
-        It carries the places in the ring's plane itself, and takes no LED to be out of it. One that is shows the more
-        the farther it is from the drogue's axis as the camera sees it: next to nothing at 5 m, and ten sigmas of the
-        centroid at the ring.
+        It learns the LEDs' places in the ring's plane, and takes none to be out of it. One that is shows the more the
+        farther it is seen off the drogue's axis: next to nothing at 5 m, by ten sigmas of the centroid at the ring.
         """
         arm_D = self._points_D[seen.led_numbers] + R_CD.T @ p_CD
         slope = np.hypot(arm_D[:, 1], arm_D[:, 2]) / np.abs(arm_D[:, 0])

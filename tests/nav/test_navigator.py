@@ -148,6 +148,33 @@ def test_frames_agree_with_themselves_on_the_places_of_leds_that_the_belief_has_
     assert frames_without_all_leds(seed, NavigatorSettings().learnt_place_sigmas) == 0
 
 
+def closing_in(time_s):
+    """Half a metre every second from 2.4 m on, and past the ring, in a sway of 3 cm."""
+    return np.array([max(2.4 - 0.5 * time_s, -0.2), 0.03 * np.sin(2.0 * time_s), 0.03 * np.sin(2.5 * time_s)])
+
+
+@pytest.mark.parametrize("seed", [0, 3, 5])
+def test_leds_out_of_the_rings_plane_are_not_refused_close_in(seed):
+    """They are out by their tolerance, 0.2 px at the ring, in a swing of 5 degrees; a spot is known to 0.006 px."""
+    sky, statuses, surest = Sky(None, closing_in, seed=seed), [], []
+    sky.misplaced_D[:, 0] = 3e-4 * np.random.default_rng(seed).standard_normal(8)
+    start = replace(sky.sheets.start, p_PD_B=closing_in(0.0), sigma_p_m=np.full(3, 0.05))
+    sky.sheets = replace(sky.sheets, start=start)
+    sky.navigator = Navigator(sky.sheets)
+    for tick in range(1, 500):
+        swing = np.radians(5.0) * min(0.01 * tick, 1.0)
+        sky.R_BD = matrix_from_yaw_pitch_roll(
+            0.03 + swing * np.sin(0.025 * tick), swing * np.sin(0.02 * tick) - 0.08, np.radians(1.0)
+        )
+        solution = step_on_leds(sky, range(8), sigma_px=0.006)
+        if tick > 20:
+            statuses.append(solution.status)
+            error = solution.p_PD_B - closing_in(0.01 * tick)
+            surest.append(error @ np.linalg.solve(solution.covariance[3:6, 3:6], error))
+    assert set(statuses) == {"pose used"}
+    assert max(surest) < 16.3 and np.mean(surest) < 3.0  # chi2 of three numbers, 0.999; their mean
+
+
 @pytest.mark.parametrize("led", [0, 2, 3])
 def test_an_led_that_wanders_off_slower_than_any_frame_can_see_is_left_out_at_last(led):
     """It goes 0.1 mm outward in a second, 6 mm in all; the fusion follows it as if its place were being learnt.
@@ -528,21 +555,21 @@ def test_the_window_is_made_for_the_next_exposure_however_old_the_frame(render):
     assert (growth[0::2] > 0).all() and (growth[1::2] == 0).all()  # two control ticks to an exposure
 
 
-def named(sky, numbers, time_s):
-    """What a model of the camera would draw: the true places of some LEDs, 0.1 px of noise."""
-    pixels = sky.led_pixels(time_s)[list(numbers)] + 0.1 * sky.rng.normal(size=(len(numbers), 2))
+def named(sky, numbers, time_s, sigma_px=0.1):
+    """What a model of the camera would draw: the true places of some LEDs, and noise."""
+    pixels = sky.led_pixels(time_s)[list(numbers)] + sigma_px * sky.rng.normal(size=(len(numbers), 2))
     return LedObservation(
         time_stamp_s=time_s,
         led_numbers=np.array(numbers, dtype=np.int64),
         centroids_px=pixels,
-        sigma_px=np.full(len(numbers), 0.1),
+        sigma_px=np.full(len(numbers), sigma_px),
     )
 
 
-def step_on_leds(sky, numbers):
+def step_on_leds(sky, numbers, sigma_px=0.1):
     """One control tick; every second with named LEDs in place of a frame."""
     imu = sky.imu()
-    seen = named(sky, numbers, imu[-1].time_stamp_s) if sky.tick % 2 == 0 else None
+    seen = named(sky, numbers, imu[-1].time_stamp_s, sigma_px) if sky.tick % 2 == 0 else None
     return sky.navigator.step(imu, seen)
 
 
