@@ -11,11 +11,12 @@ import numpy as np
 
 from dockair.errors import MachineError
 from dockair.messages import CameraFrame
+from dockair.rotations import Array
 from dockair.scenarios.flight_log import FlightLog
 from dockair.scenarios.loop import Flight, Tick
 from dockair.scenarios.recording_layout import blueprint
 from dockair.scenarios.recording_plots import log_plots
-from dockair.scenarios.recording_scene import log_scene
+from dockair.scenarios.recording_scene import hose_exit, log_moving, log_still, log_tip_path, tip_place
 from dockair.sim.shapes import shapes_of
 
 _SHOWN_HZ = 20.0  # a viewer needs no more, and each costs a few milliseconds
@@ -36,42 +37,56 @@ class LiveViewer:
         self._recording: Any = None
         self._next_s = 0.0
         self._episode = 0
+        self._frame: CameraFrame | None = None  # the newest that has not been drawn
+        self._p_TE: Array = np.zeros(3)
+        self._path: list[Array] = []
 
     def show(self, flight: Flight, tick: Tick) -> None:
         """Draw a control tick, if it is time for one; a new flight begins a new recording."""
         if flight is not self._flight:
             self._begin(flight)
-        if tick.truth.time_s < self._next_s and tick.outcome is None:
+        if isinstance(tick.frame, CameraFrame):
+            self._frame = tick.frame
+        time_s = tick.truth.time_s
+        if time_s < self._next_s and tick.outcome is None:
             return
-        self._next_s = tick.truth.time_s + 1.0 / _SHOWN_HZ
+        self._next_s = time_s + 1.0 / _SHOWN_HZ
+        self._draw(flight, tick)
+
+    def _draw(self, flight: Flight, tick: Tick) -> None:
+        import rerun as rr
+
         log = FlightLog()
-        log.append(tick.truth, tick.imu, tick.frame, tick.solution)
+        log.append(tick.truth, tick.imu, self._frame, tick.solution)
         self._recording.set_time("sim_time", duration=tick.truth.time_s)
-        log_scene(self._recording, log, [0], flight.sheets, ())
+        times = [rr.TimeColumn("sim_time", duration=[tick.truth.time_s])]
+        log_moving(self._recording, log, [0], times, flight.sheets, self._p_TE)
+        self._path.append(tip_place(tick.truth, self._p_TE))
+        log_tip_path(self._recording, self._path)
         log_plots(self._recording, log)
-        self._log_frame(tick.frame)
+        if self._frame is not None:
+            self._log_frame(self._frame)
+            self._frame = None
 
     def _begin(self, flight: Flight) -> None:
         import rerun as rr  # 0.75 s, and only this needs it
 
-        self._flight, self._next_s = flight, 0.0
+        self._flight, self._next_s, self._frame = flight, 0.0, None
+        self._p_TE, self._path = hose_exit(flight.truth), []
         self._episode += 1
         self._recording = rr.RecordingStream("dockair", recording_id=uuid4(), send_properties=False)
         self._recording.send_recording_name(f"{flight.scenario.name}, episode {self._episode}")
         self._recording.set_log_time_enabled(False)  # the timelines are the flight's
         self._sink(self._recording)
         self._recording.send_blueprint(blueprint(flight.sheets.camera))
-        log = FlightLog()
-        log.truths.append(flight.truth)
-        log_scene(self._recording, log, [], flight.sheets, shapes_of(flight.world.model))
+        log_still(self._recording, flight.sheets, shapes_of(flight.world.model))
 
-    def _log_frame(self, frame: Any) -> None:
+    def _log_frame(self, frame: CameraFrame) -> None:
         import rerun as rr
 
-        if isinstance(frame, CameraFrame):
-            shift = rr.Transform3D(translation=[frame.window.column_start, frame.window.row_start, 0])
-            self._recording.log("camera/window", shift)
-            self._recording.log("camera/window/pixels", rr.Image(np.asarray(frame.pixels), "L"))
+        shift = rr.Transform3D(translation=[frame.window.column_start, frame.window.row_start, 0])
+        self._recording.log("camera/window", shift)
+        self._recording.log("camera/window/pixels", rr.Image(np.asarray(frame.pixels), "L"))
 
 
 def _spawned(recording: Any) -> None:

@@ -331,8 +331,15 @@ def png_from_pixels(pixels: NDArray[np.uint8]) -> bytes:
 
 
 def pixels_from_png(png: bytes) -> NDArray[np.uint8]:
-    """(rows, columns) pixels of a stored frame."""
-    return np.asarray(cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_UNCHANGED), dtype=np.uint8)
+    """(rows, columns) pixels of a stored frame.
+
+    Raises:
+        DockairError: the frame is damaged.
+    """
+    pixels = cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_UNCHANGED) if png else None
+    if pixels is None:
+        raise DockairError(MESSAGES, expected="frames as a flight records them", got="a PNG that cannot be decoded")
+    return np.asarray(pixels, dtype=np.uint8)
 
 
 def read_estimates(out_dir: str | Path) -> Iterator[dict[str, Array | str]]:

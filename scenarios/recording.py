@@ -28,7 +28,7 @@ from dockair.scenarios.flight_log import FlightLog
 from dockair.scenarios.message_log import TickMessages, pixels_from_png, png_from_pixels
 from dockair.scenarios.recording_layout import BELIEF, CLOSE_UP, FOUND, NEUTRAL, TRUTH, blueprint
 from dockair.scenarios.recording_plots import log_plots
-from dockair.scenarios.recording_scene import log_scene, time_columns
+from dockair.scenarios.recording_scene import hose_exit, log_moving, log_still, log_tip_path, time_columns, tip_place
 from dockair.sim.shapes import Shape
 
 FILE_NAME = "episode.rrd"
@@ -67,7 +67,10 @@ def write_episode(
     recording.set_log_time_enabled(False)  # times of day would make two recordings of one flight differ
     recording.save(path, default_blueprint=blueprint(sheets.camera))
     ticks = drawn_ticks(log, sheets.control_rate_hz)
-    log_scene(recording, log, ticks, sheets, shapes)
+    p_TE = hose_exit(log.truths[0])
+    log_still(recording, sheets, shapes)
+    log_moving(recording, log, ticks, time_columns(log, ticks), sheets, p_TE)
+    log_tip_path(recording, [tip_place(truth, p_TE) for truth in log.truths])
     log_plots(recording, log)
     _log_overlays(recording, log, ticks, sheets)
     _log_frames(recording, log, list(messages))

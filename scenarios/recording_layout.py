@@ -10,15 +10,22 @@ BELIEF = [255, 159, 10]
 FOUND = [48, 209, 88]
 NEUTRAL = [255, 214, 10]
 PHASES = {
+    "join up": [85, 95, 125],
     "pre contact": [110, 130, 150],
     "approach": [10, 132, 255],
     "contact": [48, 209, 88],
     "hold": [36, 138, 61],
     "disconnect": [150, 110, 200],
     "clear": [90, 90, 100],
+    "back off": [255, 159, 10],
     "breakaway": [255, 69, 58],
 }
-STATUSES = {"pose used": [36, 138, 61], "no frame yet": [90, 90, 100], "truth": [90, 200, 250]}
+STATUSES = {
+    "pose used": [36, 138, 61],
+    "LEDs used": [48, 209, 88],
+    "no frame yet": [90, 90, 100],
+    "truth": [90, 200, 250],
+}
 OTHER = [200, 80, 60]  #: of a state that is none of these: something was not as it should be
 AXES = [[255, 69, 58], [48, 209, 88], [10, 132, 255]]
 

@@ -99,7 +99,7 @@ def _log_states(
     changes = [k for k, value in enumerate(values) if k == 0 or value != values[k - 1]]
     times = [rr.TimeColumn("sim_time", duration=[log.truths[k].time_s for k in changes])]
     states = [values[k].replace("_", " ") or "none" for k in changes]
-    known = sorted(set(states))
+    known = sorted({*states, *colours})  # all, for a flight that is sent in parts
     look = rr.StateConfiguration(values=known, labels=known, colors=[colours.get(state, OTHER) for state in known])
     recording.log(entity, look, static=True)
     recording.send_columns(entity, times, rr.StateChange.columns(state=states))

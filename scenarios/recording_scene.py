@@ -37,17 +37,39 @@ def time_columns(log: FlightLog, ticks: Sequence[int]) -> list[Any]:
     return [*columns, rr.TimeColumn("frame", sequence=np.maximum(frames, 0))] if numbers else columns
 
 
-def log_scene(
-    recording: Any, log: FlightLog, ticks: Sequence[int], sheets: NavigationSheets, shapes: Sequence[Shape]
-) -> None:
-    """Log bodies once, their poses at the given control ticks."""
+def hose_exit(first: Truth) -> Array:
+    """(3,) p_TE from the first truth of a flight: the exit is W's origin there, and T's axes are W's."""
+    return -first.p_WT
+
+
+def log_still(recording: Any, sheets: NavigationSheets, shapes: Sequence[Shape]) -> None:
+    """Log what does not change: the bodies' shapes, what is fitted to the receiver."""
     import rerun as rr
 
     recording.log("world", rr.ViewCoordinates.FLU, static=True)
     _log_bodies(recording, shapes)
     _log_receiver_fittings(recording, sheets)
-    times = time_columns(log, ticks)
-    p_TE = -log.truths[0].p_WT  # at the start the exit is W's origin, and T's axes are W's
+    recording.log(
+        "world/hose", rr.LineStrips3D.from_fields(colors=_HOSE_COLOUR, radii=_hose_radius(shapes)), static=True
+    )
+    _log_belief_shapes(recording, sheets)
+
+
+def log_moving(
+    recording: Any, log: FlightLog, ticks: Sequence[int], times: list[Any], sheets: NavigationSheets, p_TE: Array
+) -> None:
+    """Log where everything is at some control ticks.
+
+    Args:
+        recording: of rerun.
+        log: of the flight, or of a part of it.
+        ticks: indices into the log.
+        times: columns of the timelines at these ticks.
+        sheets: mounting of the probe.
+        p_TE: (3,) of `hose_exit`.
+    """
+    import rerun as rr
+
     truths = [log.truths[k] for k in ticks]
     axes = [_level_axes(truth, p_TE) for truth in truths]
     for body, (rotation, position) in _MOVED_BY.items():
@@ -56,15 +78,22 @@ def log_scene(
             R_EW @ (getattr(truth, position) - p_WE) for truth, (R_EW, p_WE) in zip(truths, axes, strict=True)
         ]
         recording.send_columns(f"world/{body}", times, _transforms(translations, rotations))
-    recording.log(
-        "world/hose", rr.LineStrips3D.from_fields(colors=_HOSE_COLOUR, radii=_hose_radius(shapes)), static=True
-    )
     strips = [(truth.p_WH - p_WE) @ R_EW.T for truth, (R_EW, p_WE) in zip(truths, axes, strict=True)]
     recording.send_columns("world/hose", times, rr.LineStrips3D.columns(strips=strips))
     _log_belief(recording, log, ticks, sheets, times)
-    everywhere = ((truth, *_level_axes(truth, p_TE)) for truth in log.truths)
-    path = np.array([R_EW @ (truth.p_WP - p_WE) for truth, R_EW, p_WE in everywhere])
-    line = rr.LineStrips3D([path], colors=[*TRUTH, 90], radii=rr.Radius.ui_points(0.8))
+
+
+def tip_place(truth: Truth, p_TE: Array) -> Array:
+    """(3,) the probe's tip in the axes of "world"; p_TE of `hose_exit`."""
+    R_EW, p_WE = _level_axes(truth, p_TE)
+    return np.asarray(R_EW @ (truth.p_WP - p_WE))
+
+
+def log_tip_path(recording: Any, places: Sequence[Array]) -> None:
+    """Log the way of the probe's tip, (n, 3) of `tip_place`, in the place of what was logged of it before."""
+    import rerun as rr
+
+    line = rr.LineStrips3D([np.array(places)], colors=[*TRUTH, 90], radii=rr.Radius.ui_points(0.8))
     recording.log("world/probe_path", line, static=True)
 
 
@@ -85,25 +114,31 @@ def _transforms(translations: Sequence[Array], rotations: Sequence[Array]) -> An
 def _log_belief(
     recording: Any, log: FlightLog, ticks: Sequence[int], sheets: NavigationSheets, times: list[Any]
 ) -> None:
-    """The believed drogue: ring, LEDs and axis, placed from the receiver as the navigation has it."""
+    """The believed drogue, placed from the receiver as the navigation has it, and what is commanded."""
     import rerun as rr
 
     solutions = [log.solutions[k] for k in ticks]
     places = [s.p_PD_B + sheets.mounting.p_BP for s in solutions]
     recording.send_columns("world/receiver/belief", times, _transforms(places, [s.R_BD for s in solutions]))
+    velocities = np.array([s.command.velocity_m_s for s in solutions]).reshape(-1, 3)
+    recording.send_columns("world/receiver/command", times, rr.Arrows3D.columns(vectors=velocities))
+
+
+def _log_belief_shapes(recording: Any, sheets: NavigationSheets) -> None:
+    """The believed drogue's ring, LEDs and axis; the foot of the command's arrow."""
+    import rerun as rr
+
     ring = np.vstack([sheets.ring.positions_D, sheets.ring.positions_D[:1]])
     axis = np.array([[0.0, 0.0, 0.0], [sheets.coupling_depth_m, 0.0, 0.0]])
     lines = rr.LineStrips3D([_circle(sheets.ring.diameter_m), axis], colors=BELIEF, radii=rr.Radius.ui_points(1.5))
     recording.log("world/receiver/belief/ring", lines, static=True)
     points = rr.Points3D(ring[:-1], colors=BELIEF, radii=rr.Radius.ui_points(3.0))
     recording.log("world/receiver/belief/leds", points, static=True)
-    velocities = np.array([s.command.velocity_m_s for s in solutions]).reshape(-1, 3)
     recording.log(
         "world/receiver/command",
         rr.Arrows3D.from_fields(origins=[sheets.mounting.p_BP], colors=BELIEF, radii=rr.Radius.ui_points(1.5)),
         static=True,
     )
-    recording.send_columns("world/receiver/command", times, rr.Arrows3D.columns(vectors=velocities))
 
 
 def _circle(diameter_m: float) -> Array:

@@ -54,8 +54,8 @@ def check_integer(name: str, value: Any, least: int) -> int:
     raise DockairError(name, expected=f"an integer from {least} on", got=value)
 
 
-def check_choice(name: str, value: str | None, exists: tuple[str | None, ...]) -> None:
+def check_choice(name: str, value: Any, exists: tuple[str | None, ...]) -> None:
     """Refuse a value that is none of those that exist."""
-    if value not in exists:
+    if not (value is None or isinstance(value, str)) or value not in exists:
         expected = "None or one of" if None in exists else "one of"
         raise DockairError(name, expected=expected, got=value, exists=[one for one in exists if one is not None])

@@ -239,3 +239,9 @@ def test_another_sensing_than_the_environments_own_is_refused_and_its_own_is_not
     assert made().chosen_scenario({"set": {"camera.sensing": own}}).camera.sensing == own
     with pytest.raises(DockairError, match=rf'^options\.set: camera\.sensing: expected "{own}", .*, got \'{other}\'$'):
         made().reset(options={"set": {"camera.sensing": other}})
+
+
+@pytest.mark.parametrize("reward", ["dens", None, 1.0, ["dense"], np.array([1, 2])])
+def test_a_reward_that_does_not_exist_is_refused_with_those_that_do(reward):
+    with pytest.raises(DockairError, match=r"reward: expected one of(, got .+)?; exists: dense, sparse"):
+        DockEnv(reward=reward)

@@ -1,11 +1,13 @@
 """The live viewer: what it logs while an episode is flown, and that each episode is a recording of its own."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from dockair.errors import MachineError
+from dockair.rotations import matrix_from_yaw_pitch_roll
 from dockair.scenarios import envs_viewer
 from dockair.scenarios.envs_viewer import LiveViewer
 from dockair.scenarios.loop import Tick
@@ -86,7 +88,66 @@ def test_a_viewer_that_is_asked_twice_for_one_tick_draws_it_once(hand_made, monk
     viewer = LiveViewer(opened.append)
     flight = _flight(hand_made)
     drawn = []
-    monkeypatch.setattr(envs_viewer, "log_scene", lambda recording, log, ticks, sheets, shapes: drawn.append(ticks))
+    monkeypatch.setattr(envs_viewer, "log_moving", lambda recording, log, *_: drawn.append(log.truths[0].time_s))
+    _show(viewer, hand_made, flight, 4)
     _show(viewer, hand_made, flight, 4)
     assert len(opened) == 1
-    assert drawn == [[], [0]]
+    assert drawn == [0.01]
+
+
+def _episode(hand_made, monkeypatch, path, ticks):
+    """What the viewer is sent of some ticks (truth, imu, frame, solution)."""
+    monkeypatch.setattr(envs_viewer, "shapes_of", lambda model: ())
+    recordings = []
+
+    def keep(recording) -> None:
+        recordings.append(recording)
+        recording.save(path)
+
+    viewer, flight = LiveViewer(keep), _flight(hand_made)
+    flight.truth = ticks[0][0]
+    for truth, imu, frame, solution in ticks:
+        viewer.show(flight, Tick(truth=truth, imu=imu, frame=frame, solution=solution, outcome=None))
+    recordings[0].flush()
+    recordings[0].disconnect()
+    return _rows(path)
+
+
+def test_behind_a_tanker_that_turns_the_scene_stands_where_a_recorded_episode_has_it(hand_made, monkeypatch, tmp_path):
+    """The tanker turns by 40 degrees and flies 300 m meanwhile, with all that follows it."""
+    ticks, first = [], hand_made.truth(10)
+    for k, (truth, imu, frame, solution) in enumerate(hand_made.ticks(100)):
+        turn = matrix_from_yaw_pitch_roll(np.radians(0.4 * k), 0.0, 0.0)
+        exit_W, p_WE = np.array([3.0 * k, 0.01 * k**2, -0.2 * k]), truth.p_WT - first.p_WT
+        moved = {name: exit_W + turn @ (getattr(truth, name) - p_WE) for name in ("p_WT", "p_WD", "p_WB", "p_WP")}
+        turned = {name: turn @ getattr(truth, name) for name in ("R_WT", "R_WD", "R_WB")}
+        ticks.append((replace(truth, **moved, **turned), imu, frame, solution))
+    rows = _episode(hand_made, monkeypatch, tmp_path / "turn.rrd", ticks)
+    tanker = np.array(rows["/world/tanker:Transform3D:translation"]).reshape(-1, 3)
+    assert len(tanker) > 15
+    np.testing.assert_allclose(tanker, np.tile(first.p_WT, (len(tanker), 1)), atol=1e-4)
+
+
+def test_the_way_of_the_tip_grows(hand_made, monkeypatch, tmp_path):
+    rows = _episode(hand_made, monkeypatch, tmp_path / "way.rrd", hand_made.ticks(50))
+    longest = max(len(strips[0]) for strips in rows["/world/probe_path:LineStrips3D:strips"] if strips)
+    assert longest == len(rows["/plots/range/belief:Scalars:scalars"])
+
+
+@pytest.mark.parametrize("every", [2, 5, 10])
+def test_no_camera_is_too_slow_to_be_shown(hand_made, monkeypatch, tmp_path, every):
+    """A frame that comes between two updates is drawn with the second: at 10 and 20 Hz all, at 50 Hz one an update."""
+    ticks = [
+        (truth, imu, hand_made.frame(truth) if k % every == 0 else None, solution)
+        for k, (truth, imu, _, solution) in enumerate(hand_made.ticks(60), start=1)
+    ]
+    rows = _episode(hand_made, monkeypatch, tmp_path / "frames.rrd", ticks)
+    updates = len(rows["/plots/range/belief:Scalars:scalars"])
+    assert len(rows["/camera/window/pixels:Image:buffer"]) == pytest.approx(min(60 // every, updates), abs=1)
+
+
+def test_every_phase_keeps_its_name_and_colour(hand_made, monkeypatch, tmp_path):
+    ticks = [hand_made.tick(k) for k in (200, 400)]  # astern, then closing in
+    rows = _episode(hand_made, monkeypatch, tmp_path / "phases.rrd", ticks)
+    (names, *_) = [names for names in rows["/states/phase:StateConfiguration:values"] if names]
+    assert {"pre contact", "approach", "contact", "hold", "breakaway", "back off"} <= set(names)

@@ -14,6 +14,8 @@ from dockair.scenarios.message_log import (
     NavigatorRecipe,
     TickMessages,
     estimate_row,
+    pixels_from_png,
+    png_from_pixels,
     read_estimates,
     read_messages,
 )
@@ -163,3 +165,11 @@ def test_a_full_disk_reaches_the_flight(hand_made, tmp_path, monkeypatch):
 def test_a_folder_without_recording_says_what_is_missing(tmp_path):
     with pytest.raises(DockairError, match=r"messages\.parquet: expected a flight by camera, recorded with --record"):
         next(read_messages(tmp_path))
+
+
+@pytest.mark.parametrize("damage", [lambda png: b"", lambda png: b"no picture", lambda png: png[:20]])
+def test_a_frame_that_is_damaged_is_said_to_be(damage):
+    png = png_from_pixels(np.arange(12, dtype=np.uint8).reshape(3, 4))
+    np.testing.assert_array_equal(pixels_from_png(png), np.arange(12).reshape(3, 4))
+    with pytest.raises(DockairError, match=r"messages\.parquet: expected frames .* cannot be decoded"):
+        pixels_from_png(damage(png))
