@@ -76,10 +76,18 @@ def _from_exit(flight: Any, points_W: Array, moments: slice = slice(None)) -> Ar
     return np.asarray(np.einsum("kij,kmj->kmi", level, from_exit_W).reshape(points_W.shape))
 
 
+def _contact(flight: Any) -> tuple[bool, int]:
+    """Return whether the probe was held, and the tick of that, or where the tip was nearest to the drogue."""
+    held = np.flatnonzero(_values(flight, "truth_latched"))
+    if len(held):
+        return True, int(held[0])
+    apart_m = np.linalg.norm(_points(flight, "truth_p_WP") - _points(flight, "truth_p_WD"), axis=1)
+    return False, int(np.argmin(apart_m))
+
+
 def _draw_side_view(axes: Any, flight: Any) -> None:
     tip, drogue = (_from_exit(flight, _points(flight, name)) for name in ("truth_p_WP", "truth_p_WD"))
-    held = np.flatnonzero(_values(flight, "truth_latched"))
-    moment = int(held[0]) if len(held) else int(np.argmin(np.linalg.norm(tip - drogue, axis=1)))
+    held, moment = _contact(flight)
     hose = np.array(flight["truth_p_WH_m"][moment].as_py()).reshape(1, -1, 3)
     hose = _from_exit(flight, hose, slice(moment, moment + 1))[0]
     phases = flight["nav_phase"].to_pylist()
@@ -90,7 +98,7 @@ def _draw_side_view(axes: Any, flight: Any) -> None:
     axes.plot(tip[before, 0], tip[before, 2], color=_TRUTH, lw=1.6, label="probe's tip, to contact")
     axes.plot(tip[moment:, 0], tip[moment:, 2], color=_TRUTH, lw=0.8, alpha=0.5, label="and after")
     axes.plot(*tip[0, [0, 2]], marker="o", ms=4, color=_TRUTH, ls="none")
-    words = "contact" if len(held) else f"nearest, {phases[moment].replace('_', ' ')}"
+    words = "contact" if held else f"nearest, {phases[moment].replace('_', ' ')}"
     time_s = _values(flight, "time_s")[moment]
     axes.annotate(
         f"{words} at {time_s:.1f} s", tip[moment, [0, 2]], xytext=(0, -34), textcoords="offset points", ha="center",
@@ -108,6 +116,8 @@ def _chosen_frame(folder: Path, flight: Any) -> tuple[Any, tuple[int, int], Any,
         return None
     ahead, named = _values(flight, "nav_p_PD_B_x_m"), _values(flight, "nav_leds_named")
     fresh = _fresh(flight)
+    inward = fresh[fresh <= _contact(flight)[1]]
+    fresh = inward if len(inward) else fresh  # the way back passes there, too
     chosen = int(fresh[np.argmin(np.abs(ahead[fresh] - FRAME_AT_M) + 10.0 * (8 - named[fresh]))])
     messages = message_log.read_messages(folder, pixels=False)
     tick = next(tick for k, tick in enumerate(messages) if k == chosen)

@@ -184,6 +184,23 @@ def test_a_picture_shows_the_only_frame_of_a_camera_that_drops_out_after_it(hand
     np.testing.assert_array_equal(drawn[0], hand_made.tick(2)[2].pixels)
 
 
+def test_a_picture_shows_a_frame_of_the_way_in_though_one_of_the_way_back_is_nearer_to_the_range(
+    hand_made, tmp_path, monkeypatch
+):
+    """It closes to 1.72 m, is held, and backs off through 1.5 m."""
+    log = FlightLog()
+    with MessageLog(tmp_path, NavigatorRecipe(class_name="a:B", sheets=hand_made.sheets)) as messages:
+        for k in [*range(480, 491), 660, *range(1020, 1031)]:
+            truth, imu, frame, solution = hand_made.tick(k)
+            log.append(truth, imu, frame, solution)
+            messages.append(imu, frame, solution)
+    log.write_parquet(tmp_path)
+    drawn = []
+    monkeypatch.setattr(picture, "_draw_frame", lambda axes, pixels, *rest: drawn.append(pixels))
+    picture_of_flight(tmp_path)
+    np.testing.assert_array_equal(drawn[0], hand_made.tick(490)[2].pixels)
+
+
 def test_a_picture_needs_no_frames(flown):
     folder, _, _ = flown
     (folder / "messages.parquet").unlink()
