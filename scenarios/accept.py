@@ -199,7 +199,7 @@ def _check(rows: Sequence[Row]) -> None:
 
 
 def _rate(label: str, count: int, of: int, wanted: float | None) -> list[str]:
-    if wanted is None or (of > 0 and count >= wanted * of):
+    if wanted is None or (of > 0 and count / of >= wanted):  # wanted * of may round to above a whole number
         return []
     return [f"{label} {count} of {of}, wanted at least {100.0 * wanted:g} %"]
 

@@ -47,7 +47,7 @@ def campaign(
     folder = out or default_folder(source.plan.name)
     if dry:
         with stdout_kept(as_json):
-            planned = dry_run(source, folder).to_dict()
+            planned = dry_run(source, folder, fresh=fresh, retry_errors=retry_errors).to_dict()
         print_json(planned) if as_json else show_dry_run(planned)
         return
     with stdout_kept(as_json), CampaignProgress() as progress:

@@ -29,16 +29,25 @@ class DryRun:
         return head | {"groups": self.groups, "commands": self.commands}
 
 
-def dry_run(source: PlanFile, folder: Path) -> DryRun:
+def dry_run(source: PlanFile, folder: Path, *, fresh: bool = False, retry_errors: bool = False) -> DryRun:
     """Return what a campaign would fly; flights in the folder's journal count as done, errors among them.
+
+    Whether the folder's flights are of the same code and draws is asked by `run` alone.
+
+    Args:
+        source: the plan.
+        folder: of the campaign.
+        fresh: what was flown there does not count.
+        retry_errors: what ended in an error does not.
 
     Raises:
         DockairError: the plan cannot be flown; the folder is no campaign's, or its journal is damaged.
     """
     jobs = checked_jobs(source)
-    check(folder)
-    entries = entries_of(folder) if os.path.isfile(folder / journal.FILE_NAME) else {}
-    done = {flight_of(entry["row"]) for entry in entries.values()}
+    check(folder, fresh=fresh)
+    entries = entries_of(folder) if not fresh and os.path.isfile(folder / journal.FILE_NAME) else {}
+    rows = [entry["row"] for entry in entries.values()]
+    done = {flight_of(row) for row in rows if not (retry_errors and row["error"])}
     groups = [
         {**group.kind, "flights": len(group.rows), "done": sum(flight_of(row) in done for row in group.rows)}
         for group in groups_of([unflown(job) for job in jobs])

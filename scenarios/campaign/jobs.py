@@ -114,13 +114,9 @@ def with_background(job: Job, background: str) -> Job:
 
 def scenario_hash(scenario: Scenario) -> str:
     """Return a digest of all that decides a flight but its seed, the sheets that the scenario names included."""
-    digest = blake2b(digest_size=8)
     table = scenario.model_dump(mode="json", exclude=_SAYS_NOTHING_OF_THE_FLIGHT)
-    digest.update(json.dumps(table, sort_keys=True).encode())
-    for path in (scenario.hardware.camera, scenario.hardware.ring):
-        if path is not None:
-            digest.update(Path(path).read_bytes())
-    return digest.hexdigest()
+    table["hardware"] = _sheets_by_content(table["hardware"])
+    return blake2b(json.dumps(table, sort_keys=True).encode(), digest_size=8).hexdigest()
 
 
 def file_hash(file: str) -> str:
@@ -129,14 +125,19 @@ def file_hash(file: str) -> str:
         key: value for key, value in ScenarioFile(file, {}).table.items() if key not in _SAYS_NOTHING_OF_THE_FLIGHT
     }
     hardware = table.get("hardware")
-    if isinstance(hardware, dict):  # a path is written otherwise from another folder
-        table["hardware"] = {
-            key: blake2b(Path(value).read_bytes(), digest_size=8).hexdigest()
-            if key in _SHEETS and isinstance(value, str) and Path(value).is_file()
-            else value
-            for key, value in hardware.items()
-        }
+    if isinstance(hardware, dict):
+        table["hardware"] = _sheets_by_content(hardware)
     return blake2b(json.dumps(table, sort_keys=True, default=str).encode(), digest_size=8).hexdigest()
+
+
+def _sheets_by_content(hardware: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the table with digests for the paths of sheets, which are written otherwise from another folder."""
+    return {
+        key: blake2b(Path(value).read_bytes(), digest_size=8).hexdigest()
+        if key in _SHEETS and isinstance(value, str) and Path(value).is_file()
+        else value
+        for key, value in hardware.items()
+    }
 
 
 def _layers(source: PlanFile, index: int, entry: Entry, point: Point) -> Layers:

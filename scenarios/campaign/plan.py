@@ -28,7 +28,8 @@ def flat(value: Any) -> Any:
     level: dict[str, Any] = {}
     for key, entry in value.items():
         inner = flat(entry)
-        level |= {f"{key}.{name}": v for name, v in inner.items()} if isinstance(inner, dict) else {key: inner}
+        nested = isinstance(inner, dict) and inner  # an empty table is a value: as `--set` takes it
+        level |= {f"{key}.{name}": v for name, v in inner.items()} if nested else {key: inner}
     return level
 
 

@@ -64,6 +64,11 @@ def unflown(job: Job) -> Row:
     return row_of(job, Answer(columns=None))
 
 
+def as_asked(row: Row, job: Job) -> Row:
+    """Return a row of a job that is done, said as the plan says it now: it may have been written otherwise before."""
+    return {name: value for name, value in row.items() if not name.startswith(SET)} | _asked(job)
+
+
 def flight_of(row: Mapping[str, Any]) -> tuple[str, int]:
     """Return which flight a row is of: the scenario's hash, and the seed."""
     return row["scenario_hash"], row["seed"]

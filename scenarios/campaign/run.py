@@ -16,10 +16,11 @@ from dockair.scenarios.campaign.journal import Journal
 from dockair.scenarios.campaign.manifest import FILE_NAME, manifest_of, read_manifest, require_same, write_json
 from dockair.scenarios.campaign.plan_file import PlanFile
 from dockair.scenarios.campaign.pool import Done, Pool
-from dockair.scenarios.campaign.row import row_of, unflown
+from dockair.scenarios.campaign.row import as_asked, row_of, unflown
 from dockair.scenarios.campaign.summary import summary_of
 from dockair.scenarios.campaign.table import write_table
 from dockair.scenarios.campaign.worker import FLIGHT
+from dockair.scenarios.report.groups import drawn_of, groups_of
 
 #: Called with a row and its wall time as it is done, and with None now and then.
 Watcher = Callable[[dict[str, Any] | None, float], None]
@@ -110,9 +111,22 @@ def checked_jobs(source: PlanFile) -> list[Job]:
         DockairError: the plan cannot be flown, or its gate would say nothing.
     """
     jobs = jobs_of(source)
+    _refuse_unlike_in_a_group(source, jobs)
     if source.plan.asked is not None:
         require_power(source.plan.asked, [unflown(job) for job in jobs], source.place("gate"))
     return jobs
+
+
+def _refuse_unlike_in_a_group(source: PlanFile, jobs: Sequence[Job]) -> None:
+    """Refuse flights that would be counted together and are not alike: settings in another order may be others."""
+    for group in groups_of([unflown(job) for job in jobs]):
+        first: dict[str, str] = {}
+        for row in group.rows:
+            if not drawn_of(row):
+                first.setdefault(row["scenario_hash"], row["command"])
+        if len(first) > 1:
+            expected = "settings that differ in more than their order, or than perfect navigation takes no notice of"
+            raise DockairError(source.place("scenarios"), expected=expected, got=" and ".join(list(first.values())[:2]))
 
 
 def _begun_once(journal: Journal, out: Path, now: dict[str, Any], jobs: Sequence[Job]) -> dict[str, Any]:
@@ -146,7 +160,7 @@ def _finish(
     source: PlanFile, out: Path, jobs: Sequence[Job], entries: Sequence[dict[str, Any]], timing: dict[str, Any]
 ) -> Campaign:
     """Write the table and what it shows."""
-    rows = [entry["row"] for entry in entries]
+    rows = [as_asked(entry["row"], job) for entry, job in zip(entries, jobs, strict=True)]
     write_table(rows, out)
     verdict = None if source.plan.asked is None else judge(source.plan.asked, rows)
     campaign = Campaign(name=source.plan.name, folder=out, rows=rows, groups=summary_of(rows, jobs), verdict=verdict)

@@ -9,7 +9,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from os.path import normpath
 
 import numpy as np
 
@@ -95,10 +94,10 @@ def _docked_at_once(row: Row) -> bool:
 
 
 def _by_conditions(rows: Sequence[Row], apart: tuple[str, ...]) -> dict[tuple[str, ...], list[Row]]:
-    """Return the rows by what else decides the flight: file, seed, values set and drawn."""
+    """Return the rows by what else decides the flight: seed, values set and drawn; a name has one content."""
     found: dict[tuple[str, ...], list[Row]] = {}
     for row in rows:
-        file, options = file_and_settings(row)
+        _, options = file_and_settings(row)
         settings = [text for text in options if not key_of(text).startswith(apart)]
-        found.setdefault((normpath(file), str(row["seed"]), *sorted(settings)), []).append(row)
+        found.setdefault((str(row["seed"]), *sorted(settings)), []).append(row)
     return found

@@ -28,6 +28,13 @@ def test_a_rate_is_reached_at_exactly_its_part_and_missed_by_one_flight_less():
     assert accept.judge(rows(18, 2, MISSED)) == ["contacts at the first attempt 18 of 20, wanted at least 95 %"]
 
 
+@pytest.mark.parametrize("good", [7, 14, 28, 55, 56])
+def test_a_rate_that_is_just_reached_is_reached_however_it_rounds(good):
+    accept = Accept(success_rate_min=good / 100)
+    assert accept.judge(rows(good, 100 - good, MISSED)) == []
+    assert accept.judge(rows(good - 1, 101 - good, MISSED)) != []
+
+
 def test_a_contact_in_a_later_attempt_counts_for_the_one_rate_and_not_for_the_other():
     later = rows(1, 1, {"first_attempt": False})
     accept = Accept(first_attempt_rate_min=1.0, success_rate_min=1.0)

@@ -182,6 +182,20 @@ def test_the_digest_sees_into_the_sheets_that_the_scenario_names(tmp_path):
     assert scenario_hash(scenario) != before
 
 
+def test_the_digest_does_not_see_how_the_path_of_a_sheet_is_written(tmp_path, monkeypatch):
+    """The same flight by a plan in another folder, or asked for from another one, is the same."""
+    (tmp_path / "ring.toml").write_text("a = 1")
+    monkeypatch.chdir(tmp_path)
+    paths = ["ring.toml", str(tmp_path / "ring.toml"), "../" + tmp_path.name + "/ring.toml"]
+    assert len({scenario_hash(load_scenario("default", {"hardware.ring": path})) for path in paths}) == 1
+
+
+def test_an_empty_table_in_set_is_a_value_as_on_the_command_line(plan):
+    (job,) = jobs_of(plan('scenarios = ["moderate_gusts"]\n[set]\nturbulence = {}'))
+    assert job.scenario.turbulence == load_scenario("moderate_gusts", {"turbulence": "{}"}).turbulence
+    assert job.scenario.turbulence != load_scenario("moderate_gusts").turbulence
+
+
 @pytest.mark.parametrize("name", plan_names())
 def test_every_packaged_plan_can_be_flown_and_says_what_for(name):
     source = PlanFile(name)

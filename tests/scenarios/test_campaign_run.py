@@ -20,6 +20,7 @@ from rich.console import Console
 from dockair.errors import DockairError, MachineError
 from dockair.scenarios import campaign_command, cli
 from dockair.scenarios.campaign import manifest
+from dockair.scenarios.campaign import pool as pool_module
 from dockair.scenarios.campaign import run as run_module
 from dockair.scenarios.campaign.code import Code, plug_in_files
 from dockair.scenarios.campaign.dry_run import dry_run
@@ -715,6 +716,54 @@ def test_a_dry_run_says_what_would_be_flown_and_writes_nothing(command, here, tm
     plan(tmp_path, 6)
     assert "2 of 6 flights would be flown" in command("p.toml", "--dry-run")[1]
     assert command("p.toml", "--dry-run", "--set", "start.aft=1")[0] == 2
+    assert "4 of 4 flights would be flown" in command("p.toml", "--dry-run", "--seeds", "4", "--fresh")[1]
+
+
+def test_a_dry_run_counts_errors_as_done_unless_they_are_to_be_tried_again(here, tmp_path):
+    source = plan(tmp_path, 3)
+    fly(source, tmp_path / "out", "never")
+    done = [dry_run(source, tmp_path / "out", retry_errors=again).groups[0]["done"] for again in (False, True)]
+    assert done == [3, 0]
+
+
+def test_flights_that_are_done_are_told_as_the_plan_says_them_now(here, tmp_path):
+    """The same setting as the scenario's file has, written out later: one group, of all the flights."""
+    fly(plan(tmp_path, 2, "", '"light_gusts"'), tmp_path / "out")
+    grown = plan(tmp_path, 4, '[set]\n"turbulence.intensity" = "light"', '"light_gusts"')
+    over = fly(grown, tmp_path / "out")
+    assert len(lines(here)) == 4
+    assert [group["flights"] for group in over.groups] == [4]
+    assert {"turbulence.intensity" in row["command"] for row in read_table(tmp_path / "out")} == {True}
+
+
+@pytest.mark.parametrize(
+    "entries",
+    [
+        """{ scenario = "default", set = { turbulence.sigma_m_s = 0.2, turbulence.intensity = "severe" } },
+           { scenario = "default", set = { turbulence.intensity = "severe", turbulence.sigma_m_s = 0.2 } }""",
+        """{ scenario = "default", set = { navigation.navigator = "truth" } },
+           { scenario = "default", set = { navigation.navigator = "truth", camera.sensing = "measurements" } }""",
+    ],
+)
+def test_flights_that_would_be_counted_together_and_are_not_alike_are_refused_before_any_is_flown(
+    here, tmp_path, entries
+):
+    with pytest.raises(DockairError, match=r"p\.toml: scenarios: expected settings that differ in more than"):
+        fly(plan(tmp_path, 2, "", entries), tmp_path / "out")
+    assert lines(here) == [] and not (tmp_path / "out").exists()
+
+
+def test_a_process_that_flies_does_not_hear_of_ctrl_c_from_its_first_moment(fakes):
+    """While it imports what it needs, too: the signal goes to the whole group, and is for us alone."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, ())
+    worker = pool_module._Worker("fake_flights:quick")
+    try:
+        status = Path(f"/proc/{worker.process.pid}/status").read_text()
+    finally:
+        worker.end(at_once=True)
+    (blocked,) = (line.split()[1] for line in status.splitlines() if line.startswith("SigBlk"))
+    assert int(blocked, 16) & 1 << signal.SIGINT - 1
+    assert signal.pthread_sigmask(signal.SIG_BLOCK, ()) == before
 
 
 def test_flights_with_other_settings_are_told_apart_while_they_are_flown(here, tmp_path):

@@ -201,6 +201,19 @@ def test_two_controllers_are_compared_on_the_flights_that_both_have_flown():
     assert "Two crews side by side" in text and "0.62" in text
 
 
+def test_a_scenario_of_ones_own_is_paired_however_its_path_was_written():
+    """One name has one content: `report` has refused anything else."""
+
+    def flown(path, seed, controller):
+        command = _command(path, seed, **{"guidance.controller": controller})
+        return _row(seed, scenario="mine", controller=controller, command=command)
+
+    one = [flown("sub/mine.toml", seed, "predictive") for seed in range(3)]
+    other = [flown("/where/sub/mine.toml", seed, "pid") for seed in range(3)]
+    ((_, _, pair),) = side_by_side(groups_of(one + other))
+    assert pair.flights == 3
+
+
 def test_a_key_of_guidance_is_the_crews_and_one_of_the_world_is_not():
     narrow, gusts = {"guidance.capture_radius_m": 0.1}, {"turbulence.sigma_m_s": 0.5}
     rows = [_flown_by({}, 0, True), _flown_by(narrow, 0, False), _flown_by({}, 0, True, **gusts)]
