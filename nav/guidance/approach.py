@@ -225,6 +225,7 @@ class Guidance:
             pushed_in_m=self._pushed_in_m,
             attempts=self._attempts,
             light_is_red=self._light_is_red,
+            hose_has_whipped=self._evasion.hose_has_whipped,
         )
 
     def _change_phase(self, situation: Situation) -> None:

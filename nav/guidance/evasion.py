@@ -3,7 +3,8 @@
 A drogue that comes off the probe sideways, or out of a view that frames go on to give, is on such a hose: as the phase
 ends in which the probe was held or, where the pod's light is red, on the way back from it, before the drogue is ahead
 of the tip. On the way back before an amber light it is pulled off, and gusts may take it aside as it goes. Where the
-camera itself stopped it may still be on the probe, and the receiver goes straight back.
+camera itself stopped it may still be on the probe, and the receiver goes straight back. A hose that has whipped once is
+not tried again (`phases`): nothing says that it will not do so again.
 
 Not modelled: where the hose is; how long it whips.
 """
@@ -26,6 +27,7 @@ class Evasion:
     def __init__(self, settings: GuidanceSettings, step_s: float) -> None:
         self._limits, self._lasts_s, self._step_s = settings.limits, settings.evade_s, step_s
         self._was_held, self._left_s = False, 0.0
+        self.hose_has_whipped = False  #: once, ever
 
     def step(self, before: Phase, phase: Phase, situation: Situation) -> bool:
         """Advance by one control tick, and return whether to go down now.
@@ -42,7 +44,7 @@ class Evasion:
         self._was_held = self._was_held or ends_hold
         self._left_s = max(self._left_s - self._step_s, 0.0)
         if self._was_held and _comes_off_aside(self._limits, situation, ends_hold=ends_hold):
-            self._was_held, self._left_s = False, self._lasts_s
+            self._was_held, self._left_s, self.hose_has_whipped = False, self._lasts_s, True
         return self._left_s > 0.0
 
 

@@ -95,6 +95,7 @@ class Situation:
     pushed_in_m: float  #: way flown toward the tanker since the coupling was reached
     attempts: int  #: approaches begun
     light_is_red: bool = False  #: of the pod: the hose is dead
+    hose_has_whipped: bool = False  #: a drogue has come off the probe as from a hose that nothing takes up
 
 
 _Condition = Callable[[PhaseLimits, Situation], bool]
@@ -147,6 +148,7 @@ class Transition:
 
 _TOO_FAST = Transition(Phase.BREAKAWAY, "closing too fast", lambda limits, s: s.closing_m_s > limits.closure_limit_m_s)
 _AWAY = (
+    Transition(Phase.CLEAR, "hose has whipped", lambda limits, s: _far_enough(limits, s) and s.hose_has_whipped),
     Transition(
         Phase.CLEAR,
         "no attempts left",

@@ -357,6 +357,24 @@ def test_from_a_drogue_that_came_off_the_probe_sideways_it_goes_down_for_a_momen
     assert abs(down[-1]) < 1.0
 
 
+@pytest.mark.parametrize("phase", [Phase.CONTACT, Phase.HOLD])
+@pytest.mark.parametrize(
+    ("where", "after"), [([-DEPTH_M, 0.4, 0.3], Phase.CLEAR), ([0.3, 0.1, 0.0], Phase.PRE_CONTACT)]
+)
+def test_a_hose_that_has_whipped_is_not_tried_again_and_a_drogue_that_slipped_off_ahead_is(phase, where, after):
+    guidance = Guidance(SETTINGS, RATE_HZ)
+    guidance.step(state([-DEPTH_M, 0.01, 0.0]))
+    guidance.phase = phase
+    guidance.step(state(where))
+    assert guidance.phase in (Phase.BACK_OFF, Phase.BREAKAWAY)
+    for ahead_m in np.linspace(0.3, 3.5, 4 * RATE_HZ):
+        guidance.step(state([ahead_m, 0.1, 0.0], [0.8, 0.0, 0.0]))
+        if guidance.phase not in (Phase.BACK_OFF, Phase.BREAKAWAY):
+            break
+    assert guidance.phase is after
+    assert (guidance.phase_reason == "hose has whipped") is (after is Phase.CLEAR)
+
+
 def gone_down(where_later, **later):
     """Lowest velocity up, of a receiver that goes back by a red light from a drogue that then comes off."""
     guidance = Guidance(SETTINGS, RATE_HZ)

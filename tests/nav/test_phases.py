@@ -110,6 +110,9 @@ OPENING = {"closing_m_s": -1.0}
         ("breakaway", {"in_phase_s": 10.0}, "pre_contact"),
         ("breakaway", {"in_phase_s": 10.0, "attempts": 3}, "clear"),
         ("breakaway", HELD | {"in_phase_s": 10.0}, None),
+        ("breakaway", OPENING | {"ring_ahead_m": 3.1, "hose_has_whipped": True}, "clear"),
+        ("back_off", OPENING | {"ring_ahead_m": 3.1, "hose_has_whipped": True}, "clear"),
+        ("back_off", OPENING | {"ring_ahead_m": 2.9, "hose_has_whipped": True}, None),
     ],
 )
 def test_each_row_of_the_table(phase, changes, following):
