@@ -230,7 +230,7 @@ class Navigator:
         """(n,) sigma of the LEDs' images for the filter: the centroid's, and that of what it does not learn [px].
 
         It learns the LEDs' places in the ring's plane, and takes none to be out of it. One that is shows the more the
-        farther it is seen off the drogue's axis: next to nothing at 5 m, by ten sigmas of the centroid at the ring.
+        farther it is seen off the drogue's axis: less than the centroid's noise 8 m ahead, ten times it at the ring.
         """
         arm_D = self._points_D[seen.led_numbers] + R_CD.T @ p_CD
         slope = np.hypot(arm_D[:, 1], arm_D[:, 2]) / np.abs(arm_D[:, 0])
