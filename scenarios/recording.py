@@ -69,10 +69,11 @@ def write_episode(
     ticks = drawn_ticks(log, sheets.control_rate_hz)
     p_TE = hose_exit(log.truths[0])
     log_still(recording, sheets, shapes)
-    log_moving(recording, log, ticks, time_columns(log, ticks), sheets, p_TE)
+    times = time_columns(log, ticks)
+    log_moving(recording, log, ticks, times, sheets, p_TE)
     log_tip_path(recording, [tip_place(truth, p_TE) for truth in log.truths])
     log_plots(recording, log)
-    _log_overlays(recording, log, ticks, sheets)
+    _log_overlays(recording, log, ticks, times, sheets)
     _log_frames(recording, log, list(messages))
     if summary:
         recording.log("summary", rr.TextDocument(summary, media_type="text/markdown"), static=True)
@@ -90,11 +91,12 @@ def drawn_ticks(log: FlightLog, control_rate_hz: int) -> list[int]:
     return list(range(0, len(stamps), max(control_rate_hz // RATE_HZ, 1)))
 
 
-def _log_overlays(recording: Any, log: FlightLog, ticks: Sequence[int], sheets: NavigationSheets) -> None:
+def _log_overlays(
+    recording: Any, log: FlightLog, ticks: Sequence[int], times: list[Any], sheets: NavigationSheets
+) -> None:
     import rerun as rr
 
     solutions = [log.solutions[k] for k in ticks]
-    times = time_columns(log, ticks)
     send = recording.send_columns
     width, height = sheets.camera.width_px, sheets.camera.height_px
     sensor = rr.Boxes2D(array=[0, 0, width, height], array_format=rr.Box2DFormat.XYWH, colors=[70, 70, 70])

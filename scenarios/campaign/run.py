@@ -20,7 +20,7 @@ from dockair.scenarios.campaign.row import as_asked, row_of, unflown
 from dockair.scenarios.campaign.summary import summary_of
 from dockair.scenarios.campaign.table import write_table
 from dockair.scenarios.campaign.worker import FLIGHT
-from dockair.scenarios.report.groups import drawn_of, groups_of
+from dockair.scenarios.report.groups import groups_of
 
 #: Called with a row and its wall time as it is done, and with None now and then.
 Watcher = Callable[[dict[str, Any] | None, float], None]
@@ -119,14 +119,12 @@ def checked_jobs(source: PlanFile) -> list[Job]:
 
 def _refuse_unlike_in_a_group(source: PlanFile, jobs: Sequence[Job]) -> None:
     """Refuse flights that would be counted together and are not alike: settings in another order may be others."""
-    for group in groups_of([unflown(job) for job in jobs]):
-        first: dict[str, str] = {}
-        for row in group.rows:
-            if not drawn_of(row):
-                first.setdefault(row["scenario_hash"], row["command"])
-        if len(first) > 1:
+    one_of_each = {job.scenario_hash: unflown(job) for job in jobs if not job.drawn}
+    for group in groups_of(list(one_of_each.values())):
+        if len(group.rows) > 1:
             expected = "settings that differ in more than their order, or than perfect navigation takes no notice of"
-            raise DockairError(source.place("scenarios"), expected=expected, got=" and ".join(list(first.values())[:2]))
+            got = " and ".join(row["command"] for row in group.rows[:2])
+            raise DockairError(source.place("scenarios"), expected=expected, got=got)
 
 
 def _begun_once(journal: Journal, out: Path, now: dict[str, Any], jobs: Sequence[Job]) -> dict[str, Any]:
