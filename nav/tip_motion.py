@@ -1,10 +1,13 @@
 """How the probe's tip is felt to change its velocity: by accelerometers and gyros, without a look outside.
 
-In body axes, f being the specific force at the accelerometers' place I, w the body's rate, r = p_IP and c what takes
-off gravity and the steady acceleration of the formation: from sample to sample
+In body axes, f being the specific force at the accelerometers' place I, w the body's rate, both means over a step,
+r = p_IP and c what takes off gravity and the steady acceleration of the formation: from step to step
 
     dv_P = (f + c) dt + d(w x r) + w x (w x r) dt                                                         (1)
     c' = -w x c - (f + c) / T                                                                             (2)
+
+Of the middle of a step are then all terms alike. Of a single sample of the gyro the noise times r is 20 mm/s, twice
+what gusts change in a step.
 
 Gusts and manoeuvres pass within seconds, so that over T the mean of f is -c; in between the gyros carry c along. T is
 the time since the start until it has grown to `levelling_s`.
@@ -46,7 +49,7 @@ class TipMotion:
 
         Args:
             force_B: (3,) mean of f over the step [m/s^2]; NaN where there is none.
-            w_B: (3,) w at its end [rad/s].
+            w_B: (3,) mean of w over the step [rad/s].
             step_s: dt.
         """
         before, self._w = self._w, w_B

@@ -101,7 +101,7 @@ class RelativeState:
     p_PD_B: Array  #: (3,) ring centre from the probe's tip [m]
     rate_PD_B: Array  #: (3,) d/dt of p_PD_B [m/s]
     p_PK_B: Array  #: (3,) coupling from the probe's tip [m]
-    w_WB_B: Array  #: (3,) the body's angular velocity [rad/s]
+    w_WB_B: Array  #: (3,) the body's angular velocity, mean since the last control tick [rad/s]
     sigma_lateral_m: float  #: standard deviation of p_PD_B across the probe's line
     age_s: float = 0.0  #: since the newest frame that was used
     frame_age_s: float = float("inf")  #: since the newest frame, whatever it showed; infinite where nobody says

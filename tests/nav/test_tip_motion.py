@@ -42,8 +42,9 @@ class Body:
         motion, felt = TipMotion(P_IP, levelling_s), [np.zeros(3)]
         times = STEP_S * np.arange(round(seconds / STEP_S))
         for t in times:
-            force = np.mean([self.force(t - share * STEP_S) for share in (0.0, 0.25, 0.5, 0.75)], axis=0)
-            change = motion.change_m_s(force, self.rate(t) + self.bias, STEP_S)
+            samples = [t - share * STEP_S for share in (0.0, 0.25, 0.5, 0.75)]
+            force, rate = (np.mean([felt(s) for s in samples], axis=0) for felt in (self.force, self.rate))
+            change = motion.change_m_s(force, rate + self.bias, STEP_S)
             felt.append(felt[-1] + self.attitude(t) @ np.nan_to_num(change))
         return times, np.array(felt[1:]), np.array([self.tip_velocity(t) for t in times])
 
