@@ -195,7 +195,7 @@ class RelativeFilter:
         return self._record.rate_B(time_s) - self._bias if math.isfinite(self.imu_time_s) else np.zeros(3)
 
     def mean_rate_B(self, start_s: float, end_s: float) -> Array:
-        """(3,) mean of the gyro's samples after `start_s` up to `end_s`, less the bias [rad/s]; without any, `rate_B`."""
+        """(3,) mean of the gyro samples after `start_s` up to `end_s`, less the bias [rad/s]; without any, `rate_B`."""
         felt = math.isfinite(self.imu_time_s)
         return self._record.mean_rate_B(start_s, end_s) - self._bias if felt else np.zeros(3)
 

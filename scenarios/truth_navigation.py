@@ -5,7 +5,6 @@ The same guidance flies on it. A scenario names it `navigator = "truth"`; every 
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -22,7 +21,7 @@ class TruthNavigator:
 
     def __init__(self, sheets: NavigationSheets, settings: GuidanceSettings) -> None:
         self._sheets = sheets
-        self._guidance = Guidance(_not_late(settings), sheets.control_rate_hz)
+        self._guidance = Guidance(settings, sheets.control_rate_hz)
         # of every solution: LEDs and candidates, none of which is seen, and the covariance of what is exact
         self._always = np.full((len(sheets.ring.positions_D), 2), np.nan), np.empty((0, 2)), np.zeros((9, 9))
         for array in self._always:
@@ -74,9 +73,3 @@ class TruthNavigator:
             led_pixels_px=led_pixels_px,
             phase_reason=self._guidance.phase_reason,
         )
-
-
-def _not_late(settings: GuidanceSettings) -> GuidanceSettings:
-    """Return the settings for a rate of the drogue that is told at once."""
-    swing = replace(settings.predictive.swing, rate_lag_s=0.0)
-    return replace(settings, predictive=replace(settings.predictive, swing=swing))

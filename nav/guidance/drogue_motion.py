@@ -2,10 +2,9 @@
 
 With y_r the receiver's place by its commands and what it felt besides, y_D = p + y_r is the drogue's place on a scale
 that drifts steadily with the bias of the receiver's inertial velocity: Eqs. (1) and (2) of `swing_model`. A Kalman
-filter follows their state from p and its rate, which is late where the drogue accelerates, since nobody measures that:
-seen is y_D' - tau_v y_D''. Its covariance goes on while nothing is seen: a drogue of which there are glimpses alone
-would otherwise be followed with the gains of one that is seen all the time, and the state run away. Its prediction over
-the response time is what a command given now can still meet.
+filter follows their state from p. Its covariance goes on while nothing is seen: a drogue of which there are glimpses
+alone would otherwise be followed with the gains of one that is seen all the time, and the state run away. Its
+prediction over the response time is what a command given now can still meet.
 """
 
 import numpy as np
@@ -18,7 +17,6 @@ from dockair.nav.guidance.swing_model import (
     any_moment,
     dynamics,
     held_push,
-    rate_row,
     step_noise,
 )
 from dockair.rotations import Array
@@ -39,21 +37,18 @@ class DrogueMotion:
     def __init__(self, settings: SwingSettings, step_s: float, lead_s: Array, node_s: float) -> None:
         self._lead_s = np.asarray(lead_s)
         self._omega_rad_s = 2.0 * np.pi * np.array([mode.frequency_hz for mode in settings.modes])  # (modes, 3)
-        self._felt_share = np.array([mode.felt_share for mode in settings.modes])
+        self._felt_share = np.array([*(mode.felt_share for mode in settings.modes), settings.gust_felt_share])
         self._states = FIRST_MODE + 2 * len(settings.modes) + 1
         self._A = np.stack([dynamics(settings, axis) for axis in range(3)])
         self._F = np.stack([expm(A * step_s) for A in self._A])
         self._lead = np.stack([expm(A * lead) for A, lead in zip(self._A, self._lead_s, strict=True)])
         self._Q = np.stack([step_noise(settings, axis, step_s) for axis in range(3)])
-        sigmas = np.array([settings.position_sigma_m, settings.rate_sigma_m_s]).T
-        self._R = sigmas**2 * (_FITTED_STEP_S / step_s)
+        self._R = np.array(settings.position_sigma_m) ** 2 * (_FITTED_STEP_S / step_s)
         self._P_begun, self._P_resumed = (
             np.stack([any_moment(settings, axis, sigma) for axis in range(3)])
             for sigma in (settings.drift_sigma_m_s, settings.drift_kept_sigma_m_s)
         )
         self._P: Array = self._P_begun.copy()
-        self._seen_rate = np.stack([rate_row(settings, A) for A in self._A])
-        self._rate_lag_s = settings.rate_lag_s
         self._pushed = np.stack([held_push(A, step_s) for A in self._A])
         self._F_node = np.stack([expm(A * node_s) for A in self._A])
         self._pushed_node = np.stack([held_push(A, node_s) for A in self._A])
@@ -69,19 +64,17 @@ class DrogueMotion:
         """Begin anew at a place (3,) where it comes into view again, whatever the swing; the drift stays as learnt."""
         self._x[:, 0], self._x[:, FIRST_MODE:], self._P = place_m, 0.0, self._P_resumed.copy()
 
-    def step(self, place_m: Array | None, velocity_m_s: Array | None, push_m_s2: Array, felt_m_s: Array) -> None:
+    def step(self, place_m: Array | None, push_m_s2: Array, felt_m_s: Array) -> None:
         """Advance by one control period.
 
         Args:
             place_m: (3,) on the receiver's scale, None if not seen.
-            velocity_m_s: (3,) likewise.
             push_m_s2: (3,) b.
             felt_m_s: (3,) df over the period.
         """
         _foretell(self._x, self._felt_share, felt_m_s, self._F, self._pushed, push_m_s2)
-        if place_m is not None and velocity_m_s is not None:
-            rate = self._seen_rate, self._rate_lag_s
-            _correct(self._x, self._P, self._R, *rate, push_m_s2, place_m, velocity_m_s)
+        if place_m is not None:
+            _correct(self._x, self._P, self._R, place_m)
         _spread(self._P, self._F, self._Q)
 
     @property
@@ -147,12 +140,13 @@ def _at(x, first):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _foretell(x, share, felt, F, pushed, push):  # type: ignore[no-untyped-def]
-    """A step of Eqs. (1) and (2) in place: x (3, n), share (modes, 3), F (3, n, n), pushed (3, n)."""
-    n = x.shape[1]
+    """A step of Eqs. (1) and (2) in place: x (3, n), share (modes and g, 3), F (3, n, n), pushed (3, n)."""
+    n, modes = x.shape[1], len(share) - 1
     later = np.empty(n)
     for axis in range(3):
-        for mode in range(len(share)):
+        for mode in range(modes):
             x[axis, FIRST_MODE + 1 + 2 * mode] += share[mode, axis] * felt[axis]
+        x[axis, n - 1] += share[modes, axis] * felt[axis]
         for i in range(n):
             later[i] = pushed[axis, i] * push[axis]
             for j in range(n):
@@ -161,27 +155,18 @@ def _foretell(x, share, felt, F, pushed, push):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _correct(x, P, R, seen_rate, lag_s, push, place, velocity):  # type: ignore[no-untyped-def]
-    """Correct the state (3, n) and its covariance P (3, n, n) in place by what is seen, with variances R (3, 2)."""
+def _correct(x, P, R, place):  # type: ignore[no-untyped-def]
+    """Correct the state (3, n) and its covariance P (3, n, n) in place by what is seen, with variances R (3,)."""
     n = x.shape[1]
-    PH = np.empty((n, 2))
+    PH = np.empty(n)
     for axis in range(3):
-        off, off_rate = place[axis] - _at(x[axis], 0), velocity[axis] + lag_s * push[axis]
         for i in range(n):
-            off_rate -= seen_rate[axis, i] * x[axis, i]
-            PH[i, 0] = _at(P[axis, i], 0)
-            PH[i, 1] = 0.0
-            for j in range(n):
-                PH[i, 1] += P[axis, i, j] * seen_rate[axis, j]
-        a, b, c = _at(PH[:, 0], 0) + R[axis, 0], _at(PH[:, 1], 0), R[axis, 1]
+            PH[i] = _at(P[axis, i], 0)
+        off, variance = place[axis] - _at(x[axis], 0), _at(PH, 0) + R[axis]
         for i in range(n):
-            c += seen_rate[axis, i] * PH[i, 1]
-        whole = a * c - b * b
-        for i in range(n):
-            k, k_rate = (c * PH[i, 0] - b * PH[i, 1]) / whole, (a * PH[i, 1] - b * PH[i, 0]) / whole
-            x[axis, i] += k * off + k_rate * off_rate
+            x[axis, i] += PH[i] / variance * off
             for j in range(i + 1):
-                P[axis, i, j] -= k * PH[j, 0] + k_rate * PH[j, 1]
+                P[axis, i, j] -= PH[i] * PH[j] / variance
                 P[axis, j, i] = P[axis, i, j]
 
 

@@ -104,15 +104,15 @@ class Predictive:
         if sight is None:
             self._unseen_s += self._step_s
             push: Array = np.zeros((len(self._times), 3))
-            self._motion.step(None, None, push[0], np.zeros(3))
+            self._motion.step(None, push[0], np.zeros(3))
         else:
             push = sight.push_m_s2
-            place, velocity = sight.place_m + self._own.place_m, sight.rate_m_s + self._own.velocity_m_s
+            place = sight.place_m + self._own.place_m
             if self._unseen_s > self._settings.unseen_s:
-                self._begin_anew(place, velocity)
+                self._begin_anew(place, sight.rate_m_s + self._own.velocity_m_s)
             self._unseen_s = 0.0
             self._seen_s += self._step_s
-            self._motion.step(place, velocity, push[0], self._own.felt_change_m_s)
+            self._motion.step(place, push[0], self._own.felt_change_m_s)
         self._ahead = self._motion.ahead(push[0], push[1])
         self._push = push
         if sight is not None:

@@ -1,7 +1,7 @@
 """How a drogue swings on its hose: the model that guidance foretells with (`drogue_motion`).
 
 Each axis of the drogue's place y_D, on the receiver's own scale, is drift plus the modes i of a hose with a drogue on
-its end, a swing (i = 1) and two overtones, that coloured gusts g drive, each by its share q_i, and noise of their own;
+its end, a swing (i = 1) and two overtones, that gusts g drive, each by its share q_i, and noise of their own;
 the receiver's bow wave b pushes the swing:
 
     m' = d,   d' = noise;     s_i'' = -omega_i^2 s_i - 2 zeta_i omega_i s_i' + q_i g + noise,   b besides for i = 1
@@ -9,16 +9,16 @@ the receiver's bow wave b pushes the swing:
 
 What a gust gives the drogue the hose takes back when the wave from the pod has come down, half a second later: that is
 the overtones' part. The gust reaches the receiver, too, and its tip is felt to change its velocity by df; with it, up,
-the modes'
 
-    s_i' <- s_i' + c_i df                                                                                 (2)
+    s_i' <- s_i' + c_i df,     g <- g + c_g df                                                            (2)
 
 The state of an axis is (m, d, s_i, s_i', g), n numbers.
 
-Not modelled: coupling of the axes, other frequencies for another length of hose, how a gust that is felt goes on, what
-the bow wave does to the overtones. Forward there is the reel: one mode, well damped, and nothing is felt.
-Settings: fitted to the simulated drogue (15 m of hose, 20 kg) at 180 m/s in moderate gusts, as one would to a record of
-flight; the peers' hoses and research on hose-drogue dynamics give 0.2-0.5 Hz for the swing.
+Not modelled: coupling of the axes, other frequencies for another length of hose, what the bow wave does to the
+overtones, that the receiver answers to a gust by and by. Forward there is the reel: one mode, and nothing is felt.
+Settings: frequencies, and to the left damping, of the nominal hose's own linear modes (15 m, drogue of 20 kg) at
+180 m/s; all else fitted so that places are foretold best 0.2-0.5 s ahead in moderate gusts, as one would to records of
+flight. The peers' hoses and research on hose-drogue dynamics give 0.2-0.5 Hz for the swing.
 """
 
 from dataclasses import dataclass, replace
@@ -51,36 +51,35 @@ class SwingSettings:
 
     modes: tuple[HoseMode, ...] = (
         HoseMode(
-            frequency_hz=(0.44, 0.345, 0.433),
-            damping=(0.5, 0.073, 0.177),
-            gust_density=(0.7, 1.49, 4.09),
-            felt_share=(0.0, 0.0, -0.52),
+            frequency_hz=(0.45, 0.345, 0.432),
+            damping=(0.27, 0.073, 0.129),
+            gust_density=(1.0, 0.896, 3.078),
+            felt_share=(0.0, 0.0, -0.544),
         ),
         HoseMode(
-            frequency_hz=(0.9, 0.869, 0.865),
-            damping=(0.5, 0.03, 0.074),
-            gust_density=(0.0, -0.4, 1.76),
-            felt_share=(0.0, 0.0, -0.83),
+            frequency_hz=(0.9, 0.864, 0.901),
+            damping=(0.5, 0.03, 0.029),
+            gust_density=(0.0, -0.208, -1.696),
+            felt_share=(0.0, 0.0, -0.078),
         ),
         HoseMode(
-            frequency_hz=(1.5, 1.486, 1.437),
-            damping=(0.5, 0.03, 0.051),
-            gust_density=(0.0, 0.11, -1.38),
-            felt_share=(0.0, 0.0, 0.87),
+            frequency_hz=(1.5, 1.497, 1.517),
+            damping=(0.5, 0.023, 0.059),
+            gust_density=(0.0, 0.127, 0.396),
+            felt_share=(0.0, 0.0, 0.425),
         ),
     )
-    gust_time_s: tuple[float, float, float] = (1.2, 2.8, 0.7)  # T
+    #: T: what drives the swing is all but white in its rate, as gusts are above 0.1 Hz; 3 to 10 s foretell alike.
+    gust_time_s: tuple[float, float, float] = (3.0, 3.0, 3.0)
+    gust_felt_share: tuple[float, float, float] = (0.0, 0.0, 1.183)  # c_g [1/(m/s)]
     #: Of every s_i'': what drives a mode by itself [m/s^2/sqrt(Hz)]. Forward there is the reel, and no mode.
-    rattle_density: tuple[float, float, float] = (0.0, 0.035, 0.035)
+    rattle_density: tuple[float, float, float] = (0.0, 0.02, 0.114)
     drift_sigma_m_s: float = 0.4  # of d at the start: the inertial velocity's bias, twice its 0.2 m/s
     drift_kept_sigma_m_s: float = 0.1  # of d where the swing alone is begun anew: it has not changed much meanwhile
     drift_density: float = 0.03  # of d' [m/s^2/sqrt(Hz)]: the inertial velocity's drift, gusts far below the swing
-    #: Of the place, and of its rate, in a tick of 0.01 s; at other rates the same white noise. The camera knows the
-    #: place across to a millimetre, but for what does not change; the fusion's rate is as good as its own model of the
-    #: drogue, 0.05 m/s left and 0.08 m/s up in error.
-    position_sigma_m: tuple[float, float, float] = (0.02, 0.002, 0.002)
-    rate_sigma_m_s: tuple[float, float, float] = (0.05, 0.12, 0.12)
-    rate_lag_s: float = 0.015  # tau_v: half a frame, its way here, and what the fusion's own filter needs
+    #: Of the place in a tick of 0.01 s; at other rates the same white noise. The fusion knows the place better than its
+    #: rate, for which it has its own model of the drogue: this one does without.
+    position_sigma_m: tuple[float, float, float] = (0.001, 0.001, 0.001)
 
     def at(self, dynamic_pressure_pa: float) -> "SwingSettings":
         """Return the same for another dynamic pressure [Pa], which stretches the hose more or less across."""
@@ -115,12 +114,6 @@ def _drive(settings: SwingSettings, axis: int) -> Array:
     densities[1], densities[FIRST_MODE + 1 : -1 : 2] = settings.drift_density, settings.rattle_density[axis]
     densities[-1] = 1.0
     return np.diag(densities**2)
-
-
-def rate_row(settings: SwingSettings, A: Array) -> Array:
-    """(n,) what is seen of the rate, b apart: late by tau_v."""
-    rate = np.append((np.arange(len(A) - 1) % 2 == 1).astype(float), 0.0)
-    return np.asarray(rate - settings.rate_lag_s * (rate @ A))
 
 
 def held_push(A: Array, step_s: float) -> Array:

@@ -39,8 +39,6 @@ _SETTINGS = SwingSettings(
     gust_time_s=GUST_TIME_S,
     rattle_density=(0.0,) * 3,
     position_sigma_m=(0.02,) * 3,
-    rate_sigma_m_s=(0.05, 0.10, 0.10),
-    rate_lag_s=0.032,
 )
 
 
@@ -88,7 +86,7 @@ def missed(way: Way, seed: int) -> Array:
         next_s = float(to_go_s[to_go_s > -0.5 * _STEP_S].min(initial=np.inf))
         if abs(next_s) < 0.5 * _STEP_S:
             found.append(float(np.hypot(*(places[i + round(_RESPONSE_S[1] / _STEP_S), 1:] - tip[:, 0]))))
-        motion.step(seen[i], seen_rates[i], np.zeros(3), np.zeros(3))
+        motion.step(seen[i], np.zeros(3), np.zeros(3))
         path = motion.path(np.zeros((plan.nodes + 2, 3)))
         to_contact_s = next_s if way.meets and next_s < _COMMITTED_S else None
         for row, (axis, planned) in enumerate(zip(_ACROSS, plans, strict=True)):

@@ -22,11 +22,11 @@ SWING = SwingSettings(  # alone, for what has a closed form for one mode only
 
 
 def follow(path, rate, seconds):
-    """Feed exact places and rates; return time and filter at the end."""
+    """Feed exact places, and the rate at the start; return time and filter at the end."""
     motion = DrogueMotion(SwingSettings(), STEP_S, LEAD_S, 0.1)
     motion.start(path(0.0), rate(0.0))
     for k in range(1, round(seconds / STEP_S) + 1):
-        motion.step(path(k * STEP_S), rate(k * STEP_S), CALM, STILL)
+        motion.step(path(k * STEP_S), CALM, STILL)
     return seconds, motion
 
 
@@ -64,11 +64,11 @@ def test_what_was_known_of_the_drift_stays_known_where_the_swing_is_begun_anew()
         motion = DrogueMotion(replace(SwingSettings(), drift_kept_sigma_m_s=sigma_m_s), STEP_S, LEAD_S, 0.1)
         motion.start(CALM, CALM)
         for _ in range(2000):
-            motion.step(CALM, CALM, CALM, STILL)
+            motion.step(CALM, CALM, STILL)
         motion.resume(CALM)
         drifts = []
         for t in np.arange(200) * STEP_S:
-            motion.step(2.0 * np.sin(omega * t) * up, 2.0 * omega * np.cos(omega * t) * up, CALM, STILL)
+            motion.step(2.0 * np.sin(omega * t) * up, CALM, STILL)
             drifts.append(abs(motion.drift_m_s[2]))
         most[sigma_m_s] = max(drifts)
     kept, unknown = most.values()
@@ -106,7 +106,7 @@ def test_a_steady_push_bends_the_swing_by_its_own_stiffness():
     motion = DrogueMotion(SwingSettings(), STEP_S, LEAD_S, 0.1)
     push = np.array([0.0, 0.5, -0.3])
     for _ in range(12_000):
-        motion.step(None, None, push, STILL)
+        motion.step(None, push, STILL)
     omega = 2.0 * np.pi * np.array(SwingSettings().modes[0].frequency_hz)
     np.testing.assert_allclose(motion._x[:, 2], push / omega**2, rtol=1e-3, atol=1e-9)
 
@@ -114,15 +114,11 @@ def test_a_steady_push_bends_the_swing_by_its_own_stiffness():
 def test_prediction_is_as_good_as_its_own_covariance_says():
     """Place simulated from Eq. (1) with the settings' densities: the error's variance is the Riccati equation's.
 
-    What is seen of the rate is late: less tau_v times the acceleration.
-
     P over the lead time is e^(A tau) P e^(A' tau) plus what the noise adds; P is computed here by iteration. Errors
     are correlated over about a second: 600 s give some 600 independent ones an axis, 5 sigma of their variance 29 %.
     """
     settings, rng, ticks, states = SwingSettings(), np.random.default_rng(2), 60_000, 9
-    place, rate = np.array([1.0, 0.0] * 4 + [0.0]), np.array([0.0, 1.0] * 4 + [0.0])
-    H = [np.stack([place, rate - settings.rate_lag_s * (rate @ dynamics(settings, axis))]) for axis in range(3)]
-    sigmas = np.array(list(zip(settings.position_sigma_m, settings.rate_sigma_m_s, strict=True)))  # (3, 2)
+    place, sigmas = PLACE_ROW, np.array(settings.position_sigma_m)
     lead, F, expected = np.round(LEAD_S / STEP_S).astype(int), [], []
     densities = np.zeros((3, states))
     densities[:, 1], densities[:, 8] = settings.drift_density, 1.0
@@ -132,7 +128,7 @@ def test_prediction_is_as_good_as_its_own_covariance_says():
         Q, P = np.diag(densities[axis] ** 2) * STEP_S, np.eye(states)
         for _ in range(6000):
             P = F[-1] @ P @ F[-1].T + Q
-            P = P - P @ H[axis].T @ np.linalg.solve(H[axis] @ P @ H[axis].T + np.diag(sigmas[axis] ** 2), H[axis] @ P)
+            P = P - np.outer(P @ place, P @ place) / (place @ P @ place + sigmas[axis] ** 2)
         for _ in range(lead[axis]):
             P = F[-1] @ P @ F[-1].T + Q
         expected.append(place @ P @ place)
@@ -140,8 +136,7 @@ def test_prediction_is_as_good_as_its_own_covariance_says():
     for _ in range(ticks):
         kick = np.sqrt(STEP_S) * densities * rng.standard_normal((3, states))
         x = np.stack([F[i] @ x[i] for i in range(3)]) + kick
-        seen = np.stack([H[i] @ x[i] for i in range(3)]) + rng.standard_normal((3, 2)) * sigmas
-        motion.step(seen[:, 0], seen[:, 1], CALM, STILL)
+        motion.step(x @ place + rng.standard_normal(3) * sigmas, CALM, STILL)
         true.append(x @ place)
         predicted.append(motion.ahead(CALM, CALM)[0])
     true, predicted = np.array(true), np.array(predicted)
@@ -151,34 +146,25 @@ def test_prediction_is_as_good_as_its_own_covariance_says():
         assert np.std(error) < np.std(true[n:, axis] - true[:-n, axis])
 
 
-def test_a_push_that_is_known_is_part_of_what_is_seen_late():
-    """A drogue pushed steadily from rest, its rate told tau_v late: the filter knows, one without tau_v does not."""
-    push, n = np.array([0.0, 1.0, -1.0]), 40
-    late = replace(SwingSettings(), position_sigma_m=(0.02,) * 3, rate_sigma_m_s=(0.1,) * 3, rate_lag_s=0.032)
-    places, rates = [], []
-    for settings in (late, replace(late, rate_lag_s=0.0)):
-        motion, t = DrogueMotion(settings, STEP_S, LEAD_S, 0.1), 0.0
-        for k in range(1, n + 1):
-            t = k * STEP_S
-            motion.step(0.5 * push * t * t, push * (t - late.rate_lag_s), push, STILL)
-        places.append(motion._x[:, 0:-1:2].sum(axis=1) - 0.5 * push * t * t)
-        rates.append(motion._x[:, 1:-1:2].sum(axis=1) - push * t)
-    assert np.abs(rates[0]).max() < 0.5 * np.abs(rates[1]).max()
-    assert np.abs(places[0]).max() < 0.01
-
-
 def test_what_the_tip_feels_is_part_of_the_prediction():
-    """Up, each mode's rate changes at once by its share of what was felt, and swings on from there."""
+    """Up, each mode's rate changes at once by its share of what was felt, and a gust that goes on, by its own."""
     settings, felt = SwingSettings(), np.array([0.3, 0.2, 0.1])
     motion, axis = DrogueMotion(settings, STEP_S, np.full(3, 0.3), 0.1), 2
-    motion.step(None, None, CALM, felt)
+    motion.step(None, CALM, felt)
     omega = np.array([2.0 * np.pi * mode.frequency_hz[axis] for mode in settings.modes])
     zeta = np.array([mode.damping[axis] for mode in settings.modes])
     share = np.array([mode.felt_share[axis] for mode in settings.modes])
-    damped, t = omega * np.sqrt(1.0 - zeta**2), STEP_S + 0.3
-    expected = share * felt[axis] * np.exp(-zeta * omega * t) * np.sin(damped * t) / damped
+    density = np.array([mode.gust_density[axis] for mode in settings.modes])
+    gust, T = settings.gust_felt_share[axis] * felt[axis], settings.gust_time_s[axis]
+
+    def derivative(t, x):
+        s, rate = x[:3], x[3:]
+        return [*rate, *(density * gust * np.exp(-t / T) - omega**2 * s - 2.0 * zeta * omega * rate)]
+
+    begun = [0.0, 0.0, 0.0, *(share * felt[axis])]
+    expected = solve_ivp(derivative, (0.0, STEP_S + 0.3), begun, rtol=1e-11, atol=1e-13).y[:3, -1]
     place, _, _ = motion.ahead(CALM, CALM)
-    np.testing.assert_allclose(place, [0.0, 0.0, expected.sum()], atol=1e-12)
+    np.testing.assert_allclose(place, [0.0, 0.0, expected.sum()], atol=1e-11)
     assert abs(expected).max() > 1e-3
 
 
@@ -211,7 +197,7 @@ def test_unseen_it_goes_on_by_the_model():
     motion = DrogueMotion(SwingSettings(), STEP_S, LEAD_S, 0.1)
     motion._x[:, 0], motion._x[:, 1] = 1.0, 0.1
     for _ in range(100):
-        motion.step(None, None, CALM, STILL)
+        motion.step(None, CALM, STILL)
     np.testing.assert_allclose(motion.ahead(CALM, CALM)[0], 1.0 + 0.1 * (1.0 + LEAD_S), atol=1e-9)
 
 
@@ -222,8 +208,7 @@ def test_the_path_goes_on_from_the_prediction_by_the_swing_s_own_equation():
     motion.start(np.array([4.0, 0.1, -0.2]), np.array([0.0, 0.4, 0.3]))
     for k in range(300):
         t = k * STEP_S
-        place, rate = np.array([4.0, 0.2 * np.sin(2.0 * t), 0.0]), np.array([0.0, 0.4 * np.cos(2.0 * t), 0.0])
-        motion.step(place, rate, CALM, STILL)
+        motion.step(np.array([4.0, 0.2 * np.sin(2.0 * t), 0.0]), CALM, STILL)
     push = np.zeros((12, 3))
     push[1:, axis] = np.linspace(0.0, 3.0, 11)
     swing, T = settings.modes[0], settings.gust_time_s[axis]
@@ -244,7 +229,7 @@ def test_the_mean_path_is_the_drift_alone():
     motion = DrogueMotion(SwingSettings(), STEP_S, LEAD_S, 0.1)
     motion.start(np.array([4.0, 0.0, 0.0]), np.zeros(3))
     for k in range(3000):
-        motion.step(np.array([4.0, 0.2 * k * STEP_S, 0.0]), np.array([0.0, 0.2, 0.0]), CALM, STILL)
+        motion.step(np.array([4.0, 0.2 * k * STEP_S, 0.0]), CALM, STILL)
     expected = 0.2 * (2999 * STEP_S + LEAD_S[1] + 0.1 * np.arange(1, 6))
     assert np.allclose(motion.mean_path(5)[:, 1], expected, atol=5e-3)
 
@@ -264,10 +249,10 @@ def test_the_filter_answers_as_fast_at_another_control_rate(axis):
     def poles_1_s(hz):
         motion = DrogueMotion(SwingSettings(), 1.0 / hz, LEAD_S, 0.1)
         for _ in range(60 * hz):
-            motion.step(CALM, CALM, CALM, STILL)
-        H, P = np.stack([PLACE_ROW, motion._seen_rate[axis]]), motion._P[axis]
-        K = P @ H.T @ np.linalg.inv(H @ P @ H.T + np.diag(motion._R[axis]))
-        error = (np.eye(9) - K @ H) @ motion._F[axis]
+            motion.step(CALM, CALM, STILL)
+        P = motion._P[axis]
+        K = P @ PLACE_ROW / (PLACE_ROW @ P @ PLACE_ROW + motion._R[axis])
+        error = (np.eye(9) - np.outer(K, PLACE_ROW)) @ motion._F[axis]
         return np.sort(np.abs(np.log(np.linalg.eigvals(error)) * hz))
 
     for hz in (50, 180):
@@ -275,40 +260,44 @@ def test_the_filter_answers_as_fast_at_another_control_rate(axis):
 
 
 def test_with_gaps_it_is_the_kalman_filter_of_another_program():
-    """filterpy's, over 20 s of which a third is seen, in glimpses of any length, with a push and with what is felt."""
-    settings, rng = SwingSettings(), np.random.default_rng(4)
+    """filterpy's, over 20 s of which a third is seen, in glimpses of any length, with a push and with what is felt.
+
+    Of places that scatter by 0.1 m and are told to be known to 1 mm both lose digits, filterpy's more: 2 and 20 mm.
+    """
+    settings, rng = replace(SwingSettings(), position_sigma_m=(0.02, 0.002, 0.002)), np.random.default_rng(4)
     motion, others = DrogueMotion(settings, STEP_S, LEAD_S, 0.1), []
     motion.start(np.array([4.0, 0.1, -0.2]), np.array([0.0, 0.4, 0.3]))
     for axis in range(3):
-        other = KalmanFilter(dim_x=9, dim_z=2, dim_u=1)
+        other = KalmanFilter(dim_x=9, dim_z=1, dim_u=1)
         other.F, other.Q, other.B = motion._F[axis], motion._Q[axis], motion._pushed[axis][:, np.newaxis]
-        other.H, other.R = np.stack([PLACE_ROW, motion._seen_rate[axis]]), np.diag(motion._R[axis])
+        other.H, other.R = PLACE_ROW[np.newaxis], motion._R[axis]
         other.x, other.P = motion._x[axis][:, np.newaxis].copy(), motion._P[axis].copy()
         others.append(other)
     seen = False
     for k in range(2000):
         seen = rng.random() < 0.1 if not seen else rng.random() < 0.8
-        place, velocity, push, felt = rng.standard_normal((4, 3)) * [[1.0], [2.0], [0.5], [0.02]]
-        motion.step(place if seen else None, velocity if seen else None, push, felt)
+        place, push, felt = rng.standard_normal((3, 3)) * [[0.1], [0.5], [0.02]]
+        motion.step(place if seen else None, push, felt)
         for axis, other in enumerate(others):
             other.x[3:8:2, 0] += [mode.felt_share[axis] * felt[axis] for mode in settings.modes]
+            other.x[8, 0] += settings.gust_felt_share[axis] * felt[axis]
             if k > 0:
                 other.P = other.F @ other.P @ other.F.T + other.Q
             other.x = other.F @ other.x + other.B * push[axis]
             if seen:
-                other.update(np.array([[place[axis]], [velocity[axis] + settings.rate_lag_s * push[axis]]]))
+                other.update(place[axis])
         np.testing.assert_allclose(motion._x, [other.x[:, 0] for other in others], rtol=1e-7, atol=1e-9)
 
 
 def test_a_drogue_that_whips_about_and_is_seen_in_glimpses_does_not_lead_it_far_away():
-    """Rates of some metres a second that no model foresees, in glimpses: gains of steady sight made 250 km of them."""
+    """Places a metre about that no model foresees, in glimpses: gains of steady sight made 250 km of them."""
     rng = np.random.default_rng(5)
     motion, farthest = DrogueMotion(SwingSettings(), STEP_S, LEAD_S, 0.1), 0.0
     motion.start(np.array([4.0, 0.0, 0.0]), np.zeros(3))
     for _ in range(100):
-        place, velocity = [4.0, 0.0, 0.0] + rng.uniform(-1.0, 1.0, 3), rng.uniform(-4.0, 4.0, 3)
+        place = [4.0, 0.0, 0.0] + rng.uniform(-1.0, 1.0, 3)
         for k in range(40):
             glimpsed = k < rng.integers(1, 4)
-            motion.step(place if glimpsed else None, velocity if glimpsed else None, CALM, STILL)
+            motion.step(place if glimpsed else None, CALM, STILL)
         farthest = max(farthest, float(np.abs(motion.middle_m - [4.0, 0.0, 0.0]).max()))
     assert farthest < 10.0

@@ -458,6 +458,22 @@ def test_rate_is_told_in_body_axes_linear_between_samples_and_held_outside():
         np.testing.assert_allclose(filter_.rate_B(time_s), factor * w, atol=1e-12)
 
 
+def test_the_mean_rate_is_that_of_the_samples_between_two_moments_less_the_bias():
+    filter_ = RelativeFilter(sheets(8.0), SETTINGS)
+    np.testing.assert_array_equal(filter_.mean_rate_B(0.0, 0.01), np.zeros(3))
+    w = np.array([0.1, 0.2, -0.3])
+    samples = [(1.002 + 0.002 * k, 1.0 + k) for k in range(10)]
+    filter_.propagate([ImuSample(time_stamp_s=t, angular_rate_rad_s=k * MOUNTING.R_BI.T @ w) for t, k in samples])
+    np.testing.assert_allclose(filter_.mean_rate_B(1.011, 1.021), 8.0 * w, atol=1e-12)  # the last five of ten
+    np.testing.assert_allclose(filter_.mean_rate_B(1.03, 1.04), 10.0 * w, atol=1e-12)  # none: the last one holds
+    R, p, _ = filter_.predicted_pose(1.02)
+    seen = solve_pose(CAMERA.pixels_from_points(RING @ R.T + p + [0.0, 0.02, 0.0]), RING, CAMERA)
+    assert filter_.update(seen, 1.02)
+    bias = filter_.rate_B(1.02) - 10.0 * w
+    assert np.abs(bias).max() > 1e-9
+    np.testing.assert_allclose(filter_.mean_rate_B(1.011, 1.021), 8.0 * w + bias, atol=1e-12)
+
+
 def struck(seed, settings):
     """Half a second of flight, then 1.2 m/s gained at once, as when the coupling catches the probe; 0.3 s more."""
     world = World(sheets(2.0), settings, np.random.default_rng((41, seed)))

@@ -110,6 +110,21 @@ def test_finds_the_drogue_and_knows_it_to_centimetres_along_and_millimetres_acro
     assert np.abs(solution.v_PD_B).max() < 0.05
 
 
+def test_guidance_is_told_the_mean_of_a_tick_s_gyro_samples(render):
+    """A single one times the lever to the tip is more noise than what the tip feels."""
+    sky, told = Sky(render, still), []
+    guided = sky.navigator._guidance.step
+    sky.navigator._guidance.step = lambda state: told.append(state.w_WB_B) or guided(state)
+    for _ in range(3):
+        turned = [
+            replace(sample, angular_rate_rad_s=[0.0, 0.0, r])
+            for sample, r in zip(sky.imu(), (1, 1, 1, 1, 3), strict=True)
+        ]
+        sky.navigator.step(turned, None)
+    R_BI = sky.sheets.mounting.R_BI
+    np.testing.assert_allclose(told[-1], 1.4 * R_BI[:, 2], atol=1e-9)
+
+
 def test_one_led_that_is_bent_away_is_left_out_of_the_pose(render):
     sky = Sky(render, still)
     sky.run(0.3)

@@ -20,9 +20,9 @@ def _settings(airspeed_m_s: float, altitude_m: float) -> SwingSettings:
     return SwingSettings().at(0.5 * standard_atmosphere(altitude_m).density_kg_m3 * airspeed_m_s**2)
 
 
-@pytest.mark.parametrize(("axis", "plane", "apart"), [(1, "lateral", 0.01), (2, "vertical", 0.06)])
+@pytest.mark.parametrize(("axis", "plane", "apart"), [(1, "lateral", 0.01), (2, "vertical", 0.01)])
 def test_the_modes_that_guidance_follows_are_those_of_the_hose(axis, plane, apart):
-    """Up and down the reel works, too, and the fit is no mode of the chain alone: it comes within 6 %."""
+    """Up and down, where the reel works, too, the frequencies are the chain's; the damping is not."""
     ours = [mode.frequency_hz[axis] for mode in _settings(180.0, 6000.0).modes]
     chain = [1.0 / mode.period_s for mode in _modes(plane, 180.0, 6000.0)]
     np.testing.assert_allclose(ours, chain, rtol=apart)
