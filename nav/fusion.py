@@ -192,15 +192,15 @@ class RelativeFilter:
 
     def rate_B(self, time_s: float) -> Array:
         """(3,) gyro rate less its bias [rad/s], linear between samples, that of the nearest one outside."""
-        return self._record.rate_B(time_s) - self._bias if math.isfinite(self.imu_time_s) else np.zeros(3)
+        return self._record.rate_B(time_s) - self.bias_B if math.isfinite(self.imu_time_s) else np.zeros(3)
 
     def mean_rate_B(self, start_s: float, end_s: float) -> Array:
         """(3,) mean of the gyro samples after `start_s` up to `end_s`, less the bias [rad/s]; without any, `rate_B`."""
         felt = math.isfinite(self.imu_time_s)
-        return self._record.mean_rate_B(start_s, end_s) - self._bias if felt else np.zeros(3)
+        return self._record.mean_rate_B(start_s, end_s) - self.bias_B if felt else np.zeros(3)
 
     @property
-    def _bias(self) -> Array:
+    def bias_B(self) -> Array:
         """(3,) of the gyro, as believed now [rad/s]."""
         newest = self._buffer.newest
         return newest.beliefs[0].bias if newest is not None else np.zeros(3)

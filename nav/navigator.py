@@ -321,7 +321,7 @@ class Navigator:
         step_s = self._time_s - before_s
         in_step = 0.0 < step_s * self._sheets.control_rate_hz < _LONGEST_TICKS  # else stamps have leapt
         force_B = self._filter.mean_force_B(before_s, self._time_s) if in_step else np.full(3, np.nan)
-        return self._tip.change_m_s(force_B, w_WB_B, step_s)
+        return self._tip.change_m_s(force_B, w_WB_B, self._filter.bias_B, step_s)
 
     def _heading_now(self) -> tuple[float, float, float]:
         """Exposure to ask for, heading and its sigma; the LEDs' frames are not given away while the probe goes in."""
