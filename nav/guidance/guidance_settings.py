@@ -38,7 +38,8 @@ class PredictiveSettings:
     #: that it strayed at.
     straying_s: tuple[float, float, float] = (0.9, 0.6, 0.45)
     forgotten_s: float = 4.0  # T_f: longer than the swing
-    straying_limit_m_s: float = 0.5  # of e: it was 0.06 to 0.14 m/s rms in moderate gusts
+    #: Of e, which was 0.06 to 0.14 m/s rms in moderate gusts; of an axis with none nothing is felt.
+    straying_limit_m_s: tuple[float, float, float] = (0.5, 0.5, 0.5)
     plan: PlanSettings = field(default_factory=PlanSettings)
     swing: SwingSettings = field(default_factory=SwingSettings)
 

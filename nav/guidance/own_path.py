@@ -36,11 +36,11 @@ class OwnPath:
         step_s: control period.
         straying_s: (3,) T_e.
         forgotten_s: T_f.
-        limit_m_s: of g and e, each axis.
+        limit_m_s: (3,) of g and e; of an axis with none, nothing is felt.
     """
 
     def __init__(
-        self, response_s: Array, step_s: float, straying_s: Array, forgotten_s: float, limit_m_s: float
+        self, response_s: Array, step_s: float, straying_s: Array, forgotten_s: float, limit_m_s: Array
     ) -> None:
         self._limit_m_s, self._dies = limit_m_s, np.exp(-step_s / straying_s)
         self._step_s, self._straying_s, self._kept = step_s, straying_s, 1.0 / (1.0 + step_s / forgotten_s)
@@ -111,9 +111,9 @@ def _feel(own, v, change, dies, kept, limit, step):  # type: ignore[no-untyped-d
         f, e = own[1, i], own[3, i]
         if felt:
             own[1, i] = kept * (f + change[i] - (v[i] - own[0, i]))
-            before, now = min(max(f, -limit), limit), min(max(own[1, i], -limit), limit)
+            before, now = min(max(f, -limit[i]), limit[i]), min(max(own[1, i], -limit[i]), limit[i])
             own[2, i] = now - before
-            own[3, i] = min(max(kept * (e + now - before), -limit), limit)
+            own[3, i] = min(max(kept * (e + now - before), -limit[i]), limit[i])
         else:
             own[1, i], own[2, i], own[3, i] = 0.0, 0.0, dies[i] * e
         own[0, i] = v[i]

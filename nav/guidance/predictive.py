@@ -62,9 +62,8 @@ class Predictive:
     ) -> None:
         self._settings, self._step_s, self._unseen_s = settings, step_s, float("inf")
         plan = settings.plan
-        self._own = OwnPath(
-            response_s, step_s, np.array(settings.straying_s), settings.forgotten_s, settings.straying_limit_m_s
-        )
+        straying_s, limit_m_s = np.array(settings.straying_s), np.array(settings.straying_limit_m_s)
+        self._own = OwnPath(response_s, step_s, straying_s, settings.forgotten_s, limit_m_s)
         self._motion = DrogueMotion(settings.swing, step_s, response_s, plan.node_s)
         self._plans, self._patient_plans = (
             [

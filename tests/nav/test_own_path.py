@@ -6,10 +6,11 @@ import pytest
 from dockair.nav.guidance.own_path import OwnPath
 
 RESPONSE_S, STRAYING_S = np.array([0.4, 0.17, 0.14]), np.array([0.9, 0.6, 0.45])
+LIMIT_M_S = np.full(3, 0.5)
 
 
 def test_each_axis_flies_its_commands_a_response_time_later():
-    path, u = OwnPath(RESPONSE_S, 0.01, STRAYING_S, 4.0, 0.5), np.random.default_rng(1).normal(size=(300, 3))
+    path, u = OwnPath(RESPONSE_S, 0.01, STRAYING_S, 4.0, LIMIT_M_S), np.random.default_rng(1).normal(size=(300, 3))
     sums = np.vstack([np.zeros(3), np.cumsum(u, axis=0) * 0.01])
     for k in range(300):
         path.step(u[k])
@@ -21,7 +22,7 @@ def test_each_axis_flies_its_commands_a_response_time_later():
 
 def test_what_is_felt_besides_the_commands_is_part_of_the_way():
     """A gust takes the tip to 0.3 m/s left at once, besides a command of 0.5 m/s: place and rate are those flown."""
-    path, left, flown = OwnPath(RESPONSE_S, 0.01, STRAYING_S, 1e6, 0.5), np.array([0.0, 1.0, 0.0]), 0.0
+    path, left, flown = OwnPath(RESPONSE_S, 0.01, STRAYING_S, 1e6, LIMIT_M_S), np.array([0.0, 1.0, 0.0]), 0.0
     before = 0.0
     for k in range(100):
         commanded = 0.5 if k >= 17 else 0.0  # felt a response time after it was given
@@ -34,7 +35,7 @@ def test_what_is_felt_besides_the_commands_is_part_of_the_way():
 
 
 def test_it_goes_on_to_stray_until_that_has_died_away():
-    path, strayed = OwnPath(RESPONSE_S, 0.01, STRAYING_S, 1e6, 0.5), np.array([0.1, -0.2, 0.3])
+    path, strayed = OwnPath(RESPONSE_S, 0.01, STRAYING_S, 1e6, LIMIT_M_S), np.array([0.1, -0.2, 0.3])
     path.feel(strayed)
     here = path.place_m
     for time_s in (RESPONSE_S, np.full(3, 0.8), np.full(3, 20.0)):
@@ -45,8 +46,8 @@ def test_it_goes_on_to_stray_until_that_has_died_away():
 
 
 def test_it_tells_what_it_felt_inside_the_limit_and_nothing_where_it_did_not():
-    """A push up to 0.7 m/s within 0.1 s: 0.5 of it; a gap in what is felt tells nothing, nor does a limit of 0."""
-    path, told = OwnPath(RESPONSE_S, 0.01, STRAYING_S, 1e6, 0.5), []
+    """A push up to 0.7 m/s within 0.1 s: 0.5 of it. A gap in what is felt tells nothing, nor an axis with no limit."""
+    path, told = OwnPath(RESPONSE_S, 0.01, STRAYING_S, 1e6, LIMIT_M_S), []
     for _ in range(10):
         path.feel(np.array([0.0, 0.0, 0.07]))
         told.append(path.felt_change_m_s)
@@ -55,14 +56,15 @@ def test_it_tells_what_it_felt_inside_the_limit_and_nothing_where_it_did_not():
     np.testing.assert_allclose(np.sum(told, axis=0), (0.0, 0.0, 0.5), atol=1e-6)
     path.feel(np.full(3, np.nan))
     np.testing.assert_array_equal(path.felt_change_m_s, np.zeros(3))
-    unfelt = OwnPath(RESPONSE_S, 0.01, STRAYING_S, 4.0, 0.0)
+    unfelt = OwnPath(RESPONSE_S, 0.01, STRAYING_S, 4.0, np.array([0.5, 0.0, 0.5]))
     unfelt.feel(np.full(3, 0.1))
-    np.testing.assert_array_equal(unfelt.felt_change_m_s, np.zeros(3))
+    np.testing.assert_allclose(unfelt.felt_change_m_s, (0.1, 0.0, 0.1), rtol=0.01)
+    assert unfelt.felt_change_m_s[1] == 0.0
 
 
 def test_gravity_that_is_not_quite_taken_off_is_forgotten():
     """0.05 m/s^2 from now on: felt as 0.07 m/s at most, within half a minute as nothing."""
-    path, most = OwnPath(RESPONSE_S, 0.01, STRAYING_S, 4.0, 0.5), 0.0
+    path, most = OwnPath(RESPONSE_S, 0.01, STRAYING_S, 4.0, LIMIT_M_S), 0.0
     for _ in range(3000):
         path.feel(np.full(3, 0.0005))
         path.step(np.zeros(3))
@@ -72,7 +74,7 @@ def test_gravity_that_is_not_quite_taken_off_is_forgotten():
 
 
 def test_where_nothing_is_felt_any_more_straying_dies_away():
-    path = OwnPath(RESPONSE_S, 0.01, STRAYING_S, 4.0, 0.5)
+    path = OwnPath(RESPONSE_S, 0.01, STRAYING_S, 4.0, LIMIT_M_S)
     path.feel(np.full(3, 0.3))
     straying = path.velocity_m_s
     for k in range(1, 300):
@@ -82,7 +84,7 @@ def test_where_nothing_is_felt_any_more_straying_dies_away():
 
 
 def test_a_turn_that_nobody_announced_is_not_flown_against_for_more_than_the_limit():
-    path, most = OwnPath(RESPONSE_S, 0.01, STRAYING_S, 4.0, 0.5), 0.0
+    path, most = OwnPath(RESPONSE_S, 0.01, STRAYING_S, 4.0, LIMIT_M_S), 0.0
     for _ in range(1000):
         path.feel(np.full(3, 0.05))  # 5 m/s^2
         path.step(np.zeros(3))
@@ -93,7 +95,7 @@ def test_a_turn_that_nobody_announced_is_not_flown_against_for_more_than_the_lim
 
 @pytest.mark.parametrize("most_m_s", [0.4, 1.0, 3.0])
 def test_who_was_blown_aside_and_is_at_rest_again_strays_no_more_though_the_limit_was_met(most_m_s):
-    path, strays = OwnPath(RESPONSE_S, 0.01, STRAYING_S, 1e6, 0.5), []
+    path, strays = OwnPath(RESPONSE_S, 0.01, STRAYING_S, 1e6, LIMIT_M_S), []
     for change_m_s in np.repeat([most_m_s / 50.0, -most_m_s / 50.0], 50):  # up and down again, 0.5 s each
         path.feel(np.full(3, change_m_s))
         path.step(np.zeros(3))
