@@ -64,15 +64,15 @@ class DrogueMotion:
         """Begin anew at a place (3,) where it comes into view again, whatever the swing; the drift stays as learnt."""
         self._x[:, 0], self._x[:, FIRST_MODE:], self._P = place_m, 0.0, self._P_resumed.copy()
 
-    def step(self, place_m: Array | None, push_m_s2: Array, felt_m_s: Array) -> None:
+    def step(self, place_m: Array | None, push_m_s2: Array, blown_m_s: Array) -> None:
         """Advance by one control period.
 
         Args:
             place_m: (3,) on the receiver's scale, None if not seen.
             push_m_s2: (3,) b.
-            felt_m_s: (3,) df over the period.
+            blown_m_s: (3,) dw over the period.
         """
-        _foretell(self._x, self._felt_share, felt_m_s, self._F, self._pushed, push_m_s2)
+        _foretell(self._x, self._felt_share, blown_m_s, self._F, self._pushed, push_m_s2)
         if place_m is not None:
             _correct(self._x, self._P, self._R, place_m)
         _spread(self._P, self._F, self._Q)
@@ -139,14 +139,14 @@ def _at(x, first):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _foretell(x, share, felt, F, pushed, push):  # type: ignore[no-untyped-def]
+def _foretell(x, share, blown, F, pushed, push):  # type: ignore[no-untyped-def]
     """A step of Eqs. (1) and (2) in place: x (3, n), share (modes and g, 3), F (3, n, n), pushed (3, n)."""
     n, modes = x.shape[1], len(share) - 1
     later = np.empty(n)
     for axis in range(3):
         for mode in range(modes):
-            x[axis, FIRST_MODE + 1 + 2 * mode] += share[mode, axis] * felt[axis]
-        x[axis, n - 1] += share[modes, axis] * felt[axis]
+            x[axis, FIRST_MODE + 1 + 2 * mode] += share[mode, axis] * blown[axis]
+        x[axis, n - 1] += share[modes, axis] * blown[axis]
         for i in range(n):
             later[i] = pushed[axis, i] * push[axis]
             for j in range(n):

@@ -13,6 +13,11 @@ away,
 
     e(t) = e exp(-t/T_e),      y_r(t) - y_r - way commanded = T_e (1 - exp(-t/T_e)) e                     (3)
 
+so that what gusts gave the tip's velocity from tick to tick is what it is felt to have gained, and what flight control
+has taken back of it meanwhile:
+
+    dw = g_k - exp(-dt/T_e) g_k-1                                                                         (4)
+
 y_r is a scale of the receiver's own, which drifts against any other with the bias of its inertial velocity. On it the
 drogue's motion is its own: what the receiver did is taken off, so that a filter which follows the drogue closely does
 not chase the receiver's answer to its own commands.
@@ -29,7 +34,7 @@ from dockair.rotations import Array
 
 
 class OwnPath:
-    """Eqs. (1) to (3), axes forward, left, up.
+    """Eqs. (1) to (4), axes forward, left, up.
 
     Args:
         response_s: (3,) tau.
@@ -51,7 +56,7 @@ class OwnPath:
         self._axes, self._newest = np.arange(3), 0
         self._places, self._velocities = np.zeros((self._length, 3)), np.zeros((self._length, 3))  # rings
         self._own: Array = np.zeros((5, 3))  # v_k-1, f, and what follows
-        self._felt_change: Array = self._own[2]  # of g
+        self._blown: Array = self._own[2]  # dw
         self._straying: Array = self._own[3]  # e
         self._strayed: Array = self._own[4]  # its integral
 
@@ -66,9 +71,9 @@ class OwnPath:
         self._velocities[self._newest] = velocity_m_s
 
     @property
-    def felt_change_m_s(self) -> Array:
-        """(3,) of g in the last period; 0 where not felt."""
-        return self._felt_change.copy()
+    def blown_m_s(self) -> Array:
+        """(3,) dw of the last period; 0 where not felt."""
+        return self._blown.copy()
 
     @property
     def place_m(self) -> Array:
@@ -105,14 +110,14 @@ class OwnPath:
 
 @njit(cache=True)
 def _feel(own, v, change, dies, kept, limit, step):  # type: ignore[no-untyped-def]
-    """Eqs. (1) and (2) over a step in place: own (5, 3) are the rows v_k-1, f, change of g, e, way."""
+    """Eqs. (1), (2) and (4) over a step in place: own (5, 3) are the rows v_k-1, f, dw, e, way."""
     felt = np.isfinite(change[0]) and np.isfinite(change[1]) and np.isfinite(change[2])
     for i in range(3):
         f, e = own[1, i], own[3, i]
         if felt:
             own[1, i] = kept * (f + change[i] - (v[i] - own[0, i]))
             before, now = min(max(f, -limit[i]), limit[i]), min(max(own[1, i], -limit[i]), limit[i])
-            own[2, i] = now - before
+            own[2, i] = now - dies[i] * before
             own[3, i] = min(max(kept * (e + now - before), -limit[i]), limit[i])
         else:
             own[1, i], own[2, i], own[3, i] = 0.0, 0.0, dies[i] * e

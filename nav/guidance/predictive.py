@@ -111,7 +111,7 @@ class Predictive:
                 self._begin_anew(place, sight.rate_m_s + self._own.velocity_m_s)
             self._unseen_s = 0.0
             self._seen_s += self._step_s
-            self._motion.step(place, push[0], self._own.felt_change_m_s)
+            self._motion.step(place, push[0], self._own.blown_m_s)
         self._ahead = self._motion.ahead(push[0], push[1])
         self._push = push
         if sight is not None:

@@ -125,7 +125,7 @@ def unforeseen_m(told: Told, swing: SwingSettings) -> Array:
         own.feel(told.felt_m_s[i])
         came[i] = place + own.place_m
         push = settings.bow_wave.at(place)
-        motion.step(came[i], push, own.felt_change_m_s)
+        motion.step(came[i], push, own.blown_m_s)
         foretold[i] = motion.path(np.tile(push, (nodes[-1] + 3, 1)))[nodes]
         own.step(told.commanded_m_s[i])
     for row, ahead_s in enumerate(_AHEAD_S):

@@ -45,21 +45,23 @@ def test_it_goes_on_to_stray_until_that_has_died_away():
     np.testing.assert_allclose(path.straying_ahead_m_s, strayed * np.exp(-RESPONSE_S / STRAYING_S))
 
 
-def test_it_tells_what_it_felt_inside_the_limit_and_nothing_where_it_did_not():
-    """A push up to 0.7 m/s within 0.1 s: 0.5 of it. A gap in what is felt tells nothing, nor an axis with no limit."""
+def test_it_tells_what_gusts_gave_inside_the_limit_and_nothing_where_nothing_was_felt():
+    """A push up to 0.7 m/s within 0.1 s: 0.5 of it. A gap tells nothing, nor an axis with no limit."""
     path, told = OwnPath(RESPONSE_S, 0.01, STRAYING_S, 1e6, LIMIT_M_S), []
     for _ in range(10):
         path.feel(np.array([0.0, 0.0, 0.07]))
-        told.append(path.felt_change_m_s)
+        told.append(path.blown_m_s)
         path.step(np.zeros(3))
-    np.testing.assert_allclose(told[0], (0.0, 0.0, 0.07), atol=1e-6)
-    np.testing.assert_allclose(np.sum(told, axis=0), (0.0, 0.0, 0.5), atol=1e-6)
+    felt = np.minimum(0.07 * np.arange(11), 0.5)
+    given = felt[1:] - np.exp(-0.01 / STRAYING_S[2]) * felt[:-1]  # what flight control takes back is given, too
+    np.testing.assert_allclose(np.array(told)[:, 2], given, atol=1e-6)
+    assert not np.array(told)[:, :2].any()
     path.feel(np.full(3, np.nan))
-    np.testing.assert_array_equal(path.felt_change_m_s, np.zeros(3))
+    np.testing.assert_array_equal(path.blown_m_s, np.zeros(3))
     unfelt = OwnPath(RESPONSE_S, 0.01, STRAYING_S, 4.0, np.array([0.5, 0.0, 0.5]))
     unfelt.feel(np.full(3, 0.1))
-    np.testing.assert_allclose(unfelt.felt_change_m_s, (0.1, 0.0, 0.1), rtol=0.01)
-    assert unfelt.felt_change_m_s[1] == 0.0
+    np.testing.assert_allclose(unfelt.blown_m_s, (0.1, 0.0, 0.1), rtol=0.01)
+    assert unfelt.blown_m_s[1] == 0.0
 
 
 def test_gravity_that_is_not_quite_taken_off_is_forgotten():
