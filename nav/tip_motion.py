@@ -28,7 +28,7 @@ from numba import njit
 from dockair.rotations import Array
 from dockair.vectors import is_finite
 
-_LEVEL_S = 5.0  # of gravity felt: the mean over a shorter time is as much the gust's
+_LEVEL_S = 10.0  # of gravity felt: the mean over a shorter time is as much the gust's and the joining-up's
 _SMALL2 = 1e-8  # squared angle [rad^2] below which the series' next term is rounding
 _GAP_S = 0.1  # without samples the body turns unfelt; after longer ones c is found anew
 
