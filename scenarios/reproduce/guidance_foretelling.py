@@ -18,7 +18,7 @@ import numpy as np
 from dockair.nav.guidance.drogue_motion import DrogueMotion
 from dockair.nav.guidance.own_path import OwnPath
 from dockair.nav.guidance.stabilised_axes import StabilisedAxes
-from dockair.nav.guidance.swing_model import HoseMode, SwingSettings
+from dockair.nav.guidance.swing_model import SwingSettings
 from dockair.rotations import Array
 from dockair.scenarios.build import guidance_settings
 from dockair.scenarios.loop import Flight
@@ -70,15 +70,10 @@ def flown_settings() -> SwingSettings:
 
 def knowledge(flown: SwingSettings) -> Mapping[str, SwingSettings]:
     """Return the filters: the one that flies with some of its knowledge taken away."""
-    no_kick = replace(flown, modes=tuple(replace(mode, felt_share=(0.0,) * 3) for mode in flown.modes))
-    deaf = replace(no_kick, gust_felt_share=(0.0,) * 3)
-    lone = HoseMode(
-        frequency_hz=flown.modes[0].frequency_hz,
-        damping=flown.modes[0].damping,
-        gust_density=flown.modes[0].gust_density,
-    )
+    modes = tuple(replace(mode, felt_share=(0.0,) * 3) for mode in flown.modes)
+    deaf = replace(flown, modes=modes, gust_felt_share=(0.0,) * 3)
     return {
-        "one swing": replace(deaf, modes=(lone,)),
+        "one swing": replace(deaf, modes=modes[:1]),
         "three modes": deaf,
         "three modes, and what is felt (flown)": flown,
     }
@@ -94,16 +89,15 @@ def fly(seed: int) -> Told:
     before = flight.truth.v_WP
     try:
         while (tick := flight.step()).outcome is None:
-            truth, command = tick.truth, tick.solution.command
-            if tick.solution.phase not in _WAITING or truth.p_PD_B[0] <= 0.0 or truth.time_s > _LONGEST_S:
+            truth, told = tick.truth, tick.solution  # which is the truth, too
+            if told.phase not in _WAITING or told.p_PD_B[0] <= 0.0 or truth.time_s > _LONGEST_S:
                 break
             axes.step(truth.w_WB_B, 0.0)
-            v_PD_B = (truth.v_WD - truth.v_WP) @ truth.R_WB
-            place, rate = axes.moved(truth.p_PD_B, v_PD_B - cross(truth.w_WB_B, truth.p_PD_B))
+            place, rate = axes.moved(told.p_PD_B, told.v_PD_B - cross(truth.w_WB_B, told.p_PD_B))
             places.append(place)
             rates.append(rate)
             felt.append(axes.R_NB @ ((truth.v_WP - before) @ truth.R_WB))
-            commanded.append(axes.R_NB @ command.velocity_m_s)
+            commanded.append(axes.R_NB @ told.command.velocity_m_s)
             before = truth.v_WP
     finally:
         flight.close()
