@@ -1,12 +1,14 @@
 """What a group's scenario claims, and what it lacks of the figures that it is held to.
 
 Both are of the library's scenarios alone, and of flights as these are written: with no key set, and so neither of
-perfect navigation in place of the camera nor of another controller. A file of one's own may have changed since it was
-flown, or be another one from here; its campaign's summary says what it claims.
+perfect navigation in place of the camera nor of another controller; and of a scenario that still flies what was flown,
+by its digest. A file of one's own may have changed since it was flown, or be another one from here; its campaign's
+summary says what it claims.
 """
 
 from collections.abc import Sequence
 
+from dockair.scenarios.campaign.jobs import scenario_hash
 from dockair.scenarios.report.groups import Group, Row, file_and_settings
 from dockair.scenarios.scenario_file import scenario_names
 from dockair.scenarios.schema import Scenario, load_scenario
@@ -16,7 +18,10 @@ def scenario_of(group: Group) -> Scenario | None:
     """Return the library's scenario that all of the group's flights flew as it is written, None if there is none."""
     names = {_flown_as_written(row) for row in group.rows}
     name = names.pop() if len(names) == 1 else ""
-    return load_scenario(name) if name in scenario_names() else None
+    if name not in scenario_names():
+        return None
+    scenario = load_scenario(name)
+    return scenario if {row["scenario_hash"] for row in group.rows} == {scenario_hash(scenario)} else None
 
 
 def claim_of(group: Group) -> str:

@@ -10,6 +10,7 @@ import pytest
 from dockair.errors import DockairError
 from dockair.scenarios.campaign import manifest as manifests
 from dockair.scenarios.campaign import table
+from dockair.scenarios.campaign.jobs import scenario_hash
 from dockair.scenarios.campaign.row import COLUMNS
 from dockair.scenarios.report.acceptance import claim_of, shortfalls_of
 from dockair.scenarios.report.evidence import as_text, evidence_of
@@ -18,9 +19,11 @@ from dockair.scenarios.report.folders import Campaign, read_campaigns
 from dockair.scenarios.report.groups import Share, groups_of
 from dockair.scenarios.report.page import page
 from dockair.scenarios.report.pairs import beside_perfect_navigation, side_by_side
+from dockair.scenarios.schema import load_scenario
 from dockair.scenarios.statistics import wilson_interval
 
 OUR_NAVIGATOR = "dockair.nav.navigator:Navigator"
+LIGHT_GUSTS = scenario_hash(load_scenario("light_gusts"))
 
 
 def _attempt(number, outcome="contact", offset_m=0.05, cause=""):
@@ -285,11 +288,12 @@ def test_two_navigators_of_the_same_class_name_have_each_their_own_section():
 
 def test_only_the_librarys_scenarios_as_they_are_written_are_held_to_their_claims(tmp_path, monkeypatch):
     bad = [_attempt(1, "miss", 0.4, "gust")]
-    (written,) = groups_of([_row(seed, attempts=bad) for seed in range(3)])
+    (written,) = groups_of([_row(seed, attempts=bad, scenario_hash=LIGHT_GUSTS) for seed in range(3)])
     assert shortfalls_of(written) and claim_of(written)
+    (of_another_file,) = groups_of([row | {"scenario_hash": "before it was changed"} for row in written.rows])
     changed = _row(9, attempts=bad, command=_command("light_gusts", 9, **{"turbulence.sigma_m_s": 3}))
     drawn = changed | {"set.turbulence.sigma_m_s": 3}
-    for other in (groups_of([*written.rows, drawn])[1], groups_of([changed])[0]):
+    for other in (of_another_file, groups_of([*written.rows, drawn])[1], groups_of([changed])[0]):
         assert shortfalls_of(other) is None and claim_of(other) == ""
     text = 'name = "mine"\nclaim = "it docks"\n[accept]\noutcome = "contact"\n'
     (tmp_path / "mine.toml").write_text(text)
@@ -378,7 +382,8 @@ def test_evidence_says_what_each_flight_had_drawn():
 def test_flights_without_a_draw_keep_their_claim_beside_those_with_one():
     sigma = {"turbulence.sigma_m_s": 9.0}
     drawn = [_row(k, command=_command("light_gusts", k, **sigma)) | {"set.turbulence.sigma_m_s": 9.0} for k in (5, 6)]
-    judged = [group["shortfalls"] for group in evidence_of([_campaign([_row(0), _row(1), *drawn])])["groups"]]
+    written = [_row(k, scenario_hash=LIGHT_GUSTS) for k in (0, 1)]
+    judged = [group["shortfalls"] for group in evidence_of([_campaign([*written, *drawn])])["groups"]]
     assert judged[0] is not None and judged[1] is None
 
 
