@@ -31,6 +31,7 @@ CLOSING_BAND_M_S = (1.0, 1.5)  # service practice
 CAPTURE_M = 0.15  # of the tip from the ring's centre, inside which a contact is asked for
 SENSING_IN_WORDS = {"camera": "camera", "measurements": "measurement model", "truth": "perfect navigation"}
 NOT_SAID = "not said"  # in place of a cause
+_SPELT_OUT = 3  # keys that a plan draws: of more a title says how many
 _NO_WORD = re.compile(r"[^\w.]+")
 _IN_COLUMNS = ("navigation.navigator", "camera.sensing", "guidance.controller")  # keys whose values have a column
 
@@ -100,8 +101,16 @@ class Group:
 
     @property
     def name(self) -> str:
-        """The scenario, with what is set over it."""
-        return f"{self.scenario} with {self.settings}" if self.settings else self.scenario
+        """The scenario, with what is set over it, in short."""
+        return f"{self.scenario} with {self.settings_in_short}" if self.settings else self.scenario
+
+    @property
+    def settings_in_short(self) -> str:
+        """`settings`, but how many keys are drawn where these are more than a title can hold."""
+        given, drawn = _given_and_drawn(self.rows[0])
+        if len(drawn) <= _SPELT_OUT:
+            return self.settings
+        return ", ".join([*sorted(given), f"{len(drawn)} keys drawn"])
 
     @property
     def label(self) -> str:
@@ -237,9 +246,15 @@ def drawn_of(row: Row) -> list[str]:
 
 def _settings_of(row: Row) -> str:
     """Return what was set over the scenario, of a draw the key alone; without keys that have a column of their own."""
+    given, drawn = _given_and_drawn(row)
+    return ", ".join(sorted([*given, *(f"{key} drawn" for key in drawn)]))
+
+
+def _given_and_drawn(row: Row) -> tuple[list[str], list[str]]:
+    """Return "key=value" of what was set, and the keys that were drawn; without those that have a column."""
     drawn = drawn_of(row)
     settings = [text for text in file_and_settings(row)[1] if key_of(text) not in _IN_COLUMNS]
-    return ", ".join(sorted(f"{key_of(text)} drawn" if text in drawn else text for text in settings))
+    return [text for text in settings if text not in drawn], [key_of(text) for text in settings if text in drawn]
 
 
 def key_of(text: str) -> str:

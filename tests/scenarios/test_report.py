@@ -379,6 +379,19 @@ def test_evidence_says_what_each_flight_had_drawn():
     assert with_draw["each"][0][-1] == "turbulence.sigma_m_s=0.5"
 
 
+def test_of_many_drawn_keys_titles_and_pictures_say_how_many_and_the_page_says_which_once():
+    few = {"flight.airspeed_m_s": 170.0, "start.aft_m": 5.0, "turbulence.sigma_m_s": 0.5}
+    for drawn, short in ((few, False), (few | {"parameters.hose.length_m": 14.0}, True)):
+        command = _command("light_gusts", 0, **drawn, **{"guidance.hold_s": 9})
+        (group,) = groups_of([_row(0, command=command) | {f"set.{key}": value for key, value in drawn.items()}])
+        whole = ", ".join(sorted(["guidance.hold_s=9", *(f"{key} drawn" for key in drawn)]))
+        named = "guidance.hold_s=9, 4 keys drawn" if short else whole
+        assert (group.settings, group.settings_in_short, group.name) == (whole, named, f"light_gusts with {named}")
+        text = page("made", [_campaign(group.rows)])
+        assert text.count(f"With <code>{whole}</code>") == short and named in text
+        assert evidence_of([_campaign(group.rows)])["groups"][0]["settings"] == whole
+
+
 def test_flights_without_a_draw_keep_their_claim_beside_those_with_one():
     sigma = {"turbulence.sigma_m_s": 9.0}
     drawn = [_row(k, command=_command("light_gusts", k, **sigma)) | {"set.turbulence.sigma_m_s": 9.0} for k in (5, 6)]
