@@ -17,6 +17,7 @@ from dockair.scenarios.report.groups import groups_of
 from dockair.scenarios.statistics import wilson_interval
 
 _LINE_INTERVAL_S = 30.0  # between two lines where stderr is no terminal
+_CELL = 48  # characters of settings that a table's cell can hold
 
 Row = Mapping[str, Any]
 
@@ -126,10 +127,10 @@ def show_campaign(table: Mapping[str, Any]) -> None:
     crew = _crew_columns(table["groups"])
     for name in crew:
         shown.add_column(name)
-    with_settings = any(group["settings"] for group in table["groups"])
-    if with_settings:
+    cells, whole = _settings_cells(table["groups"])
+    if any(cells):
         shown.add_column("set")
-    for group in table["groups"]:
+    for group, cell in zip(table["groups"], cells, strict=True):
         offset, speed = group["radial_offset_m"], group["closure_speed_m_s"]
         shown.add_row(
             *(group["scenario"], group["sensing"]),
@@ -138,9 +139,11 @@ def show_campaign(table: Mapping[str, Any]) -> None:
             f"{speed['min']:.2f}-{speed['max']:.2f} m/s" if speed else "",
             *(str(group[name]) if group[name] else "" for name in ("unsafe", "errors")),
             *(group[name] for name in crew),
-            *((Text(group["settings"]),) if with_settings else ()),  # a list's brackets are no markup
+            *((Text(cell),) if any(cells) else ()),  # a list's brackets are no markup
         )
     console.print(shown)
+    for text in whole:
+        console.print(text, markup=False, highlight=False, soft_wrap=True)
     for group in table["groups"]:
         for shortfall in group["shortfalls"] or ():
             where = f"{group['scenario']} ({group['sensing']}, {group['controller']})"
@@ -155,17 +158,28 @@ def _crew_columns(groups: Sequence[Mapping[str, Any]]) -> list[str]:
     return [name for name, found in crews.items() if len(found) > 1]
 
 
+def _settings_cells(groups: Sequence[Mapping[str, Any]]) -> tuple[list[str], list[str]]:
+    """Return the cell of each group's settings, "(1)" in place of long ones, and those in full, to stand below."""
+    long = list(dict.fromkeys(group["settings"] for group in groups if len(group["settings"]) > _CELL))
+    numbers = {text: f"({number})" for number, text in enumerate(long, start=1)}
+    cells = [numbers.get(group["settings"], group["settings"]) for group in groups]
+    return cells, [f"  {number} {text}" for text, number in numbers.items()]
+
+
 def show_dry_run(planned: Mapping[str, Any]) -> None:
     """Print what `dockair campaign --dry-run --json` would, but for the commands."""
     console, shown = plain_console(), Table(box=None, padding=(0, 1))
     crew = _crew_columns(planned["groups"])
     for heading in ("scenario", "sensing", *crew, "flights", "done", "set"):
         shown.add_column(heading, no_wrap=True)
-    for group in planned["groups"]:
+    cells, whole = _settings_cells(planned["groups"])
+    for group, cell in zip(planned["groups"], cells, strict=True):
         counts = str(group["flights"]), str(group["done"] or "")
         flown_by = (group[name] for name in crew)
-        shown.add_row(group["scenario"], group["sensing"], *flown_by, *counts, Text(group["settings"]))
+        shown.add_row(group["scenario"], group["sensing"], *flown_by, *counts, Text(cell))
     console.print(shown)
+    for text in whole:
+        console.print(text, markup=False, highlight=False, soft_wrap=True)
     left = planned["flights"] - planned["done"]
     console.print(f"  {left} of {planned['flights']} flights would be flown; {planned['folder']}", soft_wrap=True)
 

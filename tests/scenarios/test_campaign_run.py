@@ -719,6 +719,24 @@ def test_a_dry_run_says_what_would_be_flown_and_writes_nothing(command, here, tm
     assert "4 of 4 flights would be flown" in command("p.toml", "--dry-run", "--seeds", "4", "--fresh")[1]
 
 
+def test_settings_too_long_for_a_cell_stand_once_under_the_table(command, here, tmp_path):
+    faults = {
+        '"faults"': '[{ kind = "led_off", leds = [0, 1, 2], start_s = 1.0, stop_s = 2.0 }]',
+        '"start.aft_m"': "5.0",
+    }
+    changed = f"set = {{ {', '.join(f'{key} = {value}' for key, value in faults.items())} }}"
+    scenarios = (
+        f'"truth_navigation", {{ scenario = "truth_navigation", {changed} }}, {{ scenario = "default", {changed} }}'
+    )
+    plan(tmp_path, 1, "", scenarios)
+    for arguments in (["--dry-run"], []):
+        status, out, _ = command("p.toml", *arguments)
+        (below,) = (line for line in out.splitlines() if "leds" in line)
+        assert status == 0 and below.startswith("  (1) faults=[") and below.endswith(", start.aft_m=5.0")
+        rows = [line for line in out.splitlines() if line.startswith((" truth_navigation", " default"))]
+        assert sorted(line.rstrip().endswith(" (1)") for line in rows) == [False, True, True]
+
+
 def test_a_dry_run_counts_errors_as_done_unless_they_are_to_be_tried_again(here, tmp_path):
     source = plan(tmp_path, 3)
     fly(source, tmp_path / "out", "never")
