@@ -141,9 +141,7 @@ def show_campaign(table: Mapping[str, Any]) -> None:
             *(group[name] for name in crew),
             *((Text(cell),) if any(cells) else ()),  # a list's brackets are no markup
         )
-    console.print(shown)
-    for text in whole:
-        console.print(text, markup=False, highlight=False, soft_wrap=True)
+    _print(console, shown, whole)
     for group in table["groups"]:
         for shortfall in group["shortfalls"] or ():
             where = f"{group['scenario']} ({group['sensing']}, {group['controller']})"
@@ -166,6 +164,12 @@ def _settings_cells(groups: Sequence[Mapping[str, Any]]) -> tuple[list[str], lis
     return cells, [f"  {number} {text}" for text, number in numbers.items()]
 
 
+def _print(console: Console, shown: Table, below: Sequence[str]) -> None:
+    console.print(shown)
+    for text in below:
+        console.print(text, markup=False, highlight=False, soft_wrap=True)
+
+
 def show_dry_run(planned: Mapping[str, Any]) -> None:
     """Print what `dockair campaign --dry-run --json` would, but for the commands."""
     console, shown = plain_console(), Table(box=None, padding=(0, 1))
@@ -177,9 +181,7 @@ def show_dry_run(planned: Mapping[str, Any]) -> None:
         counts = str(group["flights"]), str(group["done"] or "")
         flown_by = (group[name] for name in crew)
         shown.add_row(group["scenario"], group["sensing"], *flown_by, *counts, Text(cell))
-    console.print(shown)
-    for text in whole:
-        console.print(text, markup=False, highlight=False, soft_wrap=True)
+    _print(console, shown, whole)
     left = planned["flights"] - planned["done"]
     console.print(f"  {left} of {planned['flights']} flights would be flown; {planned['folder']}", soft_wrap=True)
 
