@@ -140,7 +140,7 @@ def build(scenario: Scenario, seed: int) -> Parts:
         settle_s=SETTLE_S,
     )
     path, announcer = _tanker_path(scenario, seed, parameters)
-    world = World(parameters, receiver, motion, start, clock, faults.reel_locked, path)
+    world = World(parameters, receiver, motion, start, clock, faults.reel_locked, path, faults.reel_known_dead)
     place_leds(world.model, world.data, sheets.ring)
     as_built = _as_built(scenario, seed, sheets)
     if scenario.navigation.is_truth:
@@ -182,7 +182,7 @@ def guidance_settings(scenario: Scenario) -> GuidanceSettings:
     density = standard_atmosphere(scenario.flight.altitude_m).density_kg_m3
     pressure_pa = 0.5 * density * scenario.flight.airspeed_m_s**2
     mounting = load_parameters(scenario.hardware.receiver_sheet("mounting"), MountingParameters)
-    bow_wave = load_parameters("bow_wave", BowWaveParameters)
+    bow_wave = load_parameters(scenario.hardware.receiver_sheet("bow_wave"), BowWaveParameters)
     source_B = bow_wave_coefficients(bow_wave, mounting.probe_tip_m, scenario.flight.airspeed_m_s)[:3]
     x, y, z = (float(value) for value in source_B - mounting.probe_tip_m)
     control = load_parameters(scenario.hardware.receiver_sheet("flight_control"), FlightControlParameters)

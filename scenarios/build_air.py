@@ -49,7 +49,8 @@ def air_motion(
         settle_s: how long the world runs before time 0.
     """
     turbulence_sheet = load("turbulence", TurbulenceParameters)
-    wake_sheet, bow_wave_sheet = load("wake", WakeParameters), load("bow_wave", BowWaveParameters)
+    wake_sheet = load("wake", WakeParameters)
+    bow_wave_sheet = load(scenario.hardware.receiver_sheet("bow_wave"), BowWaveParameters)
     V = world.airspeed_m_s
     gusts = _turbulence(scenario, turbulence_sheet, V, clock, rng, receiver_span_m)
     single = _single_gusts(scenario, world, clock, settle_s) if scenario.gusts else None

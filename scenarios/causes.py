@@ -124,7 +124,8 @@ def flown_of(
         truths: one a control tick.
         solutions: likewise.
     """
-    sheet = load_parameters("bow_wave", BowWaveParameters, scenario.parameters.get("bow_wave"))
+    name = scenario.hardware.receiver_sheet("bow_wave")
+    sheet = load_parameters(name, BowWaveParameters, scenario.parameters.get(name))
     nose = np.array([-sheet.nose_behind_tip_m, -mounting.p_BP[1], sheet.nose_height_m - mounting.p_BP[2]])
     faults = [table.fault for table in scenario.faults]
     return Flown(

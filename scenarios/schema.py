@@ -8,7 +8,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import make_dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
@@ -24,6 +24,9 @@ from dockair.scenarios.light_tables import CameraOptions, Sun, Weather
 from dockair.scenarios.refusal import Expected, refusal
 from dockair.scenarios.scenario_file import ScenarioFile
 from dockair.scenarios.table import Table, tuple_from_list
+
+ReceiverSheet = Literal["airframe", "flight_control", "mounting", "bow_wave"]
+_OF_RECEIVER: tuple[ReceiverSheet, ...] = get_args(ReceiverSheet)
 
 
 class Hardware(Table):
@@ -41,7 +44,7 @@ class Hardware(Table):
                 raise DockairError(f"hardware.{key}", expected="the path of a calibration sheet", got=path)
         return self
 
-    def receiver_sheet(self, name: Literal["airframe", "flight_control", "mounting"]) -> str:
+    def receiver_sheet(self, name: ReceiverSheet) -> str:
         """Return the name of the receiver's own sheet of a kind."""
         return name if self.airframe == "fighter" else f"{name}_{self.airframe}"
 
@@ -90,10 +93,7 @@ class Scenario(Table):
     def _parameters_fit(self) -> Self:
         for sheet, overrides in self.parameters.items():
             load_parameters(sheet, make_dataclass(sheet, sorted(read_sheet(sheet))), overrides)  # checks only
-            if (
-                sheet.startswith(("imu_", "filter_", "airframe", "flight_control", "mounting"))
-                and sheet not in self.chosen_sheets
-            ):
+            if sheet.startswith(("imu_", "filter_", *_OF_RECEIVER)) and sheet not in self.chosen_sheets:
                 expected = f"a sheet that this scenario uses ({', '.join(self.chosen_sheets)})"
                 raise DockairError(f"parameters.{sheet}", expected=expected, got=sheet)
         return self
@@ -101,7 +101,7 @@ class Scenario(Table):
     @property
     def chosen_sheets(self) -> tuple[str, ...]:
         """Sheets that are chosen by name: of the IMU, of the filter and of the receiver."""
-        receiver = (self.hardware.receiver_sheet(name) for name in ("airframe", "flight_control", "mounting"))
+        receiver = (self.hardware.receiver_sheet(name) for name in _OF_RECEIVER)
         return f"imu_{self.hardware.imu}", f"filter_{self.camera.filter}", *receiver
 
     @property

@@ -82,6 +82,7 @@ class World:
         start: relative geometry and settling time.
         clock: physics rate.
         reel_locked: whether the reel is dead at a time of the flight [s]; while the hose settles it is 0.
+        reel_known_dead: whether the hose unit knows it at a time, and shuts the fuel off; never by default.
         tanker_path: what the tanker flies; straight on by default.
 
     Attributes:
@@ -99,11 +100,12 @@ class World:
         clock: Clock,
         reel_locked: Callable[[float], bool] | None = None,
         tanker_path: TankerPath | None = None,
+        reel_known_dead: Callable[[float], bool] | None = None,
     ) -> None:
         if not start.settle_s >= 0.0:
             raise DockairError("start.settle_s", expected="a time >= 0", got=start.settle_s)
         self.parameters, self._receiver, self._air, self._clock = parameters, receiver, air, clock
-        self._reel_locked = reel_locked
+        self._reel_locked, self._reel_known_dead, self._drum_stands = reel_locked, reel_known_dead, False
         self.model = build_scene(scene_of(parameters, receiver, clock.step_s))
         self.data = mujoco.MjData(self.model)
         self._at = Addresses.of(self.model)
@@ -158,6 +160,7 @@ class World:
     def restore(self, state: WorldState) -> None:
         """Go back to a saved state; what follows is the same to the bit."""
         mujoco.mj_setState(self.model, self.data, state.engine, _STATE)
+        self._hold_drum(state.parts[0].locked)
         self._renew()
         self._tow.reel, self._receiver, self._air, self._fuel = copy.deepcopy(state.parts)
         self._coupling, self.truth, self._seen, self._air_state = state.coupling, state.truth, state.seen, state.air
@@ -220,19 +223,28 @@ class World:
         position, rate = float(x[layout.REEL_POSITION]), float(x[layout.REEL_RATE])
         pod = self._tanker.pod() if position > 0.0 else None  # nobody asks for it while all of the hose is outside
         self._tow_wrenches[:] = self._tow.wrenches(*self._tow_places, self._air_state.tow_W, position, pod)
-        locked = self._reel_locked is not None and self._reel_locked(self._clock.seconds(self._tick))
+        began_s = self._clock.seconds(self._tick)
+        locked = self._reel_locked is not None and self._reel_locked(began_s)
+        self._hold_drum(locked)
         self._reel_force[0] = self._tow.reel.step(self._tensions[0], position, rate, locked)
         self._tanker.set_out(time_s)
         self._solve(time_s, self._at.tow.start + self._tow.link_at_exit(position))
         self._decide_coupling()
         if self._coupling is CouplingState.LATCHED or self._fuel.flow_kg_s > 0.0:
-            light = reel_light(position, locked, self.parameters.reel)
+            known_dead = self._reel_known_dead is not None and self._reel_known_dead(began_s)
+            light = reel_light(position, known_dead, self.parameters.reel)
             self._fuel.step(light, self._coupling is CouplingState.LATCHED)
         if self._air is not None:
             self._air.step()
         self._tanker.arrive()
         self._renew(may_touch=not self._reach.is_clear())
         self._observe(tick)
+
+    def _hold_drum(self, stands: bool) -> None:
+        """From the next step on the drum's inertia is on the hose's way in and out, or, where it stands, is not."""
+        if stands != self._drum_stands:
+            self._drum_stands = stands
+            self.model.dof_armature[self._at.reel_dof] = 0.0 if stands else self.parameters.reel.drum_mass_kg
 
     def _renew(self, *, may_touch: bool = True) -> None:
         """MuJoCo's first half step; to look for contacts takes a third of it."""

@@ -75,6 +75,7 @@ def make_world(
     settle_s: float = 0.0,
     rate_hz: int = 1000,
     reel_locked: Callable[[float], bool] | None = None,
+    reel_known_dead: Callable[[float], bool] | None = None,
     tanker_path: Any = None,
     **overrides: dict[str, float],
 ) -> World:
@@ -94,7 +95,7 @@ def make_world(
     if isinstance(tanker_path, TankerPathParameters):
         path = TankerPath(tanker_path, airspeed_m_s, -sheets["tanker"].exit_m)
     clock, rails = Clock(rate_hz), receiver or ReceiverOnRails()
-    return World(parameters, rails, air, start, clock, reel_locked, path)
+    return World(parameters, rails, air, start, clock, reel_locked, path, reel_known_dead)
 
 
 @pytest.fixture(name="make_world")

@@ -108,7 +108,7 @@ class Background:
             window: inside the sensor.
             white_e: electrons of a white surface on the axis, in this exposure.
             stray: electrons added to them; holds the window.
-            dirt: factor on both; holds the window.
+            dirt: factor on the picture; holds the window.
             extinction_1_m: of the haze before the solids.
             place_m: (3,) of the camera in axes that stay with the air, for what passes below; None is their origin.
             out: (rows, columns) that takes them; a new array by default.

@@ -3,7 +3,7 @@
 Block (i, j) has its centre at row k (i + 1/2) - 1/2 and column k (j + 1/2) - 1/2 of the sensor. From the blocks'
 radiances L, with the lens's fall-off and bilinear between the centres, a pixel gets
 
-    e(u, v) = (e_white [L cos^4 t](u, v) + stray(u, v)) dirt(u, v)                                               (1)
+    e(u, v) = e_white [L cos^4 t](u, v) dirt(u, v) + stray(u, v)                                                 (1)
 
 Through a lens that distorts, block (i, j) sees along the ray that the inverse of [calibration, eq 1] gives. Then the
 scene is drawn for a pinhole, on blocks of the same size around the same axis, and each block of the sensor takes the
@@ -149,7 +149,7 @@ class Blocks:
             window: what is wanted.
             white_e: electrons of radiance 1 on the axis.
             stray: electrons added; None for none.
-            dirt: factor; None for 1.
+            dirt: factor on the picture; None for 1.
             out: (rows, columns) that takes them; a new array by default.
         """
         rows = _cut(self._lines[0], window.row_start, window.row_stop)
@@ -247,14 +247,6 @@ def _to_pixels(
         a, b, down = i % 2, (i + 1) % 2, scene[1][1][r]
         for c in range(out.shape[1]):
             out[r, c] = lines[a, c] + down * (lines[b, c] - lines[a, c])
-        if stray[0].size > 0:
-            i = stray[1][0][r] - stray[3][0]
-            if i != above:
-                _spread_rows(stray, _ALIKE, white_e, above, i, lines[3:6])
-                above = i
-            a, b, down = 3 + i % 2, 3 + (i + 1) % 2, stray[1][1][r]
-            for c in range(out.shape[1]):
-                out[r, c] += lines[a, c] + down * (lines[b, c] - lines[a, c])
         if dirt[0].size > 0:
             i = dirt[1][0][r] - dirt[3][0]
             if i != below:
@@ -263,6 +255,14 @@ def _to_pixels(
             a, b, down = 6 + i % 2, 6 + (i + 1) % 2, dirt[1][1][r]
             for c in range(out.shape[1]):
                 out[r, c] *= lines[a, c] + down * (lines[b, c] - lines[a, c])
+        if stray[0].size > 0:
+            i = stray[1][0][r] - stray[3][0]
+            if i != above:
+                _spread_rows(stray, _ALIKE, white_e, above, i, lines[3:6])
+                above = i
+            a, b, down = 3 + i % 2, 3 + (i + 1) % 2, stray[1][1][r]
+            for c in range(out.shape[1]):
+                out[r, c] += lines[a, c] + down * (lines[b, c] - lines[a, c])
 
 
 @njit(cache=True)

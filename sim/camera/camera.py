@@ -3,11 +3,12 @@
     sky and scene in haze ► stray light of the Sun ► its disc ► point sources ► expected electrons
     expected electrons ► electronics ► pixels ► exposure control ► exposure of the next frame
 
-Point sources are the LEDs, their reflections and the Sun's, each spread by `optics` and smeared over the exposure by
-the motion of what it sits on. An LED is hidden when something lies between it and the lens.
+Point sources are the LEDs, their reflections and the Sun's, each spread by `optics` and smeared over the exposure, the
+LEDs by the motion of what they sit on. An LED is hidden when something lies between it and the lens.
 
 Time: `expose` is called with the world at the middle of the exposure; the frame arrives `latency_s` later.
-Not modelled: motion of background and Sun during an exposure; glints move as if they stuck to their surfaces.
+Not modelled: motion of background and Sun during an exposure; glints move as if
+at rest beside the tanker.
 """
 
 from dataclasses import replace
@@ -233,6 +234,8 @@ class NearInfraredCamera:
         pose, dirt = self.pose(data), self._defects.dirt(self._faults.camera(time_s).dirt_cover)
         veil = 1.0 if dirt is None else dirt.veil_factor
         sun_C, visible = self._sun_in_view(data, pose)
+        if dirt is not None and visible > 0.0:
+            visible *= dirt.toward(sun_C)
         stray = self._glare.stray(sun_C, visible, exposure_s, window, veil) if visible > 0.0 else None
         image = self.background_electrons(data, window, exposure_s, stray, dirt, out, pose)
         start = window.row_start, window.column_start

@@ -4,11 +4,13 @@
     h = max(g - g_c, 0)/d,   T = 1 - (1 - T_min) h^2/(1 + h^2)                                                   (2)
     veil and halo grow by   1 + scatter (1 - mean T)/(veil + halo)                                               (3)
 
-Big smudges are thick. g_c is the quantile of g that leaves the part `cover` of the frame above it, so that more cover
-contains less; d is the thickness at which a smudge is half as dark as it can be. Of the light that dirt takes, the
-part `scatter` returns as veil and halo.
+T dims the scene where it is seen, and all stray light of the Sun, which comes about in the lens behind the window, by
+T toward the Sun. Big smudges are thick. g_c is the quantile of g that leaves the part `cover` of the frame above it, so
+that more cover contains less; d is the thickness at which a smudge is half as dark as it can be. Of the light that dirt
+takes, the part `scatter` returns as veil and halo.
 
-Not modelled: that smudges move with the aperture's parallax; what they spread of LEDs (their halo stays unseen).
+Not modelled: that smudges move with the aperture's parallax; what they spread of LEDs (their halo stays unseen); that
+in the Sun's light they glow themselves, where Eq. (3) spreads what they scatter over the frame.
 Not valid for drops that focus light.
 Source: an edge 50 mm before an aperture of 2 mm is blurred over 40 mrad, which sets the sizes.
 """
@@ -20,6 +22,7 @@ from dockair.calibration import Camera
 from dockair.errors import DockairError
 from dockair.rotations import Array
 from dockair.sim.camera.coarse_grid import SPACING_PX, CoarseGrid, nodes_around
+from dockair.sim.camera.image_point import image_point
 from dockair.sim.camera.sheets import GlareParameters
 
 _SIGMA_OF_SIZE = 0.3  # a Gaussian of this times a smudge's width makes blobs of about that width
@@ -39,6 +42,7 @@ class Dirt:
     def __init__(self, parameters: GlareParameters, camera: Camera, rng: np.random.Generator, cover: float) -> None:
         if not 0.0 <= cover <= 1.0:
             raise DockairError("dirty window: cover", expected="a number in [0, 1]", got=cover)
+        self._camera = camera
         first, shape = nodes_around(camera.full_window)
         field = _field(parameters, camera.focal_length_px, rng, shape)
         edge = float(np.quantile(field, 1.0 - cover)) if cover > 0.0 else np.inf
@@ -46,7 +50,8 @@ class Dirt:
         values = (1.0 - (1.0 - parameters.dirt_darkest) * thick**2 / (1.0 + thick**2)).astype(np.float32)
         values.setflags(write=False)
         self.grid = CoarseGrid(values, first)  #: transmittance of the whole sensor
-        taken = 1.0 - float(values.mean(dtype=float))
+        self._mean = float(values.mean(dtype=float))
+        taken = 1.0 - self._mean
         spread = parameters.veiling_glare + float(parameters.halo_share.sum())
         #: how much brighter than a clean lens's are veil and halo, Eq. (3); a lens with neither keeps neither
         self.veil_factor = 1.0 + parameters.dirt_scatter * taken / spread if spread > 0.0 else 1.0
@@ -54,6 +59,12 @@ class Dirt:
     def at(self, pixels: Array) -> Array:
         """(n,) transmittance at pixels (n, 2) (u, v)."""
         return self.grid.at(pixels)
+
+    def toward(self, direction_C: Array) -> float:
+        """Transmittance in a direction (3,), x > 0; from outside the frame, where nothing is drawn, the mean."""
+        u, v = pixel = image_point(self._camera, direction_C)
+        inside = 0.0 <= u <= self._camera.width_px - 1 and 0.0 <= v <= self._camera.height_px - 1
+        return float(self.at(pixel[np.newaxis])[0]) if inside else self._mean
 
     def over(self, shape: tuple[int, int], first: tuple[int, int]) -> Array:
         """(rows, columns) transmittance of a patch of pixels whose first one is at (row, column) on the sensor."""

@@ -35,6 +35,7 @@ from dockair.rotations import Array
 from dockair.sim.camera.coarse_grid import CoarseGrid, nodes_around
 from dockair.sim.camera.ghosts import CompactGhosts, Ghosts
 from dockair.sim.camera.halo import Halo
+from dockair.sim.camera.image_point import image_point
 from dockair.sim.camera.iris import Iris, Spikes
 from dockair.sim.camera.radiometry import Responses
 from dockair.sim.camera.sheets import GlareParameters, LensParameters, LightParameters
@@ -43,7 +44,6 @@ from dockair.sim.camera.sun_disc import add_disc, image_of_disc
 __all__ = ["CoarseGrid", "CompactGhosts", "Glare"]
 
 _WING_EXPONENT: Final = 1.5  # of the round part of the diffraction's wing, [iris, eq 2]
-_MARGIN: Final = 1.3  # beyond the corners, to which the lens's distortion is taken as its polynomial
 _FAINTEST_E: Final = 1.0  # stray light of so little strength gives no pixel a measurable part
 
 
@@ -90,7 +90,6 @@ class Glare:
             iris, parameters.ghost_position, parameters.ghost_share, pupil, radius, camera.principal_point_px
         )
         self._wing = wing
-        self._widest = _MARGIN * float(np.max(np.linalg.norm(_corners(camera)[:, 1:], axis=1)))
         self._check_budget()
 
     @property
@@ -191,23 +190,13 @@ class Glare:
         """Place of the Sun's image (2,) [px] and strength of its stray light [e-], Eq. (1)."""
         if sun_C[0] <= 0.0:
             return np.zeros(2), 0.0
-        sun_px = self._image_of(sun_C)
+        sun_px = image_point(self._camera, sun_C)
         electrons = self._flux_e_s * float(sun_C[0]) * visible_s
         return sun_px, electrons * math.exp(-((self._outside_rad(sun_px) / self._parameters.veiling_decay_rad) ** 2))
 
     def _halo_electrons(self, electrons: float, veil_factor: float) -> Array:
         """(n,) strength of each part of the halo; the last is diffraction, which dirt does not change."""
         return electrons * np.append(np.full(len(self._halo.shares) - 1, veil_factor), 1.0)
-
-    def _image_of(self, sun_C: Array) -> Array:
-        """(2,) pixel of the Sun; beyond the field, where the distortion's polynomial ends, shifted as at its edge."""
-        ab = -sun_C[1:] / sun_C[0]
-        c, f = np.array(self._camera.principal_point_px), self._camera.focal_length_px
-        if self._camera.distortion is None:
-            return np.asarray(c + f * ab)
-        inner = ab * min(1.0, self._widest / max(math.hypot(*ab), 1e-12))
-        direction = np.array([[1.0, -inner[0], -inner[1]]])
-        return np.asarray(self._camera.pixels_from_points(direction)[0] + f * (ab - inner))
 
     def _outside_rad(self, pixel: Array) -> float:
         """Angle from a pixel (2,), on or off the sensor, to the nearest one on it."""
@@ -237,10 +226,3 @@ def _check_shapes(parameters: GlareParameters) -> None:
         lengths = [len(getattr(parameters, name)) for name in names]
         if len(set(lengths)) > 1:
             raise DockairError(f"glare.{names[0]}", expected=f"as many values as {names[1]}, {names[2]}", got=lengths)
-
-
-def _corners(camera: Camera) -> Array:
-    """(4, 3) directions to the array's corners at x = 1, distortion left out."""
-    (c_u, c_v), f = camera.principal_point_px, camera.focal_length_px
-    u, v = np.meshgrid([0.0, camera.width_px - 1.0], [0.0, camera.height_px - 1.0])
-    return np.column_stack([np.ones(4), -(u.ravel() - c_u) / f, -(v.ravel() - c_v) / f])

@@ -38,7 +38,8 @@ SPOT = 22  #: columns: p, n, t1, t2 (3 each), C11 C12 C22, bounds of x1 and of x
 ROW = 10  #: columns: p (3), n (3), A, size, skin, which light
 _SKIN_M = 1e-3  # a ray that starts on a surface starts this far off it
 _STEEPEST = 0.5  # h.n below which no facet of a rough surface stands that way
-_MOST_PIECES = 8  # of a streak
+_MOST_PIECES = 48  # of a streak: 60 px long in as many points as make it look whole
+_HALF_STREAK = 2.6  # standard deviations of a lobe that is cut; 1 % lies beyond and goes to the ends
 _EVERYWHERE = 1e9  # [m], bounds of surfaces without edges
 _FAINTEST_SHARE = 1e-9  # of a lobe
 _ALL_SIGMAS = 9.0  # what lies beyond is lost in rounding
@@ -98,11 +99,13 @@ def _pieces(spot: Spot, box: Box, lamp: Lamp, limits: Limits, lobe: Lobe, row: A
     """Append a lobe, cut across t1 into pieces as long as it is wide."""
     light, eye, finish = lamp
     step = limits[3] * _unit(_add(eye, -1.0, spot[0]))[1]
-    middle, long = lobe[2], math.sqrt(12.0 * lobe[4])
-    pieces = min(max(int(long / max(math.sqrt(12.0 * lobe[6]), step) + 0.5), 1), _MOST_PIECES)
+    half, width = _HALF_STREAK * math.sqrt(lobe[4]), max(math.sqrt(12.0 * lobe[6]), step)
+    first, last = max(lobe[2] - half, box[0]), min(lobe[2] + half, box[1])
+    streak = math.sqrt(12.0 * lobe[4]) >= 1.5 * width
+    pieces = min(int((last - first) / width + 0.5), _MOST_PIECES) if streak else 1
     for k in range(pieces):
-        low = box[0] if k == 0 else middle + (k / pieces - 0.5) * long
-        high = box[1] if k == pieces - 1 else middle + ((k + 1) / pieces - 0.5) * long
+        low = box[0] if k == 0 else first + k / pieces * (last - first)
+        high = box[1] if k == pieces - 1 else first + (k + 1) / pieces * (last - first)
         part = _lobe(spot, (low, high, box[2], box[3]), light, eye, finish, limits[0]) if pieces > 1 else lobe
         if part[0] > 0.0 and count < len(rows):
             _write(rows[count], spot, part, row[20], row[21])

@@ -32,7 +32,7 @@ def image_of_disc(camera: Camera, sun_C: Array, radius_rad: float) -> tuple[Arra
 
     Args:
         camera: as built, distortion included.
-        sun_C: (3,) unit vector toward the Sun, x > 0.
+        sun_C: (3,) unit vector toward the Sun, imaged on the sensor or close to it.
         radius_rad: of the disc.
     """
     across = np.cross(sun_C, np.eye(3)[int(np.argmin(np.abs(sun_C)))])

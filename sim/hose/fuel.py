@@ -1,6 +1,7 @@
 """Fuel that flows through the hose into the held probe.
 
-The pod's valve is open while the coupling holds the probe and the reel stands in its refuelling range, its light green.
+The pod's valve is open while the coupling holds the probe and the reel stands in its refuelling range, not known to be
+dead: its light is green.
 The flow follows with a first-order lag, of its own for opening and for closing:
 
     tau dQ/dt = Q_v - Q,          Q_v = Q_0 with the valve open, 0 with it shut                           (1)
@@ -8,9 +9,9 @@ The flow follows with a first-order lag, of its own for opening and for closing:
 
 both solved exactly over a tick. Coupling and nozzle have valves of their own, which shut when they part: Q = 0 at once.
 
-Not modelled: the hose's pressure, surge, fuel left in hose and nozzle; the receiver's mass, inertia and trim, which do
-not change (at 20 kg/s a hold of 10 s brings 2 per cent of a fighter's mass); the hose's, which is full all the time; a
-receiver whose tanks are full.
+Not modelled: the hose's pressure, surge, the momentum of what flows, fuel left in hose and nozzle; the receiver's mass,
+inertia and trim, which do not change (at 20 kg/s a hold of 10 s brings 2 per cent of a fighter's mass); the hose's,
+which is full all the time; a receiver whose tanks are full.
 Source of the flow: assets/parameters/fuel.toml.
 """
 

@@ -3,14 +3,21 @@
     tau dF/dt = T_s + k (T_s - T) - F                                                                    (1)
     F_hose    = F g(v) + F_b b(v) - d v + max(0, F_0 - k_s q - d_s v)                                    (2)
 
-F is the motor's pull on the hose (positive winds in), T the hose's tension at the exit, T_s the set-point, a fraction
-of the static tension at full trail. g falls from 1 to 0 as the winding speed v comes within a band of the take-up
-limit; b rises from 0 to 1 beyond the pay-out limit: a brake. The last term is the outer stop's buffer, with F_0 such
-that the hose rests on it at q = 0, its full trail. With T_s below the static tension the hose does rest there, and
-runs out again by itself after the receiver has left; with T_s equal to it, it would not.
+F is the motor's pull on the hose (positive winds in), T the hose's tension at the exit, T_s the set-point. g falls from
+1 to 0 as the winding speed v comes within a band of the take-up limit; b rises from 0 to 1 beyond the pay-out limit: a
+brake. The last term is the outer stop's buffer, with F_0 such that the hose rests on it at q = 0, its full trail.
+
+The set-point is a fraction of the static tension T_0 at full trail, but never more than lets the hose run out again by
+itself after the receiver has left, all of the reel's range being wound in, with a force F_m over:
+
+    T_s       = min(f T_0, (T_r cos(theta_r) + k T_r - F_m) / (1 + k))                                   (5)
+
+T_r and theta_r being tension and angle to the pod's axis at the exit, at rest, of a hose so much shorter. What winding
+in takes from the tension goes by the hose's weight and not with the square of the speed, so that the second bounds the
+set-point in slow flight, of light drogues and of heavy hoses. With T_s equal to T_0 no hose would run out.
 
 A dead reel is a drum that is locked: where it was, q_l, it holds the tension T_l it had, and gives way only as far as
-the hose stretches between drum and drogue,
+the hose stretches between drum and drogue, its own inertia taking no part,
 
     F_hose    = T_l + k_l (q_l - q) - d_l v                                                              (3)
 
@@ -38,6 +45,7 @@ from dockair.errors import DockairError
 from dockair.rotations import Array
 from dockair.sim.air.atmosphere import STANDARD_GRAVITY_M_S2
 from dockair.sim.hose.chain import HoseParameters
+from dockair.sim.hose.rest import RestShape
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,6 +53,7 @@ class ReelParameters:
     """assets/parameters/reel.toml."""
 
     set_point_fraction: float
+    run_out_force_n: float
     tension_gain: float
     response_time_s: float
     refuelling_from_m: float
@@ -89,21 +98,28 @@ class Reel:
 
     Args:
         parameters: the reel's sheet.
-        static_root_tension_n: tension at the exit at rest at full trail.
+        static_root_tension_n: T_0, tension at the exit at rest at full trail.
+        set_point_n: T_s, of `set_point_n`.
         step_s: physics step.
 
     Raises:
         DockairError: a refuelling range that does not lie within the reel's.
     """
 
-    def __init__(self, parameters: ReelParameters, static_root_tension_n: float, step_s: float) -> None:
+    def __init__(
+        self, parameters: ReelParameters, static_root_tension_n: float, set_point_n: float, step_s: float
+    ) -> None:
         _check_limits(parameters)
-        self._parameters = parameters
-        self.set_point_n = parameters.set_point_fraction * static_root_tension_n
+        self._parameters, self.set_point_n = parameters, set_point_n
         self._blend = float(1.0 - np.exp(-step_s / parameters.response_time_s))
         self.motor_force_n = self._wanted(static_root_tension_n)
         self._buffer_preload_n = static_root_tension_n - self.motor_force_n
         self._held: tuple[float, float] | None = None  # position and tension at which the drum locked
+
+    @property
+    def locked(self) -> bool:
+        """Whether the drum stood at the last step."""
+        return self._held is not None
 
     def step(self, tension_n: float, position_m: float, rate_m_s: float, locked: bool = False) -> float:
         """Advance by one tick; return the force on the hose [N], positive winds in.
@@ -145,6 +161,19 @@ class Reel:
         """Motor's pull asked for; it cannot push the hose out."""
         pull = self.set_point_n + self._parameters.tension_gain * (self.set_point_n - tension_n)
         return 0.0 if pull < 0.0 else pull
+
+
+def set_point_n(parameters: ReelParameters, full_trail: RestShape, wound_in: RestShape) -> float:
+    """Tension that the reel holds [N], Eq. (5).
+
+    Args:
+        parameters: the reel's sheet.
+        full_trail: the hose at rest.
+        wound_in: the same with the reel's whole range wound in.
+    """
+    p, tension_n, cosine = parameters, wound_in.root_tension_n, float(wound_in.t_W[0, 0])
+    runs_out_n = (tension_n * cosine + p.tension_gain * tension_n - p.run_out_force_n) / (1.0 + p.tension_gain)
+    return max(min(p.set_point_fraction * full_trail.root_tension_n, runs_out_n), 0.0)
 
 
 def _check_limits(parameters: ReelParameters) -> None:

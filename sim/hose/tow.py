@@ -4,15 +4,23 @@ Puts together the air loads (`loads`), the guide in the pod and the reel (`reel`
 that the world hands over arrays and gets forces back.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from dockair.errors import DockairError
 from dockair.rotations import Array
 from dockair.sim.air.atmosphere import Air
 from dockair.sim.hose.chain import DrogueParameters, HoseParameters
 from dockair.sim.hose.loads import load_coefficients, write_tow_loads
-from dockair.sim.hose.reel import Reel, ReelParameters, add_guide_loads, guide_coefficients, guide_loads
+from dockair.sim.hose.reel import (
+    Reel,
+    ReelParameters,
+    add_guide_loads,
+    guide_coefficients,
+    guide_loads,
+    set_point_n,
+)
 from dockair.sim.hose.rest import rest_shape
 
 
@@ -40,6 +48,9 @@ class Tow:
     Attributes:
         rest: shape and tensions at rest at full trail.
         reel: the motor.
+
+    Raises:
+        DockairError: a reel that winds in all of the hose, or one that `Reel` refuses.
     """
 
     def __init__(
@@ -53,7 +64,12 @@ class Tow:
     ) -> None:
         rho, nu = air.density_kg_m3, air.kinematic_viscosity_m2_s
         self.rest = rest_shape(hose, drogue, wind_W, rho, nu)
-        self.reel = Reel(reel, self.rest.root_tension_n, step_s)
+        if not reel.range_m < hose.length_m:
+            expected = f"less than the hose's length, parameters.hose.length_m = {hose.length_m}"
+            raise DockairError("parameters.reel.range_m", expected=expected, got=reel.range_m)
+        shorter = replace(hose, length_m=hose.length_m - reel.range_m)
+        holds_n = set_point_n(reel, self.rest, rest_shape(shorter, drogue, wind_W, rho, nu))
+        self.reel = Reel(reel, self.rest.root_tension_n, holds_n, step_s)
         self._link_length_m, self._links = hose.link_length_m, hose.links
         self._wind_W = np.array(wind_W, dtype=float)
         self._rates = np.empty((3, hose.links + 1, 3))  # room for velocities; written anew whenever they are asked for

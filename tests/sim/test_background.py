@@ -183,8 +183,8 @@ def test_a_linear_sky_is_linear_in_every_pixel(make: Callable[..., Background], 
     assert np.abs(image - expected).max() < WHITE_E * (2.0 * step**2 + 1e-6)
 
 
-def test_stray_light_is_added_and_dirt_dims_both(make: Callable[..., Background]) -> None:
-    """(scene + stray) dirt, both bilinear between their nodes, in every pixel."""
+def test_dirt_dims_the_scene_and_stray_light_is_added(make: Callable[..., Background]) -> None:
+    """scene dirt + stray, both bilinear between their nodes, in every pixel."""
     model, data = _scene(*THREE_BALLS)
     background, rng = make(model), np.random.default_rng(8)
     first, shape = nodes_around(FULL)
@@ -193,7 +193,7 @@ def test_stray_light_is_added_and_dirt_dims_both(make: Callable[..., Background]
     v, u = np.indices((300, 400))
     pixels = np.column_stack([u.ravel(), v.ravel()]).astype(float)
     plain = _draw(background, data)
-    expected = (plain + stray.at(pixels).reshape(plain.shape)) * dirt.at(pixels).reshape(plain.shape)
+    expected = plain * dirt.at(pixels).reshape(plain.shape) + stray.at(pixels).reshape(plain.shape)
     assert np.allclose(_draw(background, data, stray=stray, dirt=dirt), expected, rtol=1e-5)
     assert np.allclose(_draw(background, data, stray=stray), plain + stray.at(pixels).reshape(plain.shape), rtol=1e-5)
 

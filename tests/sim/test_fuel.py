@@ -67,15 +67,17 @@ def test_fuel_flows_in_a_hold_only_while_the_hose_stands_in_its_refuelling_range
     assert flow[-1] < flow[peak] * max(in_half_a_second, np.exp(-(len(flow) - 1 - peak) / 500.0)) * 1.001
 
 
-def test_no_fuel_flows_through_a_dead_reel(make_world):
-    world = make_world(p_PD_B=(0.1, 0.0, 0.0), reel_locked=lambda time_s: time_s > 2.0)
+@pytest.mark.parametrize("known", [True, False])
+def test_a_reel_that_dies_in_the_refuelling_range_stops_the_fuel_where_the_unit_knows_of_it(make_world, known):
+    dead = {"reel_locked": lambda time_s: time_s > 2.0}
+    world = make_world(p_PD_B=(0.1, 0.0, 0.0), **dead, reel_known_dead=dead["reel_locked"] if known else None)
     for _ in range(2000):
         truth = world.step(ReceiverCommand(velocity_m_s=np.array([1.2, 0.0, 0.0])))
     assert truth.latched and truth.fuel_flow_kg_s > 0.0
     before = truth.fuel_flow_kg_s
-    for _ in range(100):
-        truth = world.step(ReceiverCommand(velocity_m_s=np.array([0.0, 0.0, 0.0])))
-    assert truth.fuel_flow_kg_s < before
+    for tick in range(100):  # a probe that stopped at once would be torn off
+        truth = world.step(ReceiverCommand(velocity_m_s=np.array([1.2 - 1e-3 * tick, 0.0, 0.0])))
+    assert truth.latched and (truth.fuel_flow_kg_s < before) is known
 
 
 def test_a_restored_world_gives_the_same_fuel_to_the_bit(make_world):

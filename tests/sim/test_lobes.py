@@ -261,13 +261,13 @@ def test_a_streak_on_a_tube_is_a_row_of_points_with_the_light_of_one() -> None:
     rough = replace(IDEAL, metal_roughness_rad=0.05)
     sun = _unit(-1.0, 0.4, 0.02)
     row, one = (_glints(world, sun, replace(rough, patch_step_rad=step)) for step in (1e-3, 1.0))
-    assert len(one.p_W) == 1 and len(row.p_W) == 8
+    assert len(one.p_W) == 1 and len(row.p_W) == 48  # the most: the streak is as long as 200 steps
     assert row.area_m2_sr.sum() == pytest.approx(one.area_m2_sr[0], rel=1e-9)
     middle = row.area_m2_sr @ row.p_W / row.area_m2_sr.sum()
     np.testing.assert_allclose(middle, one.p_W[0], atol=1e-6)
     spacing = np.diff(row.p_W[:, 2])
-    assert np.all(spacing > 0.05) and np.all(row.size_m < 0.3)
-    # rows of squares as wide as they are apart
+    assert np.all(spacing > 0.02) and np.all(row.size_m < 0.02)
+    # a square along the streak has the variance of the thin piece that it stands for
     assert np.median(row.size_m) == pytest.approx(np.median(spacing) / np.sqrt(2.0), rel=0.1)
 
 
@@ -276,7 +276,7 @@ def test_the_pieces_of_a_streak_lie_on_the_ellipsoid_they_are_of() -> None:
     n, v = _unit(-0.1, 0.2, -1.0), -_unit(*centre)
     rough = replace(IDEAL, metal_roughness_rad=0.03)
     glints = _glints(_world(_body(_G.mjGEOM_ELLIPSOID, centre, list(axes))), 2.0 * (n @ v) * n - v, rough)
-    assert len(glints.p_W) == 8
+    assert len(glints.p_W) >= 8
     assert np.ptp(glints.p_W[:, 0]) > 2.0
     radius = np.sqrt((((glints.p_W - centre) / axes) ** 2).sum(axis=1))
     np.testing.assert_allclose(radius, 1.0, atol=4e-3)

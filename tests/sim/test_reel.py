@@ -9,7 +9,7 @@ import pytest
 from dockair.errors import DockairError
 from dockair.messages import ReceiverCommand
 from dockair.parameters import load_parameters
-from dockair.sim.hose.chain import HoseParameters
+from dockair.sim.hose.chain import DrogueParameters, HoseParameters
 from dockair.sim.hose.reel import (
     Reel,
     ReelLight,
@@ -17,16 +17,18 @@ from dockair.sim.hose.reel import (
     guide_coefficients,
     guide_loads,
     reel_light,
+    set_point_n,
 )
 from dockair.sim.hose.rest import hinge_angles, rest_shape
 
 REEL = load_parameters("reel", ReelParameters)
 STATIC, STEP = 1900.0, 1e-3
+SET_POINT = REEL.set_point_fraction * STATIC
 FREE_M = 1.0  # a place clear of the outer stop's buffer
 
 
 def test_motor_follows_a_step_in_tension_as_a_first_order_lag():
-    reel = Reel(REEL, STATIC, STEP)
+    reel = Reel(REEL, STATIC, SET_POINT, STEP)
     start = reel.motor_force_n
     wanted = reel.set_point_n + REEL.tension_gain * (reel.set_point_n - 1000.0)
     ticks = round(REEL.response_time_s / STEP)
@@ -37,13 +39,13 @@ def test_motor_follows_a_step_in_tension_as_a_first_order_lag():
 
 def test_hose_rests_on_its_outer_stop_at_full_trail():
     """At rest the force on the hose is the static tension exactly at q = 0: motor and buffer together."""
-    reel = Reel(REEL, STATIC, STEP)
+    reel = Reel(REEL, STATIC, SET_POINT, STEP)
     assert reel.step(STATIC, 0.0, 0.0) == pytest.approx(STATIC, rel=1e-12)
     assert reel.step(STATIC, 0.05, 0.0) < reel.set_point_n < STATIC
 
 
 def test_motor_gives_no_pull_beyond_the_take_up_speed_and_brakes_beyond_the_pay_out_speed():
-    reel = Reel(REEL, STATIC, STEP)
+    reel = Reel(REEL, STATIC, SET_POINT, STEP)
     drag = REEL.drum_damping_n_s_m
     too_fast_in = REEL.take_up_speed_m_s + 0.01
     assert reel.step(0.0, FREE_M, too_fast_in) == pytest.approx(-drag * too_fast_in)
@@ -53,7 +55,7 @@ def test_motor_gives_no_pull_beyond_the_take_up_speed_and_brakes_beyond_the_pay_
 
 
 def test_motor_never_pushes_the_hose_out():
-    reel = Reel(REEL, STATIC, STEP)
+    reel = Reel(REEL, STATIC, SET_POINT, STEP)
     for _ in range(5000):
         assert reel.step(20.0 * STATIC, FREE_M, 0.0) >= 0.0
 
@@ -61,7 +63,7 @@ def test_motor_never_pushes_the_hose_out():
 @pytest.mark.parametrize(("position_m", "rate_m_s"), [(0.0, 0.0), (-0.04, 0.0), (0.03, -1.5), (1.0, 5.0)])
 def test_locked_drum_is_a_spring_about_where_it_stood_with_the_tension_it_had_whatever_the_speed(position_m, rate_m_s):
     """Eq. (3): no limit of speed, no buffer, no set-point."""
-    reel = Reel(REEL, STATIC, STEP)
+    reel = Reel(REEL, STATIC, SET_POINT, STEP)
     at_m, held_n = 0.2, 1500.0
     assert reel.step(held_n, at_m, 0.0, locked=True) == pytest.approx(held_n)
     stretch = REEL.lock_stiffness_n_m * (at_m - position_m)
@@ -71,7 +73,7 @@ def test_locked_drum_is_a_spring_about_where_it_stood_with_the_tension_it_had_wh
 
 
 def test_reel_that_comes_to_life_begins_with_the_pull_that_the_lock_held_and_goes_back_to_its_own():
-    reel = Reel(REEL, STATIC, STEP)
+    reel = Reel(REEL, STATIC, SET_POINT, STEP)
     reel.step(1500.0, FREE_M, 0.0, locked=True)
     assert reel.step(1500.0, FREE_M, 0.0) == pytest.approx(1500.0, rel=1e-2)
     for _ in range(5000):
@@ -101,7 +103,7 @@ def test_light_says_where_in_its_range_the_reel_is_and_whether_it_is_dead(positi
 def test_refuelling_range_outside_the_reels_own_is_refused_with_the_keys_name(key, value):
     named = "inner_limit_m" if key == "refuelling_from_m" else key
     with pytest.raises(DockairError, match=rf"parameters\.reel\.{named}: expected"):
-        Reel(replace(REEL, **{key: value}), STATIC, STEP)
+        Reel(replace(REEL, **{key: value}), STATIC, SET_POINT, STEP)
 
 
 def _wind_in(world, length_m):
@@ -171,7 +173,7 @@ def test_links_inside_the_pod_feel_no_air(make_world):
 
 
 def test_dead_reel_neither_takes_up_nor_pays_out_and_the_tow_swings_on_the_hoses_stretch(make_world):
-    """Struck at rest, it moves in and out at (k_l / m)^1/2 of drum, hose and drogue, less the cost of their angle."""
+    """Struck at rest, it moves in and out at (k_l / m)^1/2 of hose and drogue; the drum stands."""
     world = make_world(p_PD_B=(60.0, 0.0, 0.0), reel_locked=lambda time_s: True)
     reel_dof = world.model.joint("reel").dofadr[0]
     world.data.qvel[reel_dof] = -0.2
@@ -180,10 +182,28 @@ def test_dead_reel_neither_takes_up_nor_pays_out_and_the_tow_swings_on_the_hoses
     position = np.array([world.step(ReceiverCommand()).reel_position_m for _ in range(1500)])
     assert np.abs(position).max() < 0.02 and abs(position[-1]) < 1e-3
     sheets = world.parameters
-    mass = REEL.drum_mass_kg + sheets.hose.line_density_kg_m * sheets.hose.length_m + sheets.drogue.mass_kg
+    mass = sheets.hose.line_density_kg_m * sheets.hose.length_m + sheets.drogue.mass_kg
     expected_s = 2.0 * np.pi * np.sqrt(mass / REEL.lock_stiffness_n_m)
     crossings = np.flatnonzero((position[:-1] < 0.0) & (position[1:] >= 0.0))
     assert crossings[1] - crossings[0] == pytest.approx(1e3 * expected_s, rel=0.1)
+
+
+def test_a_drum_that_locks_takes_its_inertia_out_of_the_hoses_way_and_a_restored_world_does_so_too(make_world):
+    """To the bit: what the restored world does next is what the saved one did."""
+    world = make_world(p_PD_B=(60.0, 0.0, 0.0), reel_locked=lambda time_s: 0.02 <= time_s < 0.06)
+    _wind_in(world, 3.0)
+    dof, seen = world.model.joint("reel").dofadr[0], []
+    states = []
+    for _ in range(100):
+        states.append(world.save())
+        world.step(ReceiverCommand())
+        seen.append(float(world.model.dof_armature[dof]))
+    assert seen == [REEL.drum_mass_kg] * 20 + [0.0] * 40 + [REEL.drum_mass_kg] * 40
+    for at in (15, 25, 58, 65):
+        world.restore(states[at])
+        again = [world.step(ReceiverCommand()).reel_position_m for _ in range(10)]
+        world.restore(states[at + 10])
+        assert again[-1] == world.truth.reel_position_m
 
 
 def test_reel_that_dies_during_the_push_holds_the_hose_where_it_was_until_it_lives_again(make_world):
@@ -192,6 +212,47 @@ def test_reel_that_dies_during_the_push_holds_the_hose_where_it_was_until_it_liv
     position = np.array([world.step(ReceiverCommand()).reel_position_m for _ in range(2600)])
     assert np.ptp(position[600:2000]) < 0.02  # the hose runs out only before and after
     assert position[500] < 2.98 and position[-1] < position[1999] - 0.05
+
+
+@pytest.mark.parametrize(
+    ("airspeed_m_s", "altitude_m"), [(180.0, 6000.0), (150.0, 6000.0), (120.0, 3000.0), (100.0, 3000.0)]
+)
+def test_all_of_the_reels_range_runs_out_again_in_slow_flight_too(make_world, airspeed_m_s, altitude_m):
+    """A fraction of the static tension alone would keep 6.5 m of hose in at 120 m/s and below."""
+    world = make_world(p_PD_B=(60.0, 0.0, 0.0), airspeed_m_s=airspeed_m_s, altitude_m=altitude_m)
+    _wind_in(world, REEL.range_m)
+    for _ in range(25000):
+        truth = world.step(ReceiverCommand())
+        if abs(truth.reel_position_m) < 0.01:
+            break
+    assert abs(truth.reel_position_m) < 0.01
+
+
+def _shapes(airspeed_m_s):
+    """At rest at full trail, and with the reel's range wound in; at 6000 m."""
+    hose, drogue = load_parameters("hose", HoseParameters), load_parameters("drogue", DrogueParameters)
+    wind = np.array([-airspeed_m_s, 0.0, 0.0])
+    lengths = hose.length_m, hose.length_m - REEL.range_m
+    return [rest_shape(replace(hose, length_m=length), drogue, wind, 0.66, 2.4e-5) for length in lengths]
+
+
+def test_set_point_is_a_fraction_of_the_static_tension_where_the_hose_runs_out_of_itself():
+    full, wound = _shapes(180.0)
+    assert set_point_n(REEL, full, wound) == REEL.set_point_fraction * full.root_tension_n
+
+
+def test_set_point_of_slow_flight_leaves_the_force_to_run_out_with_all_wound_in():
+    full, wound = _shapes(100.0)
+    held = set_point_n(REEL, full, wound)
+    tension, cosine = wound.root_tension_n, wound.t_W[0, 0]
+    pull = held + REEL.tension_gain * (held - tension)
+    assert held < REEL.set_point_fraction * full.root_tension_n
+    assert tension * cosine - pull == pytest.approx(REEL.run_out_force_n)
+
+
+def test_reel_that_would_wind_in_all_of_the_hose_is_refused(make_world):
+    with pytest.raises(DockairError, match=r"parameters\.reel\.range_m: expected less than the hose's length"):
+        make_world(hose={"length_m": 10.0}, reel={"range_m": 11.0})
 
 
 def test_set_point_equal_to_the_static_tension_would_keep_the_hose_in(make_world):

@@ -1,6 +1,7 @@
 """The Sun as the camera shows it: disc, veil, glints. The parts by themselves are in test_glare.py."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from dockair.rotations import exp
 from dockair.sim.camera.camera import NearInfraredCamera
 from dockair.sim.camera.radiometry import Responses, responses
 from dockair.sim.camera.sheets import CameraSheets
+from dockair.sim.camera.sun_view import SunView
 
 SHEETS = CameraSheets.load()
 EXPOSURE_S = SHEETS.exposure.exposure_s
@@ -47,6 +49,23 @@ def test_the_sun_in_view_is_a_disc_27_pixels_wide_in_a_saturated_glow(make_camer
     assert (frame.pixels[disc] == 255).all() or (frame.pixels[disc] >= 253).all()
     glow = (frame.pixels >= 253).sum()  # the halo and the diffraction's wing clip too: 1/1000 of the disc suffices
     assert disc.sum() < glow < 8 * disc.sum()
+
+
+def test_a_sun_far_beside_the_frame_is_not_imaged_in_it_where_the_lenses_polynomial_folds_back(
+    make_camera: Callable[..., Made],
+) -> None:
+    world, _ = make_camera()
+    camera = replace(world.as_built.camera, distortion=(-4.2e-4, -7.7e-4, 0.0, 0.0, 0.0))
+    for angle_deg in np.arange(79.0, 84.0, 0.1):
+        angle = np.deg2rad(angle_deg)
+        sun_W = np.array([np.cos(angle), np.sin(angle), 0.0])
+        view = SunView(world.model, camera, _ClearSky(), sun_W, SHEETS.light.sun_angular_radius_rad, 6.0)
+        assert view.patch(world.data, (np.eye(3), np.zeros(3))) is None
+
+
+class _ClearSky:
+    def beam(self, directions_W: np.ndarray) -> np.ndarray:
+        return np.ones(len(directions_W))
 
 
 def test_a_wing_before_the_sun_hides_disc_halo_and_veil(make_camera: Callable[..., Made]) -> None:

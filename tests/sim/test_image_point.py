@@ -1,0 +1,43 @@
+"""Where directions are imaged, on the sensor and far beside it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dockair.calibration import Camera
+from dockair.sim.camera.image_point import image_point
+
+# In the field it moves light by less than two pixels; from 81 degrees off the axis it would bring it into the frame
+FOLDING = replace(Camera(), distortion=(-4.2e-4, -7.7e-4, 0.0, 0.0, 0.0))
+
+
+def _off_axis(angle_deg: float, about_deg: float) -> np.ndarray:
+    angle, about = np.deg2rad([angle_deg, about_deg])
+    return np.array([np.cos(angle), np.sin(angle) * np.cos(about), np.sin(angle) * np.sin(about)])
+
+
+@pytest.mark.parametrize("camera", [Camera(), FOLDING], ids=["pinhole", "distorted"])
+@pytest.mark.parametrize("angle_deg", [0.0, 5.0, 20.0])
+def test_in_the_field_it_is_the_cameras_own_pixel_to_the_bit(camera: Camera, angle_deg: float) -> None:
+    direction = _off_axis(angle_deg, 160.0)
+    assert np.array_equal(image_point(camera, direction), camera.pixels_from_points(direction[np.newaxis])[0])
+
+
+def test_light_from_far_beside_the_axis_stays_far_beside_the_sensor() -> None:
+    folded = 0
+    for angle_deg in np.arange(30.0, 89.5, 0.05):
+        for about_deg in (10.0, 100.0, 160.0, 280.0):
+            direction = _off_axis(angle_deg, about_deg)
+            u, v = FOLDING.pixels_from_points(direction[np.newaxis])[0]
+            folded += 0 <= u < FOLDING.width_px and 0 <= v < FOLDING.height_px
+            off_px = np.hypot(*(image_point(FOLDING, direction) - FOLDING.principal_point_px))
+            assert off_px == pytest.approx(FOLDING.focal_length_px * np.tan(np.deg2rad(angle_deg)), rel=0.01)
+    assert folded > 0  # what the polynomial alone would have shown
+
+
+def test_the_margin_is_no_step() -> None:
+    angles = np.arange(20.0, 40.0, 0.01)
+    places = np.array([image_point(FOLDING, _off_axis(angle, 33.0)) for angle in angles])
+    steps = np.linalg.norm(np.diff(places, axis=0), axis=1)
+    assert np.all(np.abs(np.diff(steps)) < 1e-2)
