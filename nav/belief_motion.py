@@ -22,8 +22,8 @@ so that a turn that the gyro did not measure enters phi with +1 and each vector 
 second order in dt (Eq. (3) to first), then E; the steps are at most `longest_step_s`.
 
 Between two samples the rate is linear, after the last it is held. The truth departs from that by an angular
-acceleration of sigma_A: a steady one since the last sample, or one that changes its sign half-way between two. A time t
-after the last, or between two that are T apart, the gyro's squared noise density grows by
+acceleration: a steady one of sigma_A since the last sample, or one of sigma_A / 2 that changes its sign half-way
+between two. A time t after the last, or between two that are T apart, the gyro's squared noise density grows by
 
     sigma_A^2 t^3,   or   sigma_A^2 T^3 / 64,   but at most by that of a rate that is not known at all             (5)
 

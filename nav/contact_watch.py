@@ -27,7 +27,7 @@ class ContactWatch:
     """Keeps the newest test of a pose, and what has become of the belief since.
 
     Args:
-        sheets: mounting and ring.
+        sheets: mounting, ring and the camera's rate.
         belief: that the claim is about.
         limits: alert limits.
         coasting: how the belief is asked what it foretold.
@@ -41,6 +41,7 @@ class ContactWatch:
         coasting: CoastingSettings,
     ) -> None:
         self._R_BC, self._rim_m = sheets.mounting.R_BC, 0.5 * sheets.ring.diameter_m
+        self._camera_rate_hz = sheets.camera_rate_hz
         self._belief, self._limits = belief, limits
         self._horizon_s, self._coasting = coasting.horizon_s, CoastingError(coasting)
         self._integrity: Integrity | None = None
@@ -90,6 +91,8 @@ class ContactWatch:
             return None
         offset_m = self._integrity.pose.p_CD - self._belief.predicted_pose(self._posed_time_s)[1]
         age_s = time_s - self._posed_time_s
+        if -1.0 / self._camera_rate_hz <= age_s < 0.0:  # the clocks of camera and IMU may differ by a little
+            age_s = 0.0
         contradicted = self._contradicted_s > self._posed_time_s
         if self._posed_time_s > self._used_time_s:
             offset_m = offset_m * (1.0 + age_s / (self._posed_time_s - self._used_time_s))  # Eq. (1)

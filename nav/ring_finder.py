@@ -109,14 +109,16 @@ class RingFinder:
         self.candidates_px = blobs.centroids_px
         if frame.time_stamp_s > self._frame_time_s:
             self._tracker.predict(*self._turn_C(self._frame_time_s, frame.time_stamp_s))
-        self._frame_time_s = frame.time_stamp_s
+        is_late = frame.time_stamp_s <= self._frame_time_s  # a newer one has come: the track is of its time
+        self._frame_time_s = self._frame_time_s if is_late else frame.time_stamp_s
         found, expected_px = self._found(blobs, frame.time_stamp_s)
         if lost and found.status is IdentificationStatus.NOT_FOUND:
             found = self._identified(blobs)
-        self._tracker.update(found)
+        if not is_late:
+            self._tracker.update(found)
         self.status = f"ring {found.status.value}"
         if found.status is not IdentificationStatus.FOUND:
-            if not self._shown(expected_px, frame.window):
+            if not is_late and not self._shown(expected_px, frame.window):
                 self._tracker.lose()
             members, numbers = _NONE, _NONE
             if followed and (found.status is IdentificationStatus.NOT_FOUND or not self._code.says_something):

@@ -128,6 +128,8 @@ def flown_of(
     sheet = load_parameters(name, BowWaveParameters, scenario.parameters.get(name))
     nose = np.array([-sheet.nose_behind_tip_m, -mounting.p_BP[1], sheet.nose_height_m - mounting.p_BP[2]])
     faults = [table.fault for table in scenario.faults]
+    if scenario.navigation.is_truth:  # it has no sensors that could fail
+        faults = [fault for fault in faults if isinstance(fault, DeadReel)]
     return Flown(
         truths=truths, solutions=solutions, p_PN_B=nose, p_CP_B=mounting.p_BP - mounting.p_BC, faults=faults
     )  # fmt: skip

@@ -14,7 +14,7 @@ class Hold:
 
     duration_s: float
     take_in_max_m: float  #: most hose that was wound in
-    coupling_force_max_n: float
+    coupling_force_max_n: float  #: largest pull, that of the tick at which it let go included
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -31,10 +31,10 @@ def hold_of(truths: Sequence[Truth]) -> tuple[Hold | None, Disconnect | None]:
         return None, None
     during = list(takewhile(attrgetter("latched"), truths[first:]))
     last = first + len(during) - 1
+    released = truths[last + 1 : last + 2]
     hold = Hold(
         duration_s=truths[last].time_s - truths[first].time_s,
         take_in_max_m=max(truth.reel_position_m for truth in during),
-        coupling_force_max_n=max(truth.coupling_force_n for truth in during),
+        coupling_force_max_n=max(truth.coupling_force_n for truth in (*during, *released)),
     )
-    released = truths[last + 1] if last + 1 < len(truths) else None
-    return hold, Disconnect(time_s=released.time_s) if released is not None else None
+    return hold, Disconnect(time_s=released[0].time_s) if released else None

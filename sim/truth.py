@@ -68,7 +68,7 @@ class Truth:
     sideslip_rad: float
     throttle: float  #: commanded fraction of the thrust range
     latched: bool  #: the probe is held by the coupling
-    coupling_force_n: float  #: pull on the probe by the coupling, 0 when not latched
+    coupling_force_n: float  #: pull on the probe by the coupling in this tick, that in which it let go the last; else 0
     fuel_kg: float = 0.0  #: that has flowed through the coupling
     fuel_flow_kg_s: float = 0.0
     probe_touches_drogue: bool  #: any contact of the probe with basket or coupling at this tick

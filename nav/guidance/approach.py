@@ -127,7 +127,8 @@ class Guidance:
         """Show the drogue to the controller, and its distance from the probe's line to the prediction of the miss."""
         change = np.full(3, np.nan) if self._path.is_announced else self._axes.R_NB @ state.dv_WP_B
         touches = self.phase in _TOUCHING or (self.phase in (Phase.APPROACH, *_RETREATING) and ring[0] <= 0.0)
-        if not state.usable or touches:  # a drogue that is pushed about by the probe would lead it astray
+        coasts = state.age_s > self._settings.limits.frames_stop_s  # a forecast of the fusion's is nothing measured
+        if not state.usable or touches or coasts:  # a drogue that is pushed about by the probe would lead it astray
             self._controller.observe(None, change)
             return
         times = self._controller.looks_ahead_s

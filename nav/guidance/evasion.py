@@ -49,6 +49,8 @@ class Evasion:
 
 
 def _comes_off_aside(limits: PhaseLimits, s: Situation, *, ends_hold: bool) -> bool:
+    if s.frames_stopped:  # what is believed of a drogue on the probe has run off meanwhile
+        return False
     out_of_view = s.track_lost_s > limits.lost_s and s.frame_age_s <= 0.5 * limits.lost_s
     if ends_hold:
         return out_of_view or s.beside_m > limits.rim_m
