@@ -35,6 +35,11 @@ def image_point(camera: Camera, direction_C: Array) -> Array:
     return np.asarray(camera.pixels_from_slopes(inner[np.newaxis])[0] + f * (ab - inner))
 
 
+def in_field(camera: Camera, direction_C: Array) -> bool:
+    """Whether the distortion's polynomial holds for a direction (3,): on the sensor or not far beside it."""
+    return bool(math.hypot(*direction_C[1:]) <= _margin(camera) * direction_C[0])
+
+
 def _margin(camera: Camera) -> float:
     """Slope m: of the array's farthest corner, distortion left out, and some more."""
     (u, v), width, height = camera.principal_point_px, camera.width_px - 1.0, camera.height_px - 1.0

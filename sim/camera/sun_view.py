@@ -16,7 +16,7 @@ import numpy as np
 
 from dockair.calibration import Camera
 from dockair.rotations import Array
-from dockair.sim.camera.image_point import image_point
+from dockair.sim.camera.image_point import in_field
 from dockair.sim.camera.obstacles import Obstacles
 from dockair.sim.camera.occlusion import clear_directions
 
@@ -75,9 +75,9 @@ class SunView:
         """
         R_WC, p_WC = pose
         sun_C = R_WC.T @ self.direction_W
-        if sun_C[0] <= 0.0:
+        if not in_field(self._camera, sun_C):
             return None
-        u, v = image_point(self._camera, sun_C)
+        u, v = self._camera.pixels_from_points(sun_C[None])[0]
         reach = self._radius_px / float(sun_C[0]) ** 2  # off the axis the disc is drawn out
         if not (-reach < u < self._camera.width_px + reach and -reach < v < self._camera.height_px + reach):
             return None

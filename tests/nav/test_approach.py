@@ -423,6 +423,40 @@ def test_from_a_drogue_that_went_out_of_view_on_the_probe_it_goes_down_but_not_f
     assert frames_come or min(down) > -0.5
 
 
+@pytest.mark.parametrize("phase", [Phase.CONTACT, Phase.HOLD])
+@pytest.mark.parametrize("gap_s", [0.3, 0.42, 0.44, 0.46, 0.48, 0.6])
+@pytest.mark.parametrize("run_off_m", [0.0, 0.35])
+def test_from_a_drogue_on_the_probe_it_goes_straight_back_whenever_the_camera_comes_back(phase, gap_s, run_off_m):
+    """Two frames come before the first that is used; meanwhile the belief may have run off beside the probe."""
+    guidance = Guidance(SETTINGS, RATE_HZ)
+    guidance.step(state([-DEPTH_M, 0.01, 0.0]))
+    guidance.phase = phase
+    down = []
+    for k in range(2 * RATE_HZ):
+        age_s = k / RATE_HZ
+        back = age_s > gap_s + 2.5 / RATE_HZ
+        where = [-DEPTH_M, 0.01 + (0.0 if back else run_off_m * min(age_s / gap_s, 1.0)), 0.0]
+        now = state(
+            where,
+            usable=back or age_s <= 0.5,
+            age_s=0.0 if back else age_s,
+            frame_age_s=age_s if age_s <= gap_s else 0.0,
+        )
+        down.append(guidance.step(now).velocity_m_s[2])
+    assert min(down) > -0.5
+
+
+def test_a_place_that_is_coasted_is_shown_to_the_controller_no_longer_than_a_frame_may_be_late():
+    guidance = Guidance(SETTINGS, RATE_HZ)
+    guidance.step(state([4.0, 0.0, 0.0]))
+    shown, observe = [], guidance._controller.observe
+    guidance._controller.observe = lambda sight, change: (shown.append(sight is not None), observe(sight, change))
+    ages_s = np.arange(1, 15) / RATE_HZ
+    for age_s in ages_s:
+        guidance.step(state([4.0, 0.1 * age_s, 0.0], age_s=age_s, frame_age_s=age_s))
+    assert shown == [bool(age_s <= SETTINGS.limits.frames_stop_s) for age_s in ages_s]
+
+
 @pytest.mark.parametrize(("frames_come", "following"), [(True, Phase.BACK_OFF), (False, Phase.CONTACT)])
 def test_a_contact_that_falls_into_a_drop_out_of_the_camera_is_no_miss(frames_come, following):
     """The belief alone, which knows of no probe that pushes, has the tip pass through the drogue."""

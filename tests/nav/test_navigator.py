@@ -300,6 +300,35 @@ def test_a_late_frame_does_not_take_the_claim_back_in_time(render):
     assert before_s > 2.0 and sky.navigator.contact_claim().usable
 
 
+def test_a_late_frame_does_not_take_the_track_back_in_time(render):
+    """A ring that crosses the picture, and a frame that arrives after the one that followed it."""
+    ahead, behind = (Sky(render, lambda t: np.array([4.0, 0.3 * t - 0.15, -0.15])) for _ in range(2))
+    for sky, stamps in ((ahead, (1.02, 1.04, 1.08)), (behind, (1.02, 1.04, 1.08, 1.06))):
+        sky.run(1.0)
+        sky.run(0.1, camera=False)
+        for stamp in stamps:
+            seen = sky.navigator.step(sky.imu(), sky.frame(stamp, sky.sheets.camera.full_window))
+            assert seen.status == "pose used"
+    track, late = (sky.navigator._finder._tracker for sky in (ahead, behind))
+    np.testing.assert_array_equal(late.centre_px, track.centre_px)
+    np.testing.assert_array_equal(late.velocity_px_s, track.velocity_px_s)
+    assert np.hypot(*track.velocity_px_s) > 50.0
+
+
+@pytest.mark.parametrize("ahead_s", [0.004, 0.009, 0.012])
+def test_a_cameras_clock_that_is_a_little_ahead_costs_no_claim_of_contact(ahead_s):
+    sky, claimed = Sky(None, still), []
+    for k in range(300):
+        imu = sky.imu()
+        seen = named(sky, range(8), imu[-1].time_stamp_s) if sky.tick % 2 == 0 else None
+        if seen is not None:
+            seen = replace(seen, time_stamp_s=seen.time_stamp_s + ahead_s)
+        sky.navigator.step(imu, seen)
+        if k >= 100:
+            claimed.append(sky.navigator.contact_claim().usable)
+    assert all(claimed)
+
+
 def test_a_horizon_that_the_buffer_does_not_hold_is_refused():
     with pytest.raises(DockairError, match=r"coasting\.horizon_s"):
         Navigator(sheets(None), NavigatorSettings(coasting=CoastingSettings(horizon_s=0.5)))

@@ -224,6 +224,13 @@ def test_a_fault_is_named_where_it_can_have_brought_the_cause_about_and_acted_du
     assert cause(flight(faults=[DeadReel()]), outcome="given_up", reason="red light") == "fault"
 
 
+def test_faults_of_sensors_are_no_cause_where_the_truth_navigates(hand_made):
+    faults = {"faults": [{"kind": "led_off"}, {"kind": "camera_drop_out"}, {"kind": "dead_reel"}]}
+    settings = (faults | {"navigation.navigator": name} for name in ("dockair.nav.navigator:Navigator", "truth"))
+    flown = [flown_of(load_scenario("default", one), hand_made.sheets.mounting, [], []) for one in settings]
+    assert [[type(fault) for fault in one.faults] for one in flown] == [[LedOff, CameraDropOut, DeadReel], [DeadReel]]
+
+
 @pytest.mark.parametrize("outcome", ["given_up", "breakaway"])
 def test_a_fault_after_the_closest_approach_is_named_for_an_attempt_that_it_ended(flight, outcome):
     blind = flight(**BEHIND, valid=lambda t: t < 3.2, faults=[CameraDropOut(start_s=3.2)])

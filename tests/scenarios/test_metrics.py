@@ -102,6 +102,14 @@ def test_hold_and_disconnect_are_read_from_the_latch(hand_made):
     assert disconnect.time_s == 8.5
 
 
+def test_the_pull_that_opened_the_coupling_is_the_largest(hand_made):
+    truths = [hand_made.truth(10 * k) for k in range(1, 900)]
+    opens = next(k for k, truth in enumerate(truths) if truth.time_s == 8.5)
+    truths[opens] = replace(truths[opens], coupling_force_n=1913.0)
+    hold, _ = hold_of(truths)
+    assert hold is not None and hold.coupling_force_max_n == 1913.0
+
+
 def test_of_two_holds_the_first_counts(hand_made):
     once = [hand_made.truth(10 * k) for k in range(1, 900)]
     assert hold_of(once + once) == hold_of(once)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dockair.calibration import Camera
-from dockair.sim.camera.image_point import image_point
+from dockair.sim.camera.image_point import image_point, in_field
 
 # In the field it moves light by less than two pixels; from 81 degrees off the axis it would bring it into the frame
 FOLDING = replace(Camera(), distortion=(-4.2e-4, -7.7e-4, 0.0, 0.0, 0.0))
@@ -41,3 +41,13 @@ def test_the_margin_is_no_step() -> None:
     places = np.array([image_point(FOLDING, _off_axis(angle, 33.0)) for angle in angles])
     steps = np.linalg.norm(np.diff(places, axis=0), axis=1)
     assert np.all(np.abs(np.diff(steps)) < 1e-2)
+
+
+def test_the_field_ends_a_third_beyond_the_corners() -> None:
+    camera = Camera()
+    corner = camera.rays_from_pixels(np.array([[0.0, 0.0]]))[0]
+    corner_deg = np.degrees(np.arccos(corner[0]))
+    about_deg = np.degrees(np.arctan2(corner[2], corner[1]))
+    inside = [in_field(camera, _off_axis(angle, about_deg)) for angle in (0.0, corner_deg, corner_deg + 3.0)]
+    assert inside == [True, True, True]
+    assert not any(in_field(camera, _off_axis(angle, about_deg)) for angle in (corner_deg + 15.0, 89.9, 90.0, 120.0))
