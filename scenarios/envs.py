@@ -98,7 +98,7 @@ class DockPixelsEnv(Episodes[Pixels]):
         super().__init__(scenario, **options)
         self.observation_space: Any = gymnasium.spaces.Dict(
             {
-                "picture": gymnasium.spaces.Box(0, 255, PICTURE[view], np.uint8),
+                "picture": gymnasium.spaces.Box(0, 255, (*PICTURE[view], 1), np.uint8),
                 "state": box(PIXEL_STATE, np.float64),
             }
         )
@@ -128,4 +128,4 @@ class DockPixelsEnv(Episodes[Pixels]):
             place = [frame.window.column_start, frame.window.row_start, pooled, time_s - frame.time_stamp_s]
             exposure = frame.exposure_s
         state = np.concatenate([place, [exposure], *motion, [time_s]])
-        return {"picture": picture, "state": clipped(state, space["state"])}
+        return {"picture": picture[:, :, np.newaxis], "state": clipped(state, space["state"])}

@@ -8,6 +8,7 @@ One step is one control tick (or `ticks_per_step` of them). The world, the senso
 from collections.abc import Mapping
 from copy import deepcopy
 from dataclasses import replace
+from inspect import signature
 from pathlib import Path
 from typing import Any, Generic, Literal, SupportsFloat, TypeVar
 
@@ -21,7 +22,7 @@ from dockair.scenarios.attempts import succeeded
 from dockair.scenarios.envs_judge import AttemptJudge
 from dockair.scenarios.envs_options import command_from, scenario_from
 from dockair.scenarios.envs_tables import ACTION, OUTCOME_REWARD, RETRY_REWARD, action_cost, box, truth_info
-from dockair.scenarios.envs_viewer import LiveViewer
+from dockair.scenarios.envs_viewer import LiveViewer, require_viewer
 from dockair.scenarios.loop import Flight, Tick
 from dockair.scenarios.referee import Outcome
 from dockair.scenarios.schema import Scenario
@@ -33,6 +34,7 @@ REWARDS = ("dense", "sparse")
 PICTURE_PX = (640, 480)  # width, height of `render`
 _TRUNCATED = (Outcome.TIMEOUT, Outcome.DIVERGED)
 _SEEDS = 2**63  # from which the environment draws
+_NO_NAMES = ("self", "options", "unknown")  # of what an environment is made with
 
 Obs = TypeVar("Obs")
 
@@ -51,8 +53,9 @@ class Episodes(gymnasium.Env[Obs, NDArray[np.float32]], Generic[Obs]):
         render_mode: str | None = None,
         ticks_per_step: int = 1,
         reward: Literal["dense", "sparse"] = "dense",
-        attempts: int = 1,
+        attempts: int | None = None,
         until_clear: bool = False,
+        **unknown: Any,
     ) -> None:
         """Check the arguments; nothing is built before `reset`.
 
@@ -61,15 +64,30 @@ class Episodes(gymnasium.Env[Obs, NDArray[np.float32]], Generic[Obs]):
             render_mode: None, "rgb_array" (a third person's view) or "human" (the same episode in the rerun viewer).
             ticks_per_step: control ticks for which an action is held.
             reward: "dense" (distance made good, less the action's cost, and the outcome) or "sparse" (the outcome).
-            attempts: how many may fail before the episode ends.
-            until_clear: go on as a flight does, until the guidance is clear of the drogue; `attempts` is then its own.
+            attempts: how many may fail before the episode ends, 1 by default.
+            until_clear: go on as a flight does, until the guidance is clear of the drogue; its attempts are then the
+                scenario's `guidance.attempts_max`, and `attempts` is refused.
+            unknown: refused.
         """
+        if unknown:
+            exists = list(signature(type(self).__init__).parameters | signature(Episodes.__init__).parameters)
+            expected = "a known argument (of a scenario's keys: scenario=load_scenario(name, {key: value}))"
+            raise DockairError(
+                type(self).__name__,
+                expected=expected,
+                got=min(unknown),
+                exists=[k for k in exists if k not in _NO_NAMES],
+            )
         check_choice("render_mode", render_mode, (None, *RENDER_MODES))
         check_choice("reward", reward, REWARDS)
         check_integer("ticks_per_step", ticks_per_step, 1)
-        check_integer("attempts", attempts, 1)
         if not isinstance(until_clear, bool):
             raise DockairError("until_clear", expected="True or False", got=until_clear)
+        if until_clear and attempts is not None:
+            raise DockairError("attempts", expected="none with until_clear: guidance.attempts_max counts", got=attempts)
+        attempts = check_integer("attempts", 1 if attempts is None else attempts, 1)
+        if render_mode == "human":
+            require_viewer()
         self._source, self._attempts, self._is_dense = scenario, attempts, reward == "dense"
         self._until_clear, self._ticks_per_step = until_clear, ticks_per_step
         self.render_mode = render_mode
@@ -79,7 +97,7 @@ class Episodes(gymnasium.Env[Obs, NDArray[np.float32]], Generic[Obs]):
         self._viewer: LiveViewer | None = None
         self._tick: Tick | None = None
         self._outcome: Outcome | None = None
-        self._judge = AttemptJudge(attempts)
+        self._judge, self._seed = AttemptJudge(attempts), 0
         self.imu: ImuSample | None = None  #: the newest sample; None until the first
         self.metadata = self._metadata_of(self.chosen_scenario({}))
 
@@ -107,6 +125,7 @@ class Episodes(gymnasium.Env[Obs, NDArray[np.float32]], Generic[Obs]):
             self.np_random.integers(_SEEDS)
         self.close()
         self._flight, self._judge, self._outcome, self.imu = flight, judge, None, None
+        self._seed = flight_seed
         self.metadata = self._metadata_of(scenario)
         self.forget()
         self._take(tick)
@@ -234,8 +253,9 @@ class Episodes(gymnasium.Env[Obs, NDArray[np.float32]], Generic[Obs]):
         if scenario.flight.duration_s <= tick_s:
             expected = f"more than the one control tick that reset flies, {tick_s:g} s"
             raise DockairError("flight.duration_s", expected=expected, got=scenario.flight.duration_s)
-        sensing = scenario.camera.sensing
-        if "camera.sensing" in options.get("set", {}) and self.sensing not in (None, sensing):
+        sensing, settings = scenario.camera.sensing, options.get("set", {})
+        asked = "camera.sensing" in settings or "camera" in settings and "sensing" in scenario.camera.model_fields_set
+        if asked and self.sensing not in (None, sensing):
             # a scenario's own gives way to the environment's; what is asked for here would be ignored without a word
             expected = f'"{self.sensing}", which this environment is made for'
             raise DockairError("options.set: camera.sensing", expected=expected, got=sensing)
@@ -274,8 +294,11 @@ class Episodes(gymnasium.Env[Obs, NDArray[np.float32]], Generic[Obs]):
         assert self._flight is not None and self._tick is not None
         tick, outcome = self._tick, self._outcome
         return {
+            "scenario": self._flight.scenario.name,
+            "seed": self._seed,
             "is_success": outcome is Outcome.CONTACT and self._docked_well(),
             "outcome": outcome.value if outcome is not None else "",
+            "unsafe": "; ".join(self._flight.referee.unsafe),
             "attempt": self._flight.referee.attempt if self._until_clear else self._judge.number,
             "phase": tick.solution.phase,
             "sensing": self._flight.scenario.sensing,

@@ -1,6 +1,7 @@
 """What a person hands an environment, checked: the options of `reset`, and an action."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from dockair.scenarios.schema import Scenario, load_scenario
 
 _EXISTS = ("scenario", "seed", "set")
 _REAL = "biuf"  # numpy's kinds: complex numbers, texts and objects are none
+_OPTION = "--set "  # what the command line calls it
 _LONGEST = 80  # characters of what was got
 
 
@@ -39,10 +41,23 @@ def scenario_from(options: Mapping[str, Any], source: str | Path | Scenario) -> 
     if not isinstance(source, (str, Path, Scenario)):
         raise DockairError("scenario", expected="a name, a path or a Scenario", got=_said(source))
     if not isinstance(source, Scenario):
-        return load_scenario(source, settings)
+        with _as_an_option():
+            return load_scenario(source, settings)
     if settings:
         raise DockairError("options.set", expected="a scenario's name or path beside it", got="a Scenario")
     return source
+
+
+@contextmanager
+def _as_an_option() -> Iterator[None]:
+    """Say where a setting was refused as a caller of `reset` wrote it."""
+    try:
+        yield
+    except DockairError as error:
+        if not error.where.startswith(_OPTION):
+            raise
+        where = "options.set: " + error.where.removeprefix(_OPTION)
+        raise DockairError(where, expected=error.expected, got=error.got, exists=error.exists) from None
 
 
 def command_from(action: Any, space: spaces.Box) -> ReceiverCommand:

@@ -1,6 +1,8 @@
 """An episode in the rerun viewer while it is flown: scene, belief, plots, as in a recorded one."""
 
+import os
 import shutil
+import socket
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -19,6 +21,8 @@ from dockair.scenarios.recording_plots import log_plots
 from dockair.scenarios.recording_scene import hose_exit, log_moving, log_still, log_tip_path, tip_place
 from dockair.sim.shapes import shapes_of
 
+_DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY")  # by which a program under Linux finds one
+_PORT = 9876  # of rerun's viewer
 _SHOWN_HZ = 20.0  # a viewer needs no more, and each costs a few milliseconds
 
 Sink = Callable[[Any], None]
@@ -87,6 +91,27 @@ class LiveViewer:
         shift = rr.Transform3D(translation=[frame.window.column_start, frame.window.row_start, 0])
         self._recording.log("camera/window", shift)
         self._recording.log("camera/window/pixels", rr.Image(np.asarray(frame.pixels), "L"))
+
+
+def require_viewer() -> None:
+    """Refuse where no viewer can be opened and none is open.
+
+    Raises:
+        MachineError: with what to do.
+    """
+    shows = not sys.platform.startswith("linux") or any(os.environ.get(name) for name in _DISPLAYS)
+    if not shows and not _is_open():
+        expected = "a display, or a rerun viewer that is open already"
+        raise MachineError("render_mode", expected=expected, remedy='without one use "rgb_array", or `dockair fly`')
+
+
+def _is_open() -> bool:
+    """Whether somebody listens where a viewer does."""
+    try:
+        with socket.create_connection(("127.0.0.1", _PORT), timeout=0.5):
+            return True
+    except OSError:
+        return False
 
 
 def _spawned(recording: Any) -> None:

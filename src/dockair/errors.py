@@ -57,5 +57,5 @@ def check_integer(name: str, value: Any, least: int) -> int:
 def check_choice(name: str, value: Any, exists: tuple[str | None, ...]) -> None:
     """Refuse a value that is none of those that exist."""
     if not (value is None or isinstance(value, str)) or value not in exists:
-        expected = "None or one of" if None in exists else "one of"
+        expected = f"{'None or ' if None in exists else ''}one of those that exist"
         raise DockairError(name, expected=expected, got=value, exists=[one for one in exists if one is not None])

@@ -276,7 +276,7 @@ def test_the_whole_sensor_can_be_asked_for():
     for _ in range(3):
         observation, *_ = env.step(np.zeros(6, np.float32))
     env.close()
-    assert observation["picture"].shape == (136, 256)
+    assert observation["picture"].shape == (136, 256, 1)
     assert list(observation["state"][:3]) == [0.0, 0.0, 8.0]
 
 
@@ -441,3 +441,32 @@ def test_the_speed_of_a_video_follows_the_flight_and_not_the_other_environments(
     assert (before, slow, made.metadata["render_fps"]) == (50.0, 25.0, 50.0)
     assert DockEnv.metadata == shared
     assert other.metadata["render_fps"] == 100.0
+
+
+def test_info_says_which_flight_it_is_and_that_flies_again():
+    """A drawn seed, too; the flight that it names is the same to the bit."""
+    env = DockEnv(QUICK, ticks_per_step=10)
+    _, info = env.reset()
+    assert info["scenario"] == QUICK and 0 <= info["seed"] < 2**63
+    first = [env.step(np.zeros(6, np.float32))[0] for _ in range(5)]
+    _, again = env.reset(options={"seed": info["seed"]})
+    assert again["seed"] == info["seed"]
+    np.testing.assert_array_equal([env.step(np.zeros(6, np.float32))[0] for _ in range(5)], first)
+    assert env.reset(seed=5)[1]["seed"] == 5
+    env.close()
+
+
+@pytest.mark.slow
+def test_info_says_what_was_unsafe_of_a_contact_that_is_a_success():
+    """Blind from 2.6 s on and straight in at 2.2 m/s, by what the navigation then believes."""
+    blind = {"faults": [{"kind": "camera_drop_out", "start_s": 2.6, "stop_s": 60.0}]}
+    env = DockFastEnv(load_scenario("still_air", blind), ticks_per_step=2)
+    observation, info = env.reset(seed=0)
+    assert info["unsafe"] == ""
+    over = False
+    while not over:
+        aside = np.clip(observation[2:4], -2.0, 2.0)
+        observation, _, over, late, info = env.step(np.array([2.2, *aside, 0.0, 0.0, 0.0], np.float32))
+        over = over or late
+    env.close()
+    assert info["outcome"] == "contact" and info["unsafe"] == "contact on a solution marked unusable"

@@ -1,13 +1,15 @@
 """What the environments refuse: in one line, and the flight that goes on is not touched by it."""
 
+import socket
+
 import gymnasium
 import numpy as np
 import pytest
 
 from dockair.calibration import Window
-from dockair.errors import DockairError
+from dockair.errors import DockairError, MachineError
 from dockair.messages import CameraFrame
-from dockair.scenarios import envs_episode
+from dockair.scenarios import envs_episode, envs_viewer
 from dockair.scenarios.envs import DockEnv, DockFastEnv, DockPixelsEnv
 from dockair.scenarios.envs_options import command_from
 from dockair.scenarios.loop import Flight
@@ -239,9 +241,57 @@ def test_another_sensing_than_the_environments_own_is_refused_and_its_own_is_not
     assert made().chosen_scenario({"set": {"camera.sensing": own}}).camera.sensing == own
     with pytest.raises(DockairError, match=rf'^options\.set: camera\.sensing: expected "{own}", .*, got \'{other}\'$'):
         made().reset(options={"set": {"camera.sensing": other}})
+    for table in ({"sensing": other}, f'{{sensing = "{other}"}}'):  # the whole table, as TOML's text too
+        with pytest.raises(DockairError, match=rf'^options\.set: camera\.sensing: expected "{own}"'):
+            made().reset(options={"set": {"camera": table}})
+    assert made().chosen_scenario({"set": {"camera": {"exposure": "auto"}}}).camera.sensing == own
 
 
 @pytest.mark.parametrize("reward", ["dens", None, 1.0, ["dense"], np.array([1, 2])])
 def test_a_reward_that_does_not_exist_is_refused_with_those_that_do(reward):
-    with pytest.raises(DockairError, match=r"reward: expected one of(, got .+)?; exists: dense, sparse"):
+    with pytest.raises(
+        DockairError, match=r"reward: expected one of those that exist(, got .+)?; exists: dense, sparse"
+    ):
         DockEnv(reward=reward)
+
+
+def test_a_setting_that_is_refused_is_named_as_the_caller_of_reset_wrote_it():
+    with pytest.raises(DockairError, match=r"^options\.set: turbulence\.sgma"):
+        DockFastEnv().reset(options={"set": {"turbulence.sgma": 1}})
+
+
+@pytest.mark.parametrize("made", [DockEnv, DockFastEnv, DockPixelsEnv])
+def test_an_argument_that_does_not_exist_is_refused_with_those_that_do(made):
+    exists = "exists: scenario, view, render_mode" if made is DockPixelsEnv else "exists: scenario, render_mode"
+    with pytest.raises(DockairError, match=rf"^{made.__name__}: expected a known argument .*, got 'set'; {exists}"):
+        made(set={"turbulence.sigma_m_s": 1.0})
+
+
+def test_attempts_that_would_be_ignored_are_refused():
+    with pytest.raises(DockairError, match=r"^attempts: expected none with until_clear: guidance.attempts_max counts"):
+        DockFastEnv(until_clear=True, attempts=5)
+
+
+def test_a_viewer_that_cannot_be_shown_is_refused_before_a_flight_is_built(monkeypatch):
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(envs_viewer.sys, "platform", "linux")
+    monkeypatch.setattr(envs_viewer, "_is_open", lambda: False)
+    with pytest.raises(
+        MachineError, match="^render_mode: expected a display, or a rerun viewer that is open already; "
+    ):
+        DockFastEnv(render_mode="human")
+    monkeypatch.setattr(envs_viewer, "_is_open", lambda: True)
+    assert DockFastEnv(render_mode="human").render_mode == "human"
+    monkeypatch.setattr(envs_viewer, "_is_open", lambda: False)
+    monkeypatch.setenv("DISPLAY", ":0")
+    assert DockFastEnv(render_mode="human").render_mode == "human"
+
+
+def test_an_open_viewer_is_found_by_its_port(monkeypatch):
+    with socket.socket() as listener:
+        listener.bind(("127.0.0.1", 0))
+        monkeypatch.setattr(envs_viewer, "_PORT", listener.getsockname()[1])
+        assert not envs_viewer._is_open()
+        listener.listen()
+        assert envs_viewer._is_open()
