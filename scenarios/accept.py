@@ -6,10 +6,10 @@ Where no rate is asked for, every flight has to show what one flight must.
 
 import json
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from dockair.errors import DockairError
 from dockair.nav.guidance.phases import REFUELLED
@@ -41,6 +41,17 @@ class Accept(Table):
     closure_rate_min: _Rate = None  #: part of the contacts whose speed lies between the two closure speeds
     radial_offset_median_max_m: float | None = Field(default=None, gt=0.0)  #: median over a campaign's contacts
     unsafe_max: int = Field(default=0, ge=0)  #: flights of a campaign in which anything was unsafe
+
+    @model_validator(mode="after")
+    def _can_be_met(self) -> Self:
+        low, high = self.closure_speed_min_m_s, self.closure_speed_max_m_s
+        if low is not None and high is not None and low > high:
+            where, expected = "accept.closure_speed_max_m_s", f"at least closure_speed_min_m_s = {low:g}"
+            raise DockairError(where, expected=expected, got=high)
+        if self.closure_rate_min is not None and low is None and high is None:
+            expected = "closure_speed_min_m_s or closure_speed_max_m_s beside it: the part of contacts between them"
+            raise DockairError("accept.closure_rate_min", expected=expected, got=self.closure_rate_min)
+        return self
 
     @property
     def claims_figures(self) -> bool:

@@ -6,7 +6,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from dockair.calibration import Camera, LedRing, Mounting, NavigationSheets
+from dockair.calibration import Mounting, NavigationSheets
 from dockair.clock import Clock
 from dockair.errors import DockairError
 from dockair.messages import Navigates
@@ -23,6 +23,7 @@ from dockair.rotations import Array
 from dockair.scenarios import build_receiver
 from dockair.scenarios.build_air import air_motion
 from dockair.scenarios.build_measured import measured_leds
+from dockair.scenarios.buildable import require_buildable
 from dockair.scenarios.exact_json import name_of
 from dockair.scenarios.measured_leds import MeasuredLeds
 from dockair.scenarios.message_log import NavigatorRecipe
@@ -39,7 +40,6 @@ from dockair.sim.aircraft.tanker import TankerPath, TankerPathParameters
 from dockair.sim.as_built import AsBuilt, AsBuiltParameters, draw_as_built
 from dockair.sim.basket import place_leds
 from dockair.sim.camera.camera import CameraNoise, NearInfraredCamera
-from dockair.sim.camera.readout import row_time_s, shortest_period_s
 from dockair.sim.camera.sheets import CameraSheets, LedParameters
 from dockair.sim.camera.weather import Weather
 from dockair.sim.faults import Faults
@@ -110,6 +110,7 @@ def build(scenario: Scenario, seed: int) -> Parts:
         DockairError: a parameter or sheet that does not fit.
         MachineError: no off-screen OpenGL for the camera.
     """
+    require_buildable(scenario)
     clock = Clock(scenario.rates.physics_hz)
     air = standard_atmosphere(scenario.flight.altitude_m)
     mounting = _sheet(scenario, scenario.hardware.receiver_sheet("mounting"), MountingParameters).mounting()
@@ -125,7 +126,6 @@ def build(scenario: Scenario, seed: int) -> Parts:
     )
     parameters = _world_parameters(scenario, air, mounting)
     sheets = nominal_sheets(scenario, parameters, _imu_parameters(scenario))
-    _check_ring(sheets.ring, parameters.drogue)
     faults = Faults([table.fault for table in scenario.faults], sheets.ring.count)
     offset = scenario.start.sigma_p_m * random_stream(seed, "start").normal(size=3)
     start = WorldStart(p_PD_B=scenario.start.p_PD_B + offset, settle_s=SETTLE_S)
@@ -148,7 +148,6 @@ def build(scenario: Scenario, seed: int) -> Parts:
         recipe = None
         navigator: Navigates = TruthNavigator(sheets, guidance_settings(scenario))
     else:
-        _check_camera_rate(scenario.rates.camera_hz, as_built.camera, camera_sheets(scenario))
         recipe = _recipe(scenario, sheets)
         navigator = recipe.build()
         if isinstance(navigator, TruthNavigator):  # its results would not be marked
@@ -259,13 +258,6 @@ def _tanker_path(scenario: Scenario, seed: int, world: WorldParameters) -> tuple
     return path, Announcer(path, sheet, random_stream(seed, "announcement"))
 
 
-def _check_ring(ring: LedRing, drogue: DrogueParameters) -> None:
-    """The LEDs sit on the rim that the drogue's sheet describes."""
-    if ring.diameter_m != drogue.ring_diameter_m:
-        where, expected = "parameters.drogue.ring_diameter_m", f"the LED ring's own diameter, {ring.diameter_m} m"
-        raise DockairError(where, expected=f"{expected} (hardware.ring)", got=drogue.ring_diameter_m)
-
-
 def _imu_parameters(scenario: Scenario) -> ImuParameters:
     return _sheet(scenario, f"imu_{scenario.hardware.imu}", ImuParameters)
 
@@ -308,18 +300,6 @@ def _camera(scenario: Scenario, seed: int, as_built: AsBuilt, faults: Faults, wo
         automatic_exposure=table.exposure == "auto",
         background=table.background,
     )
-
-
-def _check_camera_rate(camera_hz: int, camera: Camera, sheets: CameraSheets) -> None:
-    """A full frame must be read before the next: the navigation may ask for one at any time."""
-    sensor, longest_s = sheets.sensor, sheets.exposure.longest_s
-    highest_hz = 1.0 / shortest_period_s(camera.height_px, sensor, longest_s)
-    if camera_hz > highest_hz:
-        at_which = f"at which the sensor's {sensor.outputs} outputs read full frames"
-        if longest_s > camera.height_px * row_time_s(sensor):
-            at_which = f"at which it can still expose for exposure.longest_s = {longest_s} s"
-        expected = f"a rate up to {np.floor(10.0 * highest_hz) / 10.0:.1f} Hz, {at_which}"
-        raise DockairError("rates.camera_hz", expected=expected, got=camera_hz)
 
 
 def camera_sheets(scenario: Scenario) -> CameraSheets:

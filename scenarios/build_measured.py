@@ -8,6 +8,7 @@ from dockair.nav.navigator import NavigatorSettings
 from dockair.parameters import load_parameters
 from dockair.scenarios.measured_leds import MeasuredLeds, MeasurementParameters
 from dockair.scenarios.mounting_parameters import MountingParameters
+from dockair.scenarios.nominal_sheets import nominal_camera
 from dockair.scenarios.schema import Scenario
 from dockair.sim.as_built import AsBuilt
 from dockair.sim.camera.camera import CameraNoise
@@ -52,9 +53,9 @@ def require_measurable(scenario: Scenario) -> None:
     Raises:
         DockairError: the scenario has something that acts through the picture alone.
     """
-    path, sheet = scenario.hardware.camera, scenario.hardware.receiver_sheet("mounting")
+    sheet = scenario.hardware.receiver_sheet("mounting")
     mounting = load_parameters(sheet, MountingParameters, scenario.parameters.get(sheet)).mounting()
-    refuse_unmodelled(scenario, Camera() if path is None else Camera.from_toml(path), mounting)
+    refuse_unmodelled(scenario, nominal_camera(scenario), mounting)
 
 
 def refuse_unmodelled(scenario: Scenario, camera: Camera, mounting: Mounting) -> None:

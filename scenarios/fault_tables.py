@@ -132,6 +132,9 @@ class FaultTable(Table):
         for key, optional in wanted.items():
             if getattr(self, key) is None and not optional:
                 raise DockairError(where, expected=f"the key {key} of the kind {self.kind}", got=None)
+        if self.leds is not None and (not self.leds or len(set(self.leds)) < len(self.leds)):
+            expected = "numbers of LEDs, each once; for all of them no such key"
+            raise DockairError(f"{where}.leds", expected=expected, got=list(self.leds))
         if self.stop_s is not None and self.stop_s <= self.start_s:
             raise DockairError(f"{where}.stop_s", expected=f"a time after start_s = {self.start_s}", got=self.stop_s)
 

@@ -11,11 +11,11 @@ from dockair.rotations import Array
 from dockair.scenarios.refusal import Expected
 from dockair.scenarios.table import Table, tuple_from_list
 
-_NonNegative = Annotated[float, Field(ge=0.0)]
+_Sigma = Annotated[float, Field(ge=0.0, le=20.0)]
 _ThreeSigmas = Annotated[
-    tuple[_NonNegative, _NonNegative, _NonNegative],
+    tuple[_Sigma, _Sigma, _Sigma],
     BeforeValidator(tuple_from_list),
-    Expected("three numbers, each 0 or more"),
+    Expected("three numbers, each 0 to 20"),
 ]
 _SmallAngle = Annotated[float, Field(ge=0.0, le=30.0)]
 _ThreeSmallAngles = Annotated[

@@ -35,7 +35,6 @@ def nominal_sheets(scenario: Scenario, world: WorldParameters, imu: ImuParameter
         world: flight condition and place of the hose's exit.
         imu: whose data sheet is told.
     """
-    camera = scenario.hardware.camera
     start = StartGeometry(
         p_PD_B=scenario.start.p_PD_B,
         sigma_p_m=scenario.start.sigma_p_m,
@@ -43,7 +42,7 @@ def nominal_sheets(scenario: Scenario, world: WorldParameters, imu: ImuParameter
         sigma_R_rad=scenario.start.sigma_R_rad,
     )
     return NavigationSheets(
-        camera=Camera() if camera is None else Camera.from_toml(camera),
+        camera=nominal_camera(scenario),
         ring=nominal_ring(scenario),
         mounting=world.mounting,
         start=start,
@@ -52,6 +51,12 @@ def nominal_sheets(scenario: Scenario, world: WorldParameters, imu: ImuParameter
         control_rate_hz=scenario.rates.control_hz,
         coupling_depth_m=world.coupling.depth_m,
     )
+
+
+def nominal_camera(scenario: Scenario) -> Camera:
+    """Return the camera's calibration sheet."""
+    camera = scenario.hardware.camera
+    return Camera() if camera is None else Camera.from_toml(camera)
 
 
 def nominal_ring(scenario: Scenario) -> LedRing:

@@ -6,10 +6,13 @@ from pathlib import Path
 from typing import Any
 
 from dockair.scenarios.campaign import journal
+from dockair.scenarios.campaign.code import code_of
 from dockair.scenarios.campaign.folder import check, entries_of
+from dockair.scenarios.campaign.manifest import manifest_of, read_manifest, require_same
 from dockair.scenarios.campaign.plan_file import PlanFile
 from dockair.scenarios.campaign.row import flight_of, unflown
 from dockair.scenarios.campaign.run import checked_jobs
+from dockair.scenarios.campaign.worker import FLIGHT
 from dockair.scenarios.report.groups import groups_of
 
 
@@ -32,8 +35,6 @@ class DryRun:
 def dry_run(source: PlanFile, folder: Path, *, fresh: bool = False, retry_errors: bool = False) -> DryRun:
     """Return what a campaign would fly; flights in the folder's journal count as done, errors among them.
 
-    Whether the folder's flights are of the same code and draws is asked by `run` alone.
-
     Args:
         source: the plan.
         folder: of the campaign.
@@ -41,11 +42,15 @@ def dry_run(source: PlanFile, folder: Path, *, fresh: bool = False, retry_errors
         retry_errors: what ended in an error does not.
 
     Raises:
-        DockairError: the plan cannot be flown; the folder is no campaign's, or its journal is damaged.
+        DockairError: the plan cannot be flown; the folder is no campaign's, or that of another one; its journal is
+            damaged.
     """
     jobs = checked_jobs(source)
     check(folder, fresh=fresh)
     entries = entries_of(folder) if not fresh and os.path.isfile(folder / journal.FILE_NAME) else {}
+    if entries:
+        now = manifest_of(source.plan, jobs, FLIGHT, code_of(jobs))
+        require_same(read_manifest(folder), now, set(entries), jobs, f"--out {folder}")
     rows = [entry["row"] for entry in entries.values()]
     done = {flight_of(row) for row in rows if not (retry_errors and row["error"])}
     groups = [

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from dockair.errors import DockairError
+from dockair.scenarios.buildable import require_buildable
 from dockair.scenarios.campaign.draws import Point
 from dockair.scenarios.campaign.plan import Entry
 from dockair.scenarios.campaign.plan_file import PlanFile
@@ -92,6 +93,8 @@ def jobs_of(source: PlanFile) -> list[Job]:
             ]
     _refuse_twins(source, jobs)
     _refuse_namesakes(source, jobs)
+    for job in {job.scenario_hash: job for job in jobs}.values():
+        _require_buildable(source, job)
     names = sorted({job.scenario.name for job in jobs})
     for name in source.plan.gate.scenarios:
         if name not in names:
@@ -101,6 +104,15 @@ def jobs_of(source: PlanFile) -> list[Job]:
     for name in sorted({job.scenario.navigation.navigator for job in jobs} - {"truth"}):
         _require_navigator(source, name)
     return jobs
+
+
+def _require_buildable(source: PlanFile, job: Job) -> None:
+    """Refuse a scenario of which no flight could be built: each would be a row with the same error."""
+    try:
+        require_buildable(job.scenario)
+    except DockairError as error:
+        where = f"{source.place('scenarios')}: {job.scenario.name}: {error.where}"
+        raise DockairError(where, expected=error.expected, got=error.got, exists=error.exists) from None
 
 
 def with_background(job: Job, background: str) -> Job:

@@ -1,5 +1,7 @@
 """What a campaign is held to: counts against rates, and what is told of those that fall short."""
 
+import re
+
 import pytest
 
 from dockair.errors import DockairError
@@ -170,3 +172,18 @@ def test_a_figure_of_a_contact_that_could_not_be_measured_is_inside_no_limit():
     speeds = {"closure_speed_min_m_s": 1.0, "closure_speed_max_m_s": 1.5}
     assert len(Accept(closure_rate_min=0.1, radial_offset_median_max_m=0.1, **speeds).judge(flights)) == 2
     assert Accept(radial_offset_max_m=0.15).judge(flights) == ["1 of 1 flights fall short: seeds 0"]
+
+
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        (
+            {"closure_speed_min_m_s": 3.0, "closure_speed_max_m_s": 1.0, "closure_rate_min": 0.9},
+            "accept.closure_speed_max_m_s: expected at least closure_speed_min_m_s = 3, got 1.0",
+        ),
+        ({"closure_rate_min": 0.9}, "accept.closure_rate_min: expected closure_speed_min_m_s or closure_speed_max_m_s"),
+    ],
+)
+def test_what_nothing_could_meet_or_asks_for_nothing_is_refused(asked, said):
+    with pytest.raises(DockairError, match=re.escape(said)):
+        Accept(**asked)

@@ -96,7 +96,7 @@ def flown_again(job):
 
 def test_lists_of_tables_and_whatever_toml_knows_can_be_set(plan, tmp_path):
     sheet = tmp_path / 'a "quoted" path, ä.toml'
-    sheet.write_text("")
+    sheet.write_text("diameter_m = 0.5\ncount = 8\n")
     text = f"""
 scenarios = ["default"]
 [set]
@@ -312,6 +312,19 @@ def test_every_packaged_plan_can_be_flown_and_says_what_for(name):
             'scenarios = ["default"]\nsampler = "grid"\n[draw."turbulence.sigma_m_s"]\nlow = 0.1\nhigh = 1.0',
             'p.toml: draw."turbulence.sigma_m_s": expected values, or low, high and points: the plan is a grid',
         ),
+        (
+            'scenarios = ["default"]\n[set]\n"parameters.drogue.ring_diameter_m" = 0.6',
+            "p.toml: scenarios: default: parameters.drogue.ring_diameter_m: expected the LED ring's own diameter",
+        ),
+        (
+            'scenarios = ["default"]\n[set]\n"camera.sensing" = "measurements"\n'
+            '"faults" = [{ kind = "hot_pixels", count = 3 }]',
+            'p.toml: scenarios: default: camera.sensing: expected "frames": the scenario has what acts',
+        ),
+        (
+            'scenarios = ["default"]\n[set]\n"faults" = [{ kind = "exposure_stuck", exposure_us = 5000.0 }]',
+            "p.toml: scenarios: default: faults[0].exposure_us: expected 14 to 500 us, the hardware's limits",
+        ),
         ("scenarios = [", "p.toml: expected TOML"),
     ],
 )
@@ -375,6 +388,7 @@ def test_scenarios_of_ones_own_lie_beside_the_plan(plan, tmp_path, monkeypatch):
     assert jobs_of(plan('scenarios = ["mine.toml"]'))[0].scenario.name == "my_own"
 
 
+RING, OTHER_RING = "diameter_m = 0.5\ncount = 8", "diameter_m = 0.5\ncount = 8\nbrightness = [2, 1, 1, 1, 1, 1, 1, 1]"
 MINE = 'name = "mine"\nclaim = "{claim}"\n[turbulence]\nsigma_m_s = {sigma}\n[hardware]\nring = "ring.toml"'
 
 
@@ -383,7 +397,7 @@ def two_files(tmp_path):
     """Two scenario files named "mine", each with a sheet beside it; returns what makes the second anew."""
     for folder in ("a", "b"):
         (tmp_path / folder).mkdir()
-        (tmp_path / folder / "ring.toml").write_text("a = 1")
+        (tmp_path / folder / "ring.toml").write_text(RING)
         (tmp_path / folder / "mine.toml").write_text(MINE.format(claim=folder, sigma=0.2))
 
     def second(sigma: float, ring: str) -> None:
@@ -394,7 +408,7 @@ def two_files(tmp_path):
 
 
 @pytest.mark.parametrize("draw", ["", '[draw."start.aft_m"]\nlow = 3.0\nhigh = 5.0'])
-@pytest.mark.parametrize(("sigma", "ring"), [(2.0, "a = 1"), (0.2, "a = 2")])
+@pytest.mark.parametrize(("sigma", "ring"), [(2.0, RING), (0.2, OTHER_RING)])
 def test_two_scenarios_of_one_name_are_no_plan(plan, two_files, sigma, ring, draw):
     """Pooled, the good one would carry the bad one through the gate."""
     two_files(sigma, ring)
@@ -405,7 +419,7 @@ def test_two_scenarios_of_one_name_are_no_plan(plan, two_files, sigma, ring, dra
 
 def test_one_scenario_in_two_files_or_under_two_names_is_a_plan(plan, two_files):
     assert len(jobs_of(plan('scenarios = ["a/mine.toml", { scenario = "b/mine.toml", seeds = [9] }]'))) == 2
-    two_files(2.0, "a = 1")
+    two_files(2.0, RING)
     renamed = 'scenarios = ["a/mine.toml", { scenario = "b/mine.toml", set = { name = "rough" } }]'
     assert [job.scenario.name for job in jobs_of(plan(renamed))] == ["mine", "rough"]
 

@@ -710,7 +710,8 @@ def test_a_dry_run_says_what_would_be_flown_and_writes_nothing(command, here, tm
     assert said["commands"][0].startswith("dockair fly truth_navigation --seed 0 --set turbulence.sigma_m_s=0.")
     assert command("p.toml")[0] == 0
     plan(tmp_path, 4, drawn, '"default"')
-    assert "4 of 4 flights would be flown" in command("p.toml", "--dry-run")[1]  # other draws of four
+    status, _, err = command("p.toml", "--dry-run")  # other draws of four
+    assert status == 2 and "another plan: 5 of 5 flights that are done are not part of it" in err
     plan(tmp_path, 4)
     command("p.toml", "--fresh")
     plan(tmp_path, 6)
@@ -983,3 +984,12 @@ def test_when_a_campaign_is_killed_its_processes_end_in_the_middle_of_their_flig
                 return
             time.sleep(0.01)
     pytest.fail("it sleeps on")
+
+
+def test_a_dry_run_refuses_the_folder_that_the_campaign_would_refuse(here, tmp_path):
+    fly(plan(tmp_path, 3), tmp_path / "out")
+    smaller = plan(tmp_path, 2)
+    for ask in (partial(dry_run, smaller, tmp_path / "out"), partial(fly, smaller, tmp_path / "out")):
+        with pytest.raises(DockairError, match=r"another plan: 1 of 3 flights that are done are not part of it"):
+            ask()
+    assert dry_run(smaller, tmp_path / "out", fresh=True).groups[0]["done"] == 0

@@ -41,7 +41,7 @@ def test_a_key_is_told_with_unit_range_default_and_the_comment_beside_it():
     assert told("gusts[].at_s") == ("s", "0 to 600", "", "when its front meets the drogue")
     assert told("faults[].stop_s")[:3] == ("s", "above 0", "none")
     assert told("tanker.bank_deg")[:3] == ("deg", "above 0, up to 45", "25")
-    assert told("start.sigma_m")[:3] == ("m", "three numbers, each 0 or more", "0.3, 0.3, 0.3")
+    assert told("start.sigma_m")[:3] == ("m", "three numbers, each 0 to 20", "0.3, 0.3, 0.3")
     assert told("camera.background")[3].endswith(
         "where the machine has OpenGL"
     )  # a comment of two lines, above the key

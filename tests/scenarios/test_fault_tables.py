@@ -66,6 +66,11 @@ def test_there_is_a_right_table_of_every_kind_above():
             "kind = 'led_off', cover = 0.1",
             "faults[0]: expected a key of the kind led_off, got 'cover'; exists: kind, leds, ",
         ),
+        (
+            "kind = 'led_off', leds = []",
+            "faults[0].leds: expected numbers of LEDs, each once; for all of them no such key",
+        ),
+        ("kind = 'led_off', leds = [1, 1]", "faults[0].leds: expected numbers of LEDs, each once"),
         ("kind = 'led_dim'", "faults[0]: expected the key factor of the kind led_dim"),
         ("kind = 'led_dim', factor = 1.5", "faults[0].factor: expected a number from 0.0 to 1.0, got 1.5"),
         (

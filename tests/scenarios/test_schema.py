@@ -25,7 +25,7 @@ def scenario_file(tmp_path):
 
 SEED = "an integer from 0 to 9223372036854775807"
 SPEED = "a number from 100.0 to 250.0"
-SIGMAS = "three numbers, each 0 or more"
+SIGMAS = "three numbers, each 0 to 20"
 
 
 @pytest.mark.parametrize(

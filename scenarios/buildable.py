@@ -1,0 +1,59 @@
+"""Refuses, before anything is built, what building a flight would refuse, as far as that takes milliseconds.
+
+A campaign asks it of every scenario that it is about to fly: what nothing can be flown of is said in one line, and not
+once a flight. A flight asks it, too. What shows only with a world in hand is left to the flight: a physics rate that
+hose and reel cannot bear, a receiver that cannot be trimmed, the Sun at the edge of the field of the camera as built.
+"""
+
+import numpy as np
+
+from dockair.calibration import Camera, LedRing
+from dockair.errors import DockairError
+from dockair.parameters import load_parameters
+from dockair.scenarios.build_measured import require_measurable
+from dockair.scenarios.nominal_sheets import nominal_camera, nominal_ring
+from dockair.scenarios.schema import Scenario
+from dockair.sim.camera.camera_noise import CameraNoise
+from dockair.sim.camera.defects import Defects
+from dockair.sim.camera.readout import row_time_s, shortest_period_s
+from dockair.sim.camera.sheets import CameraSheets
+from dockair.sim.faults import Faults
+from dockair.sim.hose.chain import DrogueParameters
+
+
+def require_buildable(scenario: Scenario) -> None:
+    """Refuse a rate of the camera, calibration sheets and faults that do not fit one another.
+
+    Raises:
+        DockairError: one of them does not.
+    """
+    ring = nominal_ring(scenario)
+    _check_ring(ring, load_parameters("drogue", DrogueParameters, scenario.parameters.get("drogue")))
+    faults = Faults([table.fault for table in scenario.faults], ring.count)
+    if scenario.navigation.is_truth:
+        return
+    camera, sheets = nominal_camera(scenario), CameraSheets.load(scenario.camera.filter, scenario.parameters)
+    _check_camera_rate(scenario.rates.camera_hz, camera, sheets)
+    noise = CameraNoise.of(0)  # nothing is drawn
+    Defects(camera, sheets.glare, sheets.exposure, faults, noise.dirt, noise.hot_pixels)
+    if scenario.camera.sensing == "measurements":
+        require_measurable(scenario)
+
+
+def _check_ring(ring: LedRing, drogue: DrogueParameters) -> None:
+    """The LEDs sit on the rim that the drogue's sheet describes."""
+    if ring.diameter_m != drogue.ring_diameter_m:
+        where, expected = "parameters.drogue.ring_diameter_m", f"the LED ring's own diameter, {ring.diameter_m} m"
+        raise DockairError(where, expected=f"{expected} (hardware.ring)", got=drogue.ring_diameter_m)
+
+
+def _check_camera_rate(camera_hz: int, camera: Camera, sheets: CameraSheets) -> None:
+    """A full frame must be read before the next: the navigation may ask for one at any time."""
+    sensor, longest_s = sheets.sensor, sheets.exposure.longest_s
+    highest_hz = 1.0 / shortest_period_s(camera.height_px, sensor, longest_s)
+    if camera_hz > highest_hz:
+        at_which = f"at which the sensor's {sensor.outputs} outputs read full frames"
+        if longest_s > camera.height_px * row_time_s(sensor):
+            at_which = f"at which it can still expose for exposure.longest_s = {longest_s} s"
+        expected = f"a rate up to {np.floor(10.0 * highest_hz) / 10.0:.1f} Hz, {at_which}"
+        raise DockairError("rates.camera_hz", expected=expected, got=camera_hz)
