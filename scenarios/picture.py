@@ -15,6 +15,7 @@ from dockair.scenarios import flight_log, message_log
 
 FILE_NAME = "flight.png"
 FRAME_AT_M = 1.5  # the frame shown is the one with most LEDs named when the ring is about this far ahead of the tip
+_TRACK_S = 0.5  # without a new frame for longer the track has a gap
 _GROW_PX = 3
 _SIZE_IN, _DPI = (11.0, 6.2), 110
 _TRUTH, _BELIEF, _FOUND, _GREY = "#1f77b4", "#ff7f0e", "#34c759", "#9a9a9a"
@@ -41,7 +42,8 @@ def picture_of_flight(out_dir: str | Path) -> Path:
     path = folder / flight_log.FILE_NAME
     if not path.is_file():
         raise DockairError(str(path), expected="a flight's log", got="no such file")
-    flight = pq.read_table(path)
+    with path.open("rb") as file:  # Arrow takes no path but of UTF-8
+        flight = pq.read_table(file)
     frame = _chosen_frame(folder, flight)
     figure = Figure(figsize=_SIZE_IN, dpi=_DPI, layout="constrained")
     FigureCanvasAgg(figure)
@@ -184,13 +186,15 @@ def _draw_approach(axes: Any, flight: Any) -> None:
 def _draw_errors(axes: Any, flight: Any) -> None:
     time_s = _values(flight, "time_s")
     _shade_phases(axes, flight, named=False)
-    shown = _fresh(flight)
+    gone = _gone(flight)
+    shown = np.union1d(_fresh(flight), np.flatnonzero(gone))
     sizes_mm = []
     for axis, colour, label in (("x", _BELIEF, "along"), ("y", _TRUTH, "left"), ("z", "#8e44ad", "up")):
-        error_mm = 1e3 * (_values(flight, f"nav_p_PD_B_{axis}_m") - _values(flight, f"truth_p_PD_B_{axis}_m"))[shown]
+        error_mm = 1e3 * (_values(flight, f"nav_p_PD_B_{axis}_m") - _values(flight, f"truth_p_PD_B_{axis}_m"))
+        error_mm = np.where(gone, np.nan, error_mm)[shown]
         sizes_mm.append(np.abs(error_mm))
         axes.plot(time_s[shown], error_mm, color=colour, lw=0.9, label=label)
-    sigma_mm = 3e3 * _values(flight, "nav_sigma_p_PD_B_x_m")[shown]
+    sigma_mm = np.where(gone, np.nan, 3e3 * _values(flight, "nav_sigma_p_PD_B_x_m"))[shown]
     axes.plot(time_s[shown], sigma_mm, color=_BELIEF, lw=0.8, ls=":", label="3 sigma, along")
     axes.plot(time_s[shown], -sigma_mm, color=_BELIEF, lw=0.8, ls=":")
     sizes = np.concatenate(sizes_mm)
@@ -200,6 +204,12 @@ def _draw_errors(axes: Any, flight: Any) -> None:
     axes.set_ylabel("belief - truth [mm]", fontsize=9)
     _legend_beside(axes)
     axes.tick_params(labelsize=8)
+
+
+def _gone(flight: Any) -> NDArray[np.bool_]:
+    """Return at which ticks there is no track: a line across them would read as drift."""
+    age_s = _values(flight, "time_s") - _values(flight, "nav_frame_time_stamp_s")  # NaN without a camera
+    return np.asarray(~_values(flight, "nav_valid").astype(bool) | (age_s > _TRACK_S))
 
 
 def _fresh(flight: Any) -> NDArray[np.int64]:

@@ -7,7 +7,7 @@
 | camera/{candidates,leds,ring,...}   | NavSolution        | candidates, named LEDs, the believed ring projected |
 | world/{tanker,hose,drogue,receiver} | Truth              | the model's own primitives                          |
 | world/receiver/belief               | NavSolution        | the believed drogue, orange, beside the true one    |
-| plots/*, phase, frame_status        | both               | truth beside belief with 3 sigma                    |
+| plots/*, states/{phase,frame}       | both               | truth beside belief with 3 sigma                    |
 
 Timelines: `sim_time` [s] and `frame` (of the camera). Everything is written after the flight, so that nothing of it
 costs the control loop anything. The viewer takes a change of an image's size for a fault of a video, so that windows

@@ -11,7 +11,9 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.patches import Circle
+from matplotlib.ticker import MaxNLocator
 
 from dockair.rotations import Array
 from dockair.scenarios.report.groups import CAPTURE_M, CLOSING_BAND_M_S, Group, Share
@@ -20,6 +22,7 @@ RIM_M = 0.25  # the LED ring's radius
 CLOSING_LIMIT_M_S = 2.6
 _FRAME_M = 0.6  # half the side of the picture of where tips went
 _CLOSING_AXIS_M_S = 2.8
+_ROWS_APART_IN = 0.12  # half of the gap between a label and the title below it
 #: Outcomes of attempts whose tip never crossed the ring's plane; of a collision or a strike it may have, or not.
 _NOT_CROSSED = ("breakaway", "given_up", "timeout", "diverged")
 _TIMELINES = 40  # flights whose phases are drawn
@@ -68,7 +71,7 @@ def overview(groups: Sequence[Group]) -> str:
 def panels(group: Group) -> str:
     """Six panels on one group."""
     with mpl.rc_context(_STYLE):
-        figure = Figure(figsize=(12.0, 7.4), layout="constrained")
+        figure = Figure(figsize=(12.0, 7.4), layout=ConstrainedLayoutEngine(h_pad=_ROWS_APART_IN))
         axes = figure.subplots(2, 3)
         _scatter(axes[0, 0], group)
         _closing(axes[0, 1], group)
@@ -131,6 +134,7 @@ def _closing(ax: Axes, group: Group) -> None:
     ax.hist(speeds.clip(0.0, _CLOSING_AXIS_M_S), bins=list(bins), color="tab:blue")
     beyond = f"; {outside} beyond, in the end bins" if outside else ""
     ax.set(xlabel=f"[m/s]; band of practice, limit{beyond}", ylabel="contacts", xlim=(0.0, _CLOSING_AXIS_M_S))
+    ax.yaxis.set_major_locator(_whole_numbers())
 
 
 def _by_attempt(ax: Axes, group: Group) -> None:
@@ -183,6 +187,7 @@ def _causes(ax: Axes, group: Group) -> None:
     ax.set_yticks(range(len(names)), names)
     ax.invert_yaxis()
     ax.set_xlabel("number")
+    ax.xaxis.set_major_locator(_whole_numbers())
     ax.legend(ncols=2, frameon=False, fontsize=7, loc="upper center", bbox_to_anchor=(0.5, -0.16))
 
 
@@ -203,8 +208,13 @@ def _timelines(ax: Axes, group: Group) -> None:
         _say(ax, "not recorded")
         return
     ax.set(xlabel="[s]", ylabel="flight")
+    ax.yaxis.set_major_locator(_whole_numbers())
     ax.invert_yaxis()
     ax.legend(ncols=3, frameon=False, fontsize=7, loc="upper center", bbox_to_anchor=(0.5, -0.16))
+
+
+def _whole_numbers() -> MaxNLocator:
+    return MaxNLocator(integer=True, min_n_ticks=1)  # with more of them asked for, few counts would get fractions
 
 
 def _say(ax: Axes, text: str) -> None:
