@@ -1,5 +1,6 @@
 """Plans: what is flown, in which order, over what; and what is refused with one line."""
 
+import os
 import shlex
 from pathlib import Path
 
@@ -386,6 +387,28 @@ def test_scenarios_of_ones_own_lie_beside_the_plan(plan, tmp_path, monkeypatch):
     (tmp_path / "mine.toml").write_text('name = "my_own"')
     monkeypatch.chdir("/")
     assert jobs_of(plan('scenarios = ["mine.toml"]'))[0].scenario.name == "my_own"
+
+
+def test_a_file_whose_name_begins_with_a_dash_is_flown_again_as_a_file(plan, tmp_path, monkeypatch):
+    (tmp_path / "-mine.toml").write_text('name = "mine"')
+    monkeypatch.chdir(tmp_path)
+    plan('scenarios = ["-mine.toml"]')
+    (job,) = jobs_of(PlanFile(Path("p.toml")))
+    assert job.command == "dockair fly ./-mine.toml --seed 0"
+    assert flown_again(job) == job.scenario
+
+
+def test_what_is_no_utf8_is_refused_before_it_is_flown_for_no_table_holds_it(tmp_path, plan):
+    odd = tmp_path / os.fsdecode(b"\xff")
+    odd.mkdir()
+    (odd / "mine.toml").write_text('name = "mine"')
+    for name, text in (("own", '["mine.toml"]'), ("library", '["default"]')):
+        (odd / f"{name}.toml").write_text(f'name = "p"\nscenarios = {text}')
+    with pytest.raises(DockairError, match=r"own.toml: scenarios\[0\]: expected UTF-8, got '.*udcff/mine.toml'"):
+        jobs_of(PlanFile(odd / "own.toml"))
+    assert len(jobs_of(PlanFile(odd / "library.toml"))) == 1
+    said = refusal_of(plan, 'scenarios = ["default"]', settings={"hardware.ring": str(odd / "ring.toml")})
+    assert said.startswith("--set hardware.ring: expected UTF-8, got ")
 
 
 RING, OTHER_RING = "diameter_m = 0.5\ncount = 8", "diameter_m = 0.5\ncount = 8\nbrightness = [2, 1, 1, 1, 1, 1, 1, 1]"

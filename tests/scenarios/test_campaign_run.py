@@ -579,6 +579,11 @@ def test_a_name_that_others_use_too_makes_no_campaign(here, tmp_path, files, got
     assert {path.name: path.read_text() for path in folder.iterdir()} == files
 
 
+def test_a_folder_whose_name_is_no_utf8_takes_a_campaign(here, tmp_path):
+    out = tmp_path / os.fsdecode(b"\xff")
+    assert fly(plan(tmp_path), out).rows == rows_of(out)
+
+
 def test_what_one_campaign_is_writing_no_other_removes(here, tmp_path):
     fly(plan(tmp_path), tmp_path / "out")
     part = tmp_path / "out/flights.parquet.part"

@@ -5,6 +5,7 @@ import json
 import os
 import subprocess
 import sys
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
@@ -19,7 +20,7 @@ from dockair.scenarios import cli, doctor
 from dockair.scenarios.cli_options import overrides
 from dockair.scenarios.flight_profile import PhaseEntry
 from dockair.scenarios.metrics import NavigationFigures
-from dockair.scenarios.output_folder import keep_flight, prepare_output_folder
+from dockair.scenarios.output_folder import FlightFolder
 from dockair.scenarios.referee import Contact
 from dockair.scenarios.result import Result
 from dockair.scenarios.schema import load_scenario
@@ -95,10 +96,10 @@ def flights(monkeypatch, tmp_path):
             progress(
                 SimpleNamespace(time_s=time_s, p_PD_B=np.array([3.0, 4.0, 0.0])), SimpleNamespace(phase="approach")
             )
-        under_way = prepare_output_folder(Path(out))  # as the recorder does, once the flight is built
+        folder = FlightFolder(Path(out))  # as the recorder does, once the flight is built
         result = a_result(scenario, seed, out)
-        result.write(under_way)
-        keep_flight(Path(out))
+        result.write(folder.under_way)
+        folder.keep()
         return result
 
     monkeypatch.setitem(sys.modules, "dockair.scenarios.loop", SimpleNamespace(fly=fly))
@@ -199,7 +200,7 @@ def test_what_a_navigator_prints_is_not_among_the_json(command, flights, monkeyp
 @pytest.mark.parametrize("outcome", ["miss", "rim_strike", "abort", "collision", "timeout"])
 def test_the_exit_status_is_zero_whatever_the_outcome(command, flights, monkeypatch, outcome):
     def fly(scenario, seed, out, *, record, progress, overlap):
-        prepare_output_folder(Path(out))
+        FlightFolder(Path(out)).keep()
         return a_result(scenario, seed, out, outcome=outcome, contact=None)
 
     monkeypatch.setitem(sys.modules, "dockair.scenarios.loop", SimpleNamespace(fly=fly))
@@ -293,17 +294,64 @@ def test_a_full_disk_is_one_line_and_status_three(command, flights, monkeypatch)
     assert err == "dockair: out/default-0/episode.rrd: expected room to write, got a full disk\n"
 
 
-@pytest.mark.parametrize("arguments", [["scenarios"], ["scenarios", "--json"], ["--help"]])
-def test_a_reader_that_has_gone_is_no_traceback(arguments):
+@contextmanager
+def no_reader():
+    """A pipe that nobody reads."""
     reading, writing = os.pipe()
     os.close(reading)
     try:
-        done = subprocess.run(
-            [sys.executable, "-m", "dockair", *arguments], stdout=writing, stderr=subprocess.PIPE, text=True
-        )
+        yield writing
     finally:
         os.close(writing)
-    assert done.stderr == ""
+
+
+@pytest.mark.parametrize("arguments", [["scenarios"], ["scenarios", "--json"], ["--help"], ["--version"], ["campaign"]])
+def test_a_reader_that_has_gone_is_no_failure(arguments):
+    command = [sys.executable, "-m", "dockair", *arguments]
+    with no_reader() as writing:
+        done = subprocess.run(command, stdout=writing, stderr=subprocess.PIPE, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+STANDING_IN = """
+import sys
+from types import SimpleNamespace
+from dockair.scenarios import cli
+def replay(out):
+    {does}
+sys.modules["dockair.scenarios.replay"] = SimpleNamespace(replay=replay)
+sys.argv = ["dockair", "replay", "."]
+cli.main()
+"""
+
+
+def test_without_a_reader_the_status_still_says_what_came_of_it():
+    differs = STANDING_IN.format(does="print('x', file=sys.stderr); return SimpleNamespace(identical=False)")
+    with no_reader() as writing:
+        assert subprocess.run([sys.executable, "-c", differs], stdout=writing, stderr=writing).returncode == 1
+
+
+def test_a_pipe_that_breaks_within_is_no_quiet_failure():
+    breaks = STANDING_IN.format(does="raise BrokenPipeError(32, 'a pipe of our own')")
+    done = subprocess.run([sys.executable, "-c", breaks], capture_output=True, text=True)
+    assert "a pipe of our own" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status"), [("scenarios", 0), ("scenarios --json", 0), ("--help", 0), ("fly nosuch", 2)]
+)
+@pytest.mark.parametrize("closed", [">&-", "2>&-", "<&- >&- 2>&-"])
+def test_a_stream_that_is_closed_is_no_traceback(arguments, status, closed):
+    command = f'"{sys.executable}" -m dockair {arguments} {closed}'
+    done = subprocess.run(["sh", "-c", command], capture_output=True, text=True)
+    assert done.returncode == status
+    assert "Traceback" not in done.stderr and "dockair: " not in done.stdout
+
+
+def test_a_path_of_any_bytes_is_printed_as_it_is():
+    code = "import os; from dockair.scenarios.std_streams import outlive_readers; outlive_readers()"
+    done = subprocess.run([sys.executable, "-c", f"{code}; print(os.fsdecode(b'out/\\xff'))"], capture_output=True)
+    assert (done.stdout, done.stderr) == (b"out/\xff\n", b"")
 
 
 @pytest.mark.parametrize(("identical", "expected_status"), [(True, 0), (False, 1)])

@@ -1,5 +1,6 @@
 """What is read back from a message log is what was delivered, to the last bit."""
 
+import os
 from dataclasses import dataclass, field, fields
 
 import numpy as np
@@ -52,6 +53,15 @@ def test_messages_are_read_back_as_they_were_delivered(hand_made, tmp_path):
     read = list(read_messages(tmp_path))
     assert len(read) == 230
     assert all(_same_messages(delivered, messages) for delivered, messages in zip(ticks, read, strict=True))
+
+
+def test_a_folder_whose_name_is_no_utf8_takes_messages_and_gives_them_back(hand_made, tmp_path):
+    folder = tmp_path / os.fsdecode(b"\xff")
+    folder.mkdir()
+    with MessageLog(folder, NavigatorRecipe(class_name="a:B", sheets=hand_made.sheets)) as log:
+        for _, imu, frame, solution in hand_made.ticks(3):
+            log.append(imu, frame, solution)
+    assert (len(list(read_messages(folder))), len(list(read_estimates(folder)))) == (3, 3)
 
 
 def test_announcement_is_read_back_in_the_tick_it_was_made_in_and_in_no_other(hand_made, tmp_path):

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import cv2
 import numpy as np
+import pyarrow as pa
 import pytest
 from PIL import Image
 
@@ -205,3 +206,13 @@ def test_a_picture_needs_no_frames(flown):
     folder, _, _ = flown
     (folder / "messages.parquet").unlink()
     assert picture_of_flight(folder).stat().st_size > 10_000
+
+
+def test_where_there_is_no_track_the_picture_draws_none():
+    """Not valid, or nothing used for longer than half a second; on perfect navigation there are no frames."""
+    columns = {
+        "time_s": [1.0, 2.0, 3.0, 4.0],
+        "nav_frame_time_stamp_s": [0.9, 1.4, 2.9, float("nan")],
+        "nav_valid": [True, True, False, True],
+    }
+    assert picture._gone(pa.table(columns)).tolist() == [False, True, True, False]

@@ -12,6 +12,7 @@ from dockair.scenarios.campaign import manifest as manifests
 from dockair.scenarios.campaign import table
 from dockair.scenarios.campaign.jobs import scenario_hash
 from dockair.scenarios.campaign.row import COLUMNS
+from dockair.scenarios.report import figures
 from dockair.scenarios.report.acceptance import claim_of, shortfalls_of
 from dockair.scenarios.report.evidence import as_text, evidence_of
 from dockair.scenarios.report.figures import overview, panels
@@ -510,3 +511,9 @@ def test_each_cause_leads_to_the_flights_that_it_is_of():
         (link,) = {name for name, shown in re.findall(r'href="#([^"]+)">(\d+)</a>', table_) if shown == str(seed)}
         (row,) = re.findall(rf'<tr id="{link}">.*</tr>', text)
         assert f"dockair fly light_gusts --seed {seed}</code>" in row
+
+
+@pytest.mark.parametrize("most", [1, 2, 3, 7, 200])
+def test_flights_are_counted_in_whole_numbers(most):
+    ticks = figures._whole_numbers().tick_values(0.0, most)
+    assert len(ticks) > 1 and all(float(tick).is_integer() for tick in ticks)

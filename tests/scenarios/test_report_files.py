@@ -203,9 +203,22 @@ def test_a_campaigns_own_files_are_not_written_over(campaign, report, tmp_path, 
     assert not (folder / "report.html").exists()
 
 
-def test_where_no_campaign_is_its_names_are_anybodys(campaign, report, tmp_path):
-    assert report(campaign("a"), "--out", tmp_path / "page.html", "--evidence", tmp_path / "summary.json") == (0, "")
-    assert (tmp_path / "summary.json").is_file()
+@pytest.mark.parametrize("option", ["--out", "--evidence"])
+@pytest.mark.parametrize("name", ["result.json", "as_built.json", "episode.rrd"])
+def test_a_flights_own_files_are_not_written_over(campaign, report, tmp_path, option, name):
+    for file in ("result.json", "flight.parquet", "as_built.json"):
+        (tmp_path / file).write_text(file)
+    before = {path: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()}
+    said = f'dockair: {option} {tmp_path / name}: expected a file of its own, got "a flight\'s"\n'
+    assert report(campaign("a"), option, tmp_path / name) == (2, said)
+    assert {path: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()} == before
+    assert report(campaign("a"), option, tmp_path / "page.html") == (0, "")
+
+
+def test_where_no_campaign_and_no_flight_is_their_names_are_anybodys(campaign, report, tmp_path):
+    for name in ("summary.json", "result.json", "result.json"):
+        assert report(campaign("a"), "--out", tmp_path / "page.html", "--evidence", tmp_path / name) == (0, "")
+        assert (tmp_path / name).is_file()
 
 
 def test_a_table_that_was_cut_off_is_one_line(campaign, report):
