@@ -7,7 +7,6 @@ progress and errors go to stderr. Modules that are slow to import are imported b
 
 import errno
 import json
-import os
 import sys
 from dataclasses import asdict
 from enum import Enum
@@ -23,6 +22,7 @@ from dockair.scenarios.campaign_command import campaign
 from dockair.scenarios.cli_options import Json, ScenarioName, Seed, Settings, overrides, print_json, stdout_kept
 from dockair.scenarios.design_ring_command import design_ring
 from dockair.scenarios.report_command import report
+from dockair.scenarios.std_streams import outlive_readers
 
 if TYPE_CHECKING:
     from dockair.scenarios.schema import Scenario
@@ -63,10 +63,10 @@ def fly(
     seed: Seed = None,
     settings: Settings = None,
     out: Annotated[Path | None, typer.Option(help="Folder to write to; out/<scenario>-<seed> by default.")] = None,
-    record: Annotated[Record, typer.Option(help="Frames to keep: whole, as navigated on, or none.")] = Record.WINDOW,
+    record: Annotated[Record, typer.Option(help="Frames to keep: full (the whole sensor), window (as navigated on) or none.")] = Record.WINDOW,
     as_json: Json = False,
 ) -> None:
-    """Fly a scenario and write result.json and episode.rrd."""
+    """Fly a scenario and write its result, logs, recording and picture to a folder (docs/results.md)."""
     from dockair.scenarios.output import FlightProgress, show_result
     from dockair.scenarios.output_folder import check_output_folder, default_output_folder
     from dockair.scenarios.schema import load_scenario
@@ -134,7 +134,7 @@ def replay(
     out: Annotated[Path, typer.Argument(metavar="OUT", help="Folder of a recorded flight.")],
     as_json: Json = False,
 ) -> None:
-    """Feed a flight's recorded frames and gyro to the navigation, without a simulator; compare every bit."""
+    """Feed a flight's recorded frames and IMU to the navigation, without a simulator; compare every bit."""
     from dockair.scenarios.replay import replay as replay_flight
 
     if not out.is_dir():
@@ -264,6 +264,7 @@ def _require_background(scenario: "Scenario") -> None:
 
 def main() -> None:
     """Run a command; what a person did wrong ends in one line on stderr, not in a traceback."""
+    outlive_readers()
     sys.path.append(str(Path.cwd()))  # where one's own navigator lies; last, so that it hides nothing
     try:
         status = app(standalone_mode=False)
@@ -276,9 +277,10 @@ def main() -> None:
     except typer.TyperException as error:
         print(f"dockair: {error.format_message()}", file=sys.stderr)
         sys.exit(2)
-    except BrokenPipeError:  # whoever read our output has gone
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        sys.exit(0)
+    except SystemExit as ended:
+        if isinstance(ended.__context__, BrokenPipeError):  # of a pipe within: typer would pass it over with status 1
+            raise ended.__context__ from None
+        raise
     except PermissionError as error:
         print(f"dockair: {error.filename or 'a file'}: expected leave to use it, got {error.strerror}", file=sys.stderr)
         sys.exit(2)

@@ -80,7 +80,8 @@ class FlightLog:
     def write_parquet(self, out_dir: str | Path) -> Path:
         """Write `flight.parquet` into a folder and return its path."""
         path = Path(out_dir) / FILE_NAME
-        pq.write_table(pa.table(self.columns()), path, compression="ZSTD")
+        with path.open("wb") as file:  # Arrow takes no path but of UTF-8
+            pq.write_table(pa.table(self.columns()), file, compression="ZSTD")
         return path
 
     def _truth_columns(self) -> dict[str, Any]:

@@ -17,6 +17,7 @@ import platform
 import queue
 import threading
 from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, fields, is_dataclass
 from hashlib import blake2b
 from importlib.metadata import version
@@ -157,10 +158,15 @@ class MessageLog:
     def __init__(self, out_dir: str | Path, recipe: NavigatorRecipe) -> None:
         self._folder = folder = Path(out_dir)
         recipe.write(folder)
-        self._messages = pq.ParquetWriter(
-            folder / MESSAGES, _MESSAGE_SCHEMA, compression={"png": "NONE"} | dict.fromkeys(_compressed(), "ZSTD")
-        )
-        self._estimates = pq.ParquetWriter(folder / ESTIMATES, _ESTIMATE_SCHEMA, compression="ZSTD")
+        with ExitStack() as opened:  # Arrow takes no path but of UTF-8
+            messages, estimates = (opened.enter_context((folder / name).open("wb")) for name in (MESSAGES, ESTIMATES))
+            self._messages = opened.enter_context(
+                pq.ParquetWriter(
+                    messages, _MESSAGE_SCHEMA, compression={"png": "NONE"} | dict.fromkeys(_compressed(), "ZSTD")
+                )
+            )
+            self._estimates = opened.enter_context(pq.ParquetWriter(estimates, _ESTIMATE_SCHEMA, compression="ZSTD"))
+            self._files = opened.pop_all()
         self._queue: queue.Queue[_Entry | None] = queue.Queue(QUEUE_TICKS)
         self._failure: BaseException | None = None
         self._thread = threading.Thread(target=self._work, name="message log", daemon=True)
@@ -192,8 +198,7 @@ class MessageLog:
             self._queue.put(None)
             self._thread.join()
         try:
-            self._messages.close()
-            self._estimates.close()
+            self._files.close()
         except OSError as failure:
             self._failure = self._failure or failure
         self._raise_failure()
@@ -289,7 +294,7 @@ def read_messages(out_dir: str | Path, *, pixels: bool = True) -> Iterator[TickM
 def _rows(out_dir: Path, name: str, needed: set[str]) -> Iterator[dict[str, Any]]:
     path, expected = _existing(out_dir, name), "a whole table as a flight records it"
     try:
-        with pq.ParquetFile(path) as file:
+        with path.open("rb") as data, pq.ParquetFile(data) as file:  # Arrow takes no path but of UTF-8
             if missing := sorted(needed - set(file.schema_arrow.names)):
                 raise DockairError(str(path), expected=expected, got=f"none with the column {missing[0]}")
             for group in range(file.num_row_groups):

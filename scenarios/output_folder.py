@@ -1,13 +1,18 @@
 """Where results are written: a flight's into an empty folder or over an earlier flight, never over others' files.
 
-An earlier flight is replaced by a whole one only: while a flight goes on its files are in a folder within.
+An earlier flight is replaced by a whole one only: while a flight goes on its files are in a folder within, and a lock
+keeps other flights out.
 """
 
+import os
 import shutil
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from dockair.errors import DockairError
+from dockair.scenarios.file_lock import LockFile
 
 #: What a flight writes; only these are ever replaced.
 FLIGHT_FILES = (
@@ -21,8 +26,7 @@ FLIGHT_FILES = (
     "as_built.json",
 )
 
-
-_UNDER_WAY = ".flight"  # what a flight that was killed has left is the next one's to remove
+_UNDER_WAY, _LOCK = ".flight", ".flight.lock"  # what a flight that was killed has left is the next one's to remove
 
 
 def default_output_folder(scenario_name: str, seed: int) -> Path:
@@ -43,41 +47,85 @@ def check_output_folder(folder: Path) -> None:
         present = sorted(path.name for path in folder.iterdir()) if folder.is_dir() else []
     except OSError as error:
         raise DockairError(f"--out {folder}", expected=expected, got=error.strerror) from None
-    if present and not set(present) & {*FLIGHT_FILES, _UNDER_WAY}:
+    if present and not set(present) & {*FLIGHT_FILES, _UNDER_WAY, _LOCK}:
         raise DockairError(f"--out {folder}", expected=expected, got=f"a folder with {present[0]}")
 
 
-def prepare_output_folder(folder: Path) -> Path:
-    """Make the folder, and return one within for the files of the flight that begins; what is there stays.
+class FlightFolder:
+    """A folder while a flight is being written to it; no other flight may be, until this one is kept or forgotten.
+
+    Args:
+        folder: made if there is none; what is there stays until the flight is kept.
+
+    Attributes:
+        under_way: empty folder within, for the flight's files.
 
     Raises:
-        DockairError: as `check_output_folder`, or it cannot be written.
+        DockairError: as `check_output_folder`, or it cannot be written, or another flight is being written there.
     """
-    try:
+
+    def __init__(self, folder: Path) -> None:
         check_output_folder(folder)
-        under_way = folder / _UNDER_WAY
-        if under_way.exists():
-            shutil.rmtree(under_way)
-        under_way.mkdir(parents=True)
-    except OSError as error:
-        raise DockairError(f"--out {folder}", expected="a folder that can be written", got=error.strerror) from None
-    return under_way
+        self._folder, self.under_way = folder, folder / _UNDER_WAY
+        where = f"--out {folder}"
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            self._lock = LockFile(folder / _LOCK)
+            try:
+                if self.under_way.exists():
+                    shutil.rmtree(self.under_way)
+                self.under_way.mkdir()
+            except BaseException:
+                self._lock.release()
+                raise
+        except BlockingIOError:
+            got = "another flight is being written there"
+            raise DockairError(where, expected="a folder for this flight alone", got=got) from None
+        except OSError as error:
+            raise DockairError(where, expected="a folder that can be written", got=error.strerror) from None
+
+    def keep(self) -> None:
+        """Put the files of the flight that is over in the place of an earlier one's; other files stay."""
+        written = {path.name for path in self.under_way.iterdir()}
+        for name in FLIGHT_FILES:
+            if name in written:
+                (self.under_way / name).replace(self._folder / name)
+            else:
+                (self._folder / name).unlink(missing_ok=True)
+        self.forget()
+
+    def forget(self) -> None:
+        """Remove what a flight that came to nothing has written; one that is kept, or another's, stays."""
+        if self._lock.is_held:
+            shutil.rmtree(self.under_way, ignore_errors=True)
+            self._lock.release()
 
 
-def keep_flight(folder: Path) -> None:
-    """Put the files of the flight that is over in the place of an earlier one's; other files stay."""
-    written = {path.name for path in (folder / _UNDER_WAY).iterdir()}
-    for name in FLIGHT_FILES:
-        if name in written:
-            (folder / _UNDER_WAY / name).replace(folder / name)
-        else:
-            (folder / name).unlink(missing_ok=True)
-    forget_flight(folder)
+def is_flights_file(path: Path) -> bool:
+    """Whether a path is a flight's own file, which nobody else may write: by its name, beside another such file."""
+    path = Path(os.path.realpath(path))
+    others = (path.with_name(name) for name in FLIGHT_FILES if name != path.name)
+    return path.name in FLIGHT_FILES and any(map(os.path.lexists, others))
 
 
-def forget_flight(folder: Path) -> None:
-    """Remove what a flight that came to nothing has written."""
-    shutil.rmtree(folder / _UNDER_WAY, ignore_errors=True)
+@contextmanager
+def utf8_path_of(folder: Path) -> Iterator[Path]:
+    """Give a path of a folder for who takes no other than UTF-8: its own, or a link's that is removed afterwards."""
+    if _is_utf8(str(folder)):
+        yield folder
+        return
+    with tempfile.TemporaryDirectory() as elsewhere:
+        link = Path(elsewhere) / "folder"
+        link.symlink_to(folder.absolute())
+        yield link
+
+
+def _is_utf8(text: str) -> bool:
+    try:
+        text.encode()
+    except UnicodeEncodeError:
+        return False
+    return True
 
 
 def made_folder(folder: Path) -> Path:

@@ -10,7 +10,7 @@ from dockair.messages import LedObservation
 from dockair.scenarios.causes import flown_of
 from dockair.scenarios.flight_log import FlightLog
 from dockair.scenarios.message_log import MessageLog, read_messages
-from dockair.scenarios.output_folder import forget_flight, keep_flight, prepare_output_folder
+from dockair.scenarios.output_folder import FlightFolder, utf8_path_of
 from dockair.scenarios.referee import Outcome
 from dockair.scenarios.result import Result, summarise
 
@@ -36,13 +36,16 @@ class Recorder:
     def __init__(self, flight: "Flight", out: str | Path | None, record: str) -> None:
         if record not in RECORD:
             raise DockairError("record", expected="what to keep of the frames", got=record, exists=RECORD)
-        self._folder = None if out is None else Path(out)
-        self._log, self._finished = FlightLog(), False
+        self._path = None if out is None else Path(out)
+        self._log = FlightLog()
         self._messages: MessageLog | None = None
-        if self._folder is not None:
-            self._under_way = prepare_output_folder(self._folder)
-            if record != "none" and flight.recipe is not None:
-                self._messages = MessageLog(self._under_way, flight.recipe)
+        self._folder = None if self._path is None else FlightFolder(self._path)
+        if self._folder is not None and record != "none" and flight.recipe is not None:
+            try:
+                self._messages = MessageLog(self._folder.under_way, flight.recipe)
+            except BaseException:
+                self._folder.forget()
+                raise
 
     def append(self, tick: "Tick") -> None:
         """Take one control tick."""
@@ -65,8 +68,8 @@ class Recorder:
         try:
             self.settle()
         finally:
-            if self._folder is not None and not self._finished:
-                forget_flight(self._folder)
+            if self._folder is not None:
+                self._folder.forget()
 
     def finish(self, flight: "Flight", outcome: Outcome, seed: int, wall_time_s: float) -> Result:
         """Return the result; with a folder, write result.json, flight.parquet, episode.rrd and flight.png there.
@@ -91,12 +94,11 @@ class Recorder:
             sensing=flight.scenario.sensing,
             background="" if flight.camera is None else flight.camera.background,
             wall_time_s=wall_time_s,
-            out_dir=self._folder,
+            out_dir=self._path,
         )
         if self._folder is not None:
-            self._write(flight, result, self._under_way)
-            keep_flight(self._folder)
-            self._finished = True
+            self._write(flight, result, self._folder.under_way)
+            self._folder.keep()
         return result
 
     def _write(self, flight: "Flight", result: Result, folder: Path) -> None:
@@ -107,15 +109,16 @@ class Recorder:
         result.write(folder)
         (folder / AS_BUILT).write_text(json.dumps(flight.as_built.record(), indent=1) + "\n", encoding="utf-8")
         self._log.write_parquet(folder)
-        write_episode(
-            folder,
-            self._log,
-            flight.sheets,
-            name=f"{result.scenario}-{result.seed}",
-            shapes=shapes_of(flight.world.model),
-            messages=read_messages(folder, pixels=False) if self._messages is not None else (),
-            summary=summary_of(result),
-        )
+        with utf8_path_of(folder) as place:  # Rerun takes no other
+            write_episode(
+                place,
+                self._log,
+                flight.sheets,
+                name=f"{result.scenario}-{result.seed}",
+                shapes=shapes_of(flight.world.model),
+                messages=read_messages(folder, pixels=False) if self._messages is not None else (),
+                summary=summary_of(result),
+            )
         picture_of_flight(folder)
 
 

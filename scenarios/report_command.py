@@ -21,6 +21,7 @@ def report(
 ) -> None:
     """Make one self-contained HTML page of campaigns: rates with intervals, scatter, errors, causes of failure."""
     from dockair.scenarios.campaign.folder import is_own_file
+    from dockair.scenarios.output_folder import is_flights_file
     from dockair.scenarios.report import evidence as table
     from dockair.scenarios.report.folders import read_campaigns
     from dockair.scenarios.report.page import page, write_text
@@ -29,8 +30,9 @@ def report(
     if evidence is not None and os.path.realpath(evidence) == os.path.realpath(out):
         raise DockairError(f"--evidence {evidence}", expected="a file of its own", got="the page's")
     for option, path in (("--out", out), ("--evidence", evidence)):
-        if path is not None and is_own_file(path):
-            raise DockairError(f"{option} {path}", expected="a file of its own", got="a campaign's")
+        if path is not None and (is_own_file(path) or is_flights_file(path)):
+            got = "a campaign's" if is_own_file(path) else "a flight's"
+            raise DockairError(f"{option} {path}", expected="a file of its own", got=got)
     campaigns = read_campaigns(folders)
     title = title or ", ".join(campaign.name for campaign in campaigns)
     path = write_text(page(title, campaigns), out)

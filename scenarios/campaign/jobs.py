@@ -53,7 +53,8 @@ class Job:
     def command(self) -> str:
         """What flies this flight again."""
         changes = [f"--set {shlex.quote(f'{key}={as_toml(value, key)}')}" for key, value in self.settings.items()]
-        return " ".join(["dockair fly", shlex.quote(self.file), f"--seed {self.seed}", *changes])
+        file = f".{os.sep}{self.file}" if self.file.startswith("-") else self.file  # it would be read as an option
+        return " ".join(["dockair fly", shlex.quote(file), f"--seed {self.seed}", *changes])
 
     @property
     def key(self) -> str:
@@ -72,11 +73,13 @@ def jobs_of(source: PlanFile) -> list[Job]:
     """Return the plan's jobs in the order of the table.
 
     Raises:
-        DockairError: a scenario that cannot be flown as the plan says; a key that decides nothing, or is not flown as
-            drawn; two scenarios of one name; a navigator that cannot be imported; two jobs that are the same flight;
-            too many; a seed that is too large.
+        DockairError: a scenario that cannot be flown as the plan says; a path or a setting that no table can hold;
+            a key that decides nothing, or is not flown as drawn; two scenarios of one name; a navigator that cannot be
+            imported; two jobs that are the same flight; too many; a seed that is too large.
     """
     refuse_too_many(source)
+    for key, value in source.settings.items():
+        _require_text(f"--set {key}", as_toml(value, f"--set {key}"))
     jobs: list[Job] = []
     for index, entry in enumerate(source.plan.scenarios):
         content = ""
@@ -85,6 +88,7 @@ def jobs_of(source: PlanFile) -> list[Job]:
             _require_decisive(layers)
             settings = _merged(layers)
             file, scenario = _scenario(source, index, entry, layers, settings)
+            _require_text(source.place(f"scenarios[{index}]"), file)
             _require_as_drawn(source, scenario, point)
             digest, content = scenario_hash(scenario), content or file_hash(file)
             jobs += [
@@ -104,6 +108,14 @@ def jobs_of(source: PlanFile) -> list[Job]:
     for name in sorted({job.scenario.navigation.navigator for job in jobs} - {"truth"}):
         _require_navigator(source, name)
     return jobs
+
+
+def _require_text(where: str, written: str) -> None:
+    """Refuse what is not UTF-8, as a path and the command line may be: the table's column `command` cannot hold it."""
+    try:
+        written.encode()
+    except UnicodeEncodeError:
+        raise DockairError(where, expected="UTF-8", got=written) from None
 
 
 def _require_buildable(source: PlanFile, job: Job) -> None:

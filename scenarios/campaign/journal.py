@@ -4,7 +4,6 @@ A line that was being written when the power went is the last one and not whole:
 again. A line that could not be written (no room) is cut off likewise. One process writes at a time.
 """
 
-import fcntl
 import json
 import os
 from pathlib import Path
@@ -14,6 +13,7 @@ from typing import Any, Self
 from dockair.errors import DockairError, MachineError
 from dockair.scenarios.campaign.row import is_row
 from dockair.scenarios.campaign.whole_file import NO_ROOM
+from dockair.scenarios.file_lock import has_locked
 
 FILE_NAME = "journal.jsonl"
 _BEGINS = b'{"key": "'  # every entry, as `append` is given it
@@ -83,10 +83,12 @@ class Journal:
 
     def _lock(self) -> None:
         try:
-            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)  # goes with the process, however that ends
-        except OSError:
+            alone = has_locked(self._file)
+        except OSError as error:
+            raise DockairError(str(self.path), expected="a file that can be locked", got=error.strerror) from None
+        if not alone:
             expected = "a folder in which no campaign is running"
-            raise DockairError(str(self.path.parent), expected=expected, got="another process at work") from None
+            raise DockairError(str(self.path.parent), expected=expected, got="another process at work")
 
 
 def begins_like_one(path: Path) -> bool:

@@ -43,7 +43,8 @@ def read_table(folder: Path) -> list[dict[str, Any]]:
     path = folder / FILE_NAME
     expected = "the table of a campaign (removed, it is made again by the command that flew it)"
     try:
-        rows: list[dict[str, Any]] = pq.read_table(path).to_pylist()
+        with path.open("rb") as file:  # Arrow takes no path but of UTF-8
+            rows: list[dict[str, Any]] = pq.read_table(file).to_pylist()
     except (pa.ArrowException, OSError, ValueError) as error:
         raise DockairError(str(path), expected=expected, got=" ".join(str(error).split())) from None
     if not all(map(is_row, rows)):

@@ -10,6 +10,7 @@ import pytest
 from dockair.errors import DockairError
 from dockair.messages import Window
 from dockair.nav.navigator import Navigator
+from dockair.scenarios import file_lock
 from dockair.scenarios.camera_process import OverlappedExposures
 from dockair.scenarios.loop import fly
 from dockair.scenarios.output_folder import (
@@ -131,14 +132,13 @@ def test_a_flight_that_is_over_does_not_forget_the_next_ones_files(tmp_path):
 
 def test_who_opened_the_lock_before_it_was_removed_takes_the_new_one(tmp_path, monkeypatch):
     """The first flight ends, and removes its lock, between the second's opening of it and its locking."""
-    first, opened = FlightFolder(tmp_path), os.open
+    first, has_locked = FlightFolder(tmp_path), file_lock.has_locked
 
-    def late(path, *options):
-        file = opened(path, *options)
+    def late(file):
         first.forget()
-        return file
+        return has_locked(file)
 
-    monkeypatch.setattr(os, "open", late)
+    monkeypatch.setattr(file_lock, "has_locked", late)
     second = FlightFolder(tmp_path)
     monkeypatch.undo()
     with pytest.raises(DockairError, match="another flight is being written there"):

@@ -210,14 +210,16 @@ def test_a_flights_own_files_are_not_written_over(campaign, report, tmp_path, op
         (tmp_path / file).write_text(file)
     before = {path: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()}
     said = f'dockair: {option} {tmp_path / name}: expected a file of its own, got "a flight\'s"\n'
-    assert report(campaign("a"), option, tmp_path / name) == (2, said)
+    folder = campaign("a")
+    assert report(folder, option, tmp_path / name) == (2, said)
     assert {path: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()} == before
-    assert report(campaign("a"), option, tmp_path / "page.html") == (0, "")
+    assert report(folder, option, tmp_path / "page.html") == (0, "")
 
 
 def test_where_no_campaign_and_no_flight_is_their_names_are_anybodys(campaign, report, tmp_path):
+    folder = campaign("a")
     for name in ("summary.json", "result.json", "result.json"):
-        assert report(campaign("a"), "--out", tmp_path / "page.html", "--evidence", tmp_path / name) == (0, "")
+        assert report(folder, "--out", tmp_path / "page.html", "--evidence", tmp_path / name) == (0, "")
         assert (tmp_path / name).is_file()
 
 
