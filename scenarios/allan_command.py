@@ -13,7 +13,9 @@ def allan(
     rate_hz: Annotated[float, typer.Option(min=1e-3, max=1e6, help="Of the record's samples.")],
     unit: Annotated[str | None, typer.Option(help="rad/s or deg/s, if the columns' names do not say.")] = None,
     terms: Annotated[str, typer.Option(help="Which of Q, N, B, K to look for.")] = "QNBK",
-    bias_correlation_s: Annotated[float | None, typer.Option(min=1e-3, max=1e7, help="Of the bias, where it is known.")] = None,
+    bias_correlation_s: Annotated[
+        float | None, typer.Option(min=1e-3, max=1e7, help="Of the bias, where it is known.")
+    ] = None,
     out: Annotated[Path | None, typer.Option(help="Parameter sheet to write.")] = None,
     as_json: Json = False,
 ) -> None:

@@ -63,7 +63,9 @@ def fly(
     seed: Seed = None,
     settings: Settings = None,
     out: Annotated[Path | None, typer.Option(help="Folder to write to; out/<scenario>-<seed> by default.")] = None,
-    record: Annotated[Record, typer.Option(help="Frames to keep: full (the whole sensor), window (as navigated on) or none.")] = Record.WINDOW,
+    record: Annotated[
+        Record, typer.Option(help="Frames to keep: full (the whole sensor), window (as navigated on) or none.")
+    ] = Record.WINDOW,
     as_json: Json = False,
 ) -> None:
     """Fly a scenario and write its result, logs, recording and picture to a folder (docs/results.md)."""

@@ -165,7 +165,7 @@ def test_a_mistake_is_told_in_one_line_and_ends_with_status_two(command, tmp_pat
         ),
         (
             ("--bias-correlation-s", "1e300"),
-            "Invalid value for '--bias-correlation-s': Input should be less than or equal to 10000000.0",
+            "Invalid value for '--bias-correlation-s': Input should be less than or equal to 10000000",
         ),
         (("--terms", "X"), "--terms: expected letters of the terms, each once, got 'X'; exists: Q, N, B, K"),
     ],
