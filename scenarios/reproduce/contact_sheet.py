@@ -1,8 +1,9 @@
 """Sixteen frames of one ring: every light, weather, range and fault that the camera can meet, on one sheet.
 
 Each frame is the last of a few from a camera whose exposure control has settled, with the receiver put where the lens
-is so far behind the ring. The picture shows a quarter of the resolution, brightened, and the ring's surroundings as
-they are. The figures say what the frame does to the detection of LEDs; there is nothing published to compare with.
+is so far behind the ring. The picture shows a quarter of the resolution and the ring's surroundings in full, each
+stretched from black to white by itself. The figures say what the frame does to the detection of LEDs; there is nothing
+published to compare with.
 """
 
 from collections.abc import Mapping
@@ -26,7 +27,8 @@ _WHITE_DN = 255
 _REACH_PX = 3  # of an LED's image, to each side
 _OTHER_PX = 12  # from every LED: what is brightest there is none of them, nor its reflection in its own seat
 _REDUCTION = 4
-_GAMMA = 0.4
+_GAMMA = 0.6
+_SHOWN, _LEAST_DN = (0.02, 0.995), 24.0  # quantiles; but no less between them: noise is no picture
 _INSET_MARGIN = 1.6  # ring radii
 
 
@@ -169,4 +171,7 @@ def _surroundings(pixels: NDArray[np.uint8], leds_px: Array) -> Array:
 
 
 def _brightened(pixels: NDArray[np.uint8]) -> Array:
-    return np.asarray((pixels / 255.0) ** _GAMMA)
+    """From black to white between what nearly all pixels are above and below: what is faint shows, LEDs stay white."""
+    black, white = np.quantile(pixels, _SHOWN)
+    shown = (pixels - black) / max(white - black, _LEAST_DN)
+    return np.asarray(shown.clip(0.0, 1.0) ** _GAMMA)
