@@ -10,7 +10,7 @@ Not modelled: where the hose is; how long it whips.
 """
 
 from dockair.nav.guidance.guidance_settings import GuidanceSettings
-from dockair.nav.guidance.phases import Phase, PhaseLimits, Situation
+from dockair.nav.guidance.phases import Phase, PhaseLimits, Situation, is_off_the_probe
 
 _ON_PROBE = (Phase.CONTACT, Phase.HOLD)
 _GOING_BACK = (Phase.DISCONNECT, Phase.BACK_OFF, Phase.BREAKAWAY)
@@ -51,9 +51,11 @@ class Evasion:
 def _comes_off_aside(limits: PhaseLimits, s: Situation, *, ends_hold: bool) -> bool:
     if s.frames_stopped:  # what is believed of a drogue on the probe has run off meanwhile
         return False
-    out_of_view = s.track_lost_s > limits.lost_s and s.frame_age_s <= 0.5 * limits.lost_s
-    if ends_hold:
-        return out_of_view or s.beside_m > limits.rim_m
+    frames_come = s.frame_age_s <= 0.5 * limits.lost_s
+    out_of_view = s.track_lost_s > limits.lost_s and frames_come
+    if ends_hold:  # a belief that runs off the probe unseen says no more than that the drogue is not seen there
+        unseen = s.unusable_s > limits.frames_stop_s and frames_come and is_off_the_probe(limits, s)
+        return out_of_view or unseen or s.beside_m > limits.rim_m
     if not s.light_is_red:
         return False
     if out_of_view:  # since when the receiver may have gone back a little

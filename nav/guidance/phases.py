@@ -123,10 +123,14 @@ def _beside(limits: PhaseLimits, s: Situation) -> bool:
     return s.entered_m > limits.rim_m
 
 
+def is_off_the_probe(limits: PhaseLimits, s: Situation) -> bool:
+    """Whether the coupling is believed to be elsewhere than at the tip."""
+    return abs(s.ahead_m) > limits.come_along_m or s.beside_m > limits.rim_m
+
+
 def _left(limits: PhaseLimits, s: Situation) -> bool:
     """Off the probe, or lost. That the probe pushes it only frames tell; without them the belief passes through it."""
-    off = abs(s.ahead_m) > limits.come_along_m or s.beside_m > limits.rim_m
-    return (off and not s.frames_stopped) or s.track_lost_s > limits.lost_s
+    return (is_off_the_probe(limits, s) and not s.frames_stopped) or s.track_lost_s > limits.lost_s
 
 
 def _far_enough(limits: PhaseLimits, s: Situation) -> bool:

@@ -424,6 +424,22 @@ def test_from_a_drogue_that_went_out_of_view_on_the_probe_it_goes_down_but_not_f
 
 
 @pytest.mark.parametrize("phase", [Phase.CONTACT, Phase.HOLD])
+def test_from_a_drogue_that_leaves_the_view_it_goes_down_though_its_belief_runs_off_ahead_first(phase):
+    """Frames go on to come; to call the track lost takes half a second, the belief is off the probe before that."""
+    guidance = Guidance(SETTINGS, RATE_HZ)
+    guidance.step(state([-DEPTH_M, 0.01, 0.0]))
+    guidance.phase = phase
+    down = []
+    for k in range(2 * RATE_HZ):
+        age_s = k / RATE_HZ
+        now = state([-DEPTH_M + 0.6 * age_s, 0.01, 0.0], usable=age_s <= 0.1, age_s=age_s, frame_age_s=0.0)
+        down.append(guidance.step(now).velocity_m_s[2])
+        if k == int(0.45 * RATE_HZ):
+            assert guidance.phase in (Phase.BACK_OFF, Phase.BREAKAWAY)  # before the track counts as lost
+    assert min(down) < -0.9 * SETTINGS.evade_speed_m_s
+
+
+@pytest.mark.parametrize("phase", [Phase.CONTACT, Phase.HOLD])
 @pytest.mark.parametrize("gap_s", [0.3, 0.42, 0.44, 0.46, 0.48, 0.6])
 @pytest.mark.parametrize("run_off_m", [0.0, 0.35])
 def test_from_a_drogue_on_the_probe_it_goes_straight_back_whenever_the_camera_comes_back(phase, gap_s, run_off_m):
