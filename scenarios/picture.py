@@ -15,7 +15,6 @@ from dockair.scenarios import flight_log, message_log
 
 FILE_NAME = "flight.png"
 FRAME_AT_M = 1.5  # the frame shown is the one with most LEDs named when the ring is about this far ahead of the tip
-_TRACK_S = 0.5  # without a new frame for longer the track has a gap
 _GROW_PX = 3
 _SIZE_IN, _DPI = (11.0, 6.2), 110
 _TRUTH, _BELIEF, _FOUND, _GREY = "#1f77b4", "#ff7f0e", "#34c759", "#9a9a9a"
@@ -207,9 +206,8 @@ def _draw_errors(axes: Any, flight: Any) -> None:
 
 
 def _gone(flight: Any) -> NDArray[np.bool_]:
-    """Return at which ticks there is no track: a line across them would read as drift."""
-    age_s = _values(flight, "time_s") - _values(flight, "nav_frame_time_stamp_s")  # NaN without a camera
-    return np.asarray(~_values(flight, "nav_valid").astype(bool) | (age_s > _TRACK_S))
+    """Return at which ticks no solution may be flown on: a line across them would read as drift."""
+    return np.asarray(~_values(flight, "nav_valid").astype(bool))
 
 
 def _fresh(flight: Any) -> NDArray[np.int64]:

@@ -343,9 +343,7 @@ def test_a_drogue_that_lies_beside_the_probe_has_not_been_refuelled_from(phase):
 @pytest.mark.parametrize(("where", "evades"), [([-DEPTH_M, 0.4, 0.3], True), ([0.2, 0.1, 0.0], False)])
 def test_from_a_drogue_that_came_off_the_probe_sideways_it_goes_down_for_a_moment(phase, usable, where, evades):
     """Back and down, out of the way of a hose that may whip; from one that is ahead it goes straight back."""
-    guidance = Guidance(SETTINGS, RATE_HZ)
-    guidance.step(state([-DEPTH_M, 0.01, 0.0]))
-    guidance.phase = phase
+    guidance = on_the_probe(phase)
     down = np.array([guidance.step(state(where, usable=usable)).velocity_m_s[2] for _ in range(6 * RATE_HZ)])
     assert guidance.phase in (Phase.BACK_OFF, Phase.BREAKAWAY)
     if not evades:
@@ -362,9 +360,7 @@ def test_from_a_drogue_that_came_off_the_probe_sideways_it_goes_down_for_a_momen
     ("where", "after"), [([-DEPTH_M, 0.4, 0.3], Phase.CLEAR), ([0.3, 0.1, 0.0], Phase.PRE_CONTACT)]
 )
 def test_a_hose_that_has_whipped_is_not_tried_again_and_a_drogue_that_slipped_off_ahead_is(phase, where, after):
-    guidance = Guidance(SETTINGS, RATE_HZ)
-    guidance.step(state([-DEPTH_M, 0.01, 0.0]))
-    guidance.phase = phase
+    guidance = on_the_probe(phase)
     guidance.step(state(where))
     assert guidance.phase in (Phase.BACK_OFF, Phase.BREAKAWAY)
     for ahead_m in np.linspace(0.3, 3.5, 4 * RATE_HZ):
@@ -373,6 +369,14 @@ def test_a_hose_that_has_whipped_is_not_tried_again_and_a_drogue_that_slipped_of
             break
     assert guidance.phase is after
     assert (guidance.phase_reason == "hose has whipped") is (after is Phase.CLEAR)
+
+
+def on_the_probe(phase):
+    """Guidance in a phase, the drogue seen where the coupling holds it."""
+    guidance = Guidance(SETTINGS, RATE_HZ)
+    guidance.step(state([-DEPTH_M, 0.01, 0.0]))
+    guidance.phase = phase
+    return guidance
 
 
 def gone_down(where_later, **later):
@@ -410,9 +414,7 @@ def test_from_a_drogue_that_went_out_of_view_on_the_probe_it_goes_down_but_not_f
     phase, frames_come
 ):
     """What is believed of it is still on the probe: a hose that whips takes it out of view within a frame or two."""
-    guidance = Guidance(SETTINGS, RATE_HZ)
-    guidance.step(state([-DEPTH_M, 0.01, 0.0]))
-    guidance.phase = phase
+    guidance = on_the_probe(phase)
     down = []
     for k in range(3 * RATE_HZ):
         age_s = k / RATE_HZ
@@ -426,9 +428,7 @@ def test_from_a_drogue_that_went_out_of_view_on_the_probe_it_goes_down_but_not_f
 @pytest.mark.parametrize("phase", [Phase.CONTACT, Phase.HOLD])
 def test_from_a_drogue_that_leaves_the_view_it_goes_down_though_its_belief_runs_off_ahead_first(phase):
     """Frames go on to come; to call the track lost takes half a second, the belief is off the probe before that."""
-    guidance = Guidance(SETTINGS, RATE_HZ)
-    guidance.step(state([-DEPTH_M, 0.01, 0.0]))
-    guidance.phase = phase
+    guidance = on_the_probe(phase)
     down = []
     for k in range(2 * RATE_HZ):
         age_s = k / RATE_HZ
@@ -444,9 +444,7 @@ def test_from_a_drogue_that_leaves_the_view_it_goes_down_though_its_belief_runs_
 @pytest.mark.parametrize("run_off_m", [0.0, 0.35])
 def test_from_a_drogue_on_the_probe_it_goes_straight_back_whenever_the_camera_comes_back(phase, gap_s, run_off_m):
     """Two frames come before the first that is used; meanwhile the belief may have run off beside the probe."""
-    guidance = Guidance(SETTINGS, RATE_HZ)
-    guidance.step(state([-DEPTH_M, 0.01, 0.0]))
-    guidance.phase = phase
+    guidance = on_the_probe(phase)
     down = []
     for k in range(2 * RATE_HZ):
         age_s = k / RATE_HZ
