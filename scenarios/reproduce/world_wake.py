@@ -47,12 +47,12 @@ class _Tanker:
         self.air, self.sheet = standard_atmosphere(altitude_m), load_parameters("wake", WakeParameters)
         self.body = load_parameters("tanker", TankerParameters)
         self.span_m = self.body.span_m
-        self.gamma = circulation_m2_s(self.sheet, self.body.mass_kg, self.span_m, airspeed_m_s, self.air)
         self.half_m = 0.5 * self.sheet.vortex_span_fraction * self.span_m
         #: the wing's vortices alone, their bound part through the origin, all but without cores
         self.thin = replace(
             self.sheet, bound_m=np.zeros(3), tail_circulation_fraction=0.0, core_fraction=1e-9, core_growth=0.0
         )
+        self.gamma = circulation_m2_s(self.thin, self.body.mass_kg, self.span_m, airspeed_m_s, self.air)
 
     def velocity(self, sheet: WakeParameters, points_T: Array, *, viscous: bool = True) -> Array:
         """(n, 3) velocity in T."""

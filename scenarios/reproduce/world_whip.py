@@ -172,7 +172,7 @@ def _draw(runs: list[Engagement], path: Path) -> None:
     for axes, speed in zip(panels[0], SPEEDS_M_S, strict=True):
         axes.axhline(1e-3 * _WHIP_TENSION * runs[0].static_n, color="black", lw=0.7, ls="--", label="1.5 of static")
         axes.set(title=f"contact at {speed} m/s, stopped over {_STOP_M:.0f} m", xlabel="time since contact [s]")
-        axes.set(xlim=(-0.1, 5.0), ylim=(-3.0, 13.0))
+        axes.set(xlim=(-0.1, 5.0), ylim=(-3.0, 16.0))
         axes.legend(frameon=False, fontsize=8, loc="upper right")
     panels[0, 0].set_ylabel("tension at the exit [kN]")
     figure.savefig(path)

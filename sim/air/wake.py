@@ -1,8 +1,9 @@
 """The tanker's wake: horseshoe vortices of its wing and its tailplane, with Hallock-Burnham cores.
 
-The wing's lift makes a bound vortex on its quarter chord and two trailing legs, a distance b_v apart:
+The wing's lift makes a bound vortex on its quarter chord and two trailing legs, a distance b_v apart; the tailplane's,
+f Gamma with legs b_t apart, is a small one with the sense of a download, f < 0. Both together carry the tanker:
 
-    Gamma = m g / (rho V b_v),      b_v = s b                                                            (1)
+    Gamma = m g / (rho V (b_v + f b_t)),      b_v = s b                                                  (1)
     v     = Gamma/(4 pi) e x d / (h^2 + r_c^2) (cos A + cos B)          for each straight piece             (2)
     r_c^2 = r_0^2 + 4 alpha (nu + a Gamma) t,      alpha = 1.25643,      t = age = (x_b - x)/V              (3)
 
@@ -18,7 +19,7 @@ The legs stand at b_v/2 from the wing on. An elliptic loading sheds a sheet that
 from the tips that come in later would carry too much. `filaments` > 1 divides the sheet into as many nested horseshoes
 of equal strength, at the centroids of their parts of the elliptic sheet: not rolled up at all.
 
-The tailplane's horseshoe is a small one with the sense of a download. Frame: T, axes of the tanker; the air blows
+Frame: T, axes of the tanker; the air blows
 along -x. Not modelled: roll-up, sinking and meandering of the legs, sweep and dihedral of the bound vortex, jets,
 fuselage, the wing's thickness, curvature of the legs in a turn.
 Sources: Eq. (3) Squire 1965 with a of Bhagwat & Leishman 2002; tail as in RflySim/RflySimAAR `TankerVortexWindField.m`.
@@ -48,15 +49,17 @@ class WakeParameters:
     bound_m: Array  #: (3,) middle of the wing's bound vortex
     core_fraction: float  #: r_0 over the span of wing or tailplane
     core_growth: float  #: a
-    tail_circulation_fraction: float  #: of the wing's; negative for a download
-    tail_vortex_span_m: float
+    tail_circulation_fraction: float  #: f, of the wing's; negative for a download
+    tail_vortex_span_m: float  #: b_t
     tail_bound_m: Array  #: (3,) middle of the tailplane's bound vortex
 
 
 def circulation_m2_s(parameters: WakeParameters, mass_kg: float, span_m: float, airspeed_m_s: float, air: Air) -> float:
     """Gamma of the wing in straight level flight, Eq. (1)."""
     lift_n = mass_kg * STANDARD_GRAVITY_M_S2
-    return lift_n / (air.density_kg_m3 * airspeed_m_s * parameters.vortex_span_fraction * span_m)
+    wing_m = parameters.vortex_span_fraction * span_m
+    tail_m = parameters.tail_circulation_fraction * parameters.tail_vortex_span_m
+    return lift_n / (air.density_kg_m3 * airspeed_m_s * (wing_m + tail_m))
 
 
 def wake_coefficients(

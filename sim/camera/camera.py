@@ -3,12 +3,11 @@
     sky and scene in haze ► stray light of the Sun ► its disc ► point sources ► expected electrons
     expected electrons ► electronics ► pixels ► exposure control ► exposure of the next frame
 
-Point sources are the LEDs, their reflections and the Sun's, each spread by `optics` and smeared over the exposure, the
-LEDs by the motion of what they sit on. An LED is hidden when something lies between it and the lens.
+Point sources are the LEDs, their reflections and the Sun's, each spread by `optics` and smeared over the exposure by
+the motion of what they sit on. An LED is hidden when something lies between it and the lens.
 
 Time: `expose` is called with the world at the middle of the exposure; the frame arrives `latency_s` later.
-Not modelled: motion of background and Sun during an exposure; glints move as if
-at rest beside the tanker.
+Not modelled: motion of background and Sun during an exposure.
 """
 
 from dataclasses import replace

@@ -47,16 +47,17 @@ def ellipsoid_spots(
             if found and abs(n[balls.thin[i]]) <= balls.most_cos[i]:
                 out = spots[count]
                 _write(out, _add(at, 1.0, _out_of(M, p)), _out_of(M, n), _out_of(M, t1), _out_of(M, t2), c)
-                out[19], out[20], out[21] = balls.material[i], _SKIN_M, j
+                out[19], out[20], out[21], out[22] = balls.material[i], _SKIN_M, j, g
                 count += 1
     return count
 
 
 @njit(cache=True)
-def rim_spots(
-    torus: Torus, material: float, skin: float, lights: Array, point: float, eye: Vector, spots: Array
-) -> int:
-    """Fill rows with up to two mirror points a light on a torus; the other arguments as of `round_spots`."""
+def rim_spots(torus: Torus, labels: Vector, lights: Array, point: float, eye: Vector, spots: Array) -> int:
+    """Fill rows with up to two mirror points a light on a torus, its material, skin and geom in `labels`.
+
+    The other arguments as of `round_spots`.
+    """
     centre, axis, radius, tube = torus
     count = 0
     for j in range(len(lights)):
@@ -67,7 +68,7 @@ def rim_spots(
                 out = spots[count]
                 _write(out, p, n, t1, t2, c)
                 out[15], out[16] = -radius, radius  # an arc of 1 rad to either side: further on it turns away
-                out[19], out[20], out[21] = material, skin, j
+                out[19], out[20], out[21], out[22] = labels[0], labels[1], j, labels[2]
                 count += 1
     return count
 

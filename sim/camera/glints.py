@@ -24,7 +24,7 @@ from dockair.rotations import Array
 from dockair.sim.camera.curved_mirrors import ellipsoid_spots, rim_spots
 from dockair.sim.camera.facets import facets_that_may_shine
 from dockair.sim.camera.lobes import ROW, SPOT, facet_rows, spot_rows
-from dockair.sim.camera.mirrors import METAL, Mirrors, Vector, finishes, vector
+from dockair.sim.camera.mirrors import Mirrors, Vector, finishes, vector
 from dockair.sim.camera.obstacles import Obstacles
 from dockair.sim.camera.occlusion import first_hits, is_clear
 from dockair.sim.camera.round_mirrors import round_spots
@@ -137,7 +137,7 @@ def glint_rows(
     if mirrors.any_ellipsoids:
         n += ellipsoid_spots(balls, xpos, xmat, sun, 0.0, eye, spots[n:])
     if mirrors.rim is not None:
-        n += rim_spots(mirrors.rim.torus_W(data), float(METAL), mirrors.rim.skin_m, sun, 0.0, eye, spots[n:])
+        n += rim_spots(mirrors.rim.torus_W(data), mirrors.rim.labels, sun, 0.0, eye, spots[n:])
     rows = np.empty((_MOST, ROW))
     count = spot_rows(spots[:n], sun, 0.0, variance, eye, finish, limits, rows, 0)
     poses, facets, s = (xpos, xmat), mirrors.facets, vector(s_W)

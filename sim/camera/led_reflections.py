@@ -26,7 +26,7 @@ from dockair.rotations import Array
 from dockair.sim.camera.curved_mirrors import ellipsoid_spots, rim_spots
 from dockair.sim.camera.glints import starts_of_seen
 from dockair.sim.camera.lobes import ROW, SPOT, Poses, spot_rows
-from dockair.sim.camera.mirrors import METAL, Balls, Mirrors, Tubes, Vector, finishes, vector
+from dockair.sim.camera.mirrors import Balls, Mirrors, Tubes, Vector, finishes, vector
 from dockair.sim.camera.obstacles import Obstacles
 from dockair.sim.camera.occlusion import is_clear
 from dockair.sim.camera.round_mirrors import round_spots
@@ -230,7 +230,7 @@ def _rows(
     if mirrors.any_ellipsoids:
         n += ellipsoid_spots(balls, xpos, xmat, leds_W, 1.0, eye, spots[n:])
     if mirrors.rim is not None:
-        n += rim_spots(mirrors.rim.torus_W(data), float(METAL), mirrors.rim.skin_m, leds_W, 1.0, eye, spots[n:])
+        n += rim_spots(mirrors.rim.torus_W(data), mirrors.rim.labels, leds_W, 1.0, eye, spots[n:])
     limits = (math.cos(surfaces.grazing_rad), 0.0, 0.0, math.inf)
     rows = np.empty((n, ROW))
     return rows[: spot_rows(spots[:n], leds_W, 1.0, 0.0, eye, finish, limits, rows, 0)]

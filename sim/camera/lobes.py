@@ -34,8 +34,8 @@ from numpy.typing import NDArray
 from dockair.rotations import Array
 from dockair.sim.camera.mirrors import Facets
 
-SPOT = 22  #: columns: p, n, t1, t2 (3 each), C11 C12 C22, bounds of x1 and of x2 (4), material, skin, which light
-ROW = 10  #: columns: p (3), n (3), A, size, skin, which light
+SPOT = 23  #: columns: p, n, t1, t2 (3 each), C11 C12 C22, bounds of x1 and of x2 (4), material, skin, light, geom
+ROW = 11  #: columns: p (3), n (3), A, size, skin, which light, geom
 _SKIN_M = 1e-3  # a ray that starts on a surface starts this far off it
 _STEEPEST = 0.5  # h.n below which no facet of a rough surface stands that way
 _MOST_PIECES = 48  # of a streak: 60 px long in as many points as make it look whole
@@ -108,7 +108,7 @@ def _pieces(spot: Spot, box: Box, lamp: Lamp, limits: Limits, lobe: Lobe, row: A
         high = box[1] if k == pieces - 1 else first + (k + 1) / pieces * (last - first)
         part = _lobe(spot, (low, high, box[2], box[3]), light, eye, finish, limits[0]) if pieces > 1 else lobe
         if part[0] > 0.0 and count < len(rows):
-            _write(rows[count], spot, part, row[20], row[21])
+            _write(rows[count], spot, part, (row[20], row[21], row[22]))
             count += 1
     return count
 
@@ -138,14 +138,14 @@ def facet_rows(
         spot, box = _nearer(spot, box, light, eye)  # where it is bright, Eq. (2)'s linear map is better
         lobe = _lobe(spot, box, light, eye, finish, limits[0])
         if lobe[0] > 0.0 and lobe[0] >= limits[1] and lobe[1] >= limits[2] and count < len(rows):
-            _write(rows[count], spot, lobe, _SKIN_M, 0.0)
+            _write(rows[count], spot, lobe, (_SKIN_M, 0.0, float(g)))
             count += 1
     return count
 
 
 @njit(cache=True)
-def _write(row: Array, spot: Spot, lobe: Lobe, skin: float, j: float) -> None:
-    """The patch's middle, put back onto the surface to second order in x, and its normal there."""
+def _write(row: Array, spot: Spot, lobe: Lobe, labels: Vector) -> None:
+    """The patch's middle, put back onto the surface to second order in x, its normal there; skin, light and geom."""
     p, n, t1, t2, c = spot
     area, _, x1, x2, var1, _, var2 = lobe
     m1, m2 = c[0] * x1 + c[1] * x2, c[1] * x1 + c[2] * x2
@@ -153,7 +153,8 @@ def _write(row: Array, spot: Spot, lobe: Lobe, skin: float, j: float) -> None:
     normal, _ = _unit(_add(_add(n, m1, t1), m2, t2))
     for k in range(3):
         row[k], row[3 + k] = middle[k], normal[k]
-    row[6], row[7], row[8], row[9] = area, math.sqrt(6.0 * (var1 + var2)), skin, j
+    row[6], row[7] = area, math.sqrt(6.0 * (var1 + var2))
+    row[8], row[9], row[10] = labels
 
 
 @njit(cache=True)

@@ -77,10 +77,16 @@ class Rim:
     """The basket's rim as a torus about its body's x axis."""
 
     body: int
+    geom: int  #: the first of the pieces that are drawn
     centre_x_m: float
     radius_m: float
     tube_radius_m: float
     skin_m: float  #: how far the straight pieces that are drawn stick out of the torus, and a ray's skin
+
+    @property
+    def labels(self) -> Vector:
+        """Material, skin and geom, as `curved_mirrors` takes them."""
+        return float(METAL), self.skin_m, float(self.geom)
 
     def torus_W(self, data: mujoco.MjData) -> tuple[Vector, Vector, float, float]:
         """Centre, axis and the two radii in W, as `curved_mirrors` takes them."""
@@ -169,6 +175,7 @@ def rim_of(model: mujoco.MjModel) -> Rim | None:
     radius = float(np.hypot(chord, model.geom_size[pieces, 1]).mean())
     return Rim(
         body=int(model.geom_bodyid[pieces[0]]),
+        geom=pieces[0],
         centre_x_m=float(middle[:, 0].mean()),
         radius_m=radius,
         tube_radius_m=float(model.geom_size[pieces, 0].mean()),

@@ -4,10 +4,10 @@ A point r of a body moves past the lens, in camera axes, at
 
     v_C = R_CW (v_r - v_lens) - w_C x p_C                                                                        (1)
 
-and during the exposure by v_C t_exp. A glint is taken to stick to its place: only the camera's own turn and motion move
-it.
+and during the exposure by v_C t_exp. A glint, and an LED's reflection, moves as the body's point that it is on.
 
-Not modelled: the way of a glint over its surface; what hides an LED in a part of the exposure.
+Not modelled: the way of a glint over its surface as body, light and lens turn; what hides an LED in a part of the
+exposure.
 """
 
 import math
@@ -48,7 +48,7 @@ class Sources:
     electrons: Array  #: (n,) of each whole blob
     size_m: Array  #: (n,) side of the source
     way_C_m: Array  #: (n, 3) motion during the exposure
-    patches_W: Array  #: (n, ROW) as of `lobes`; the last column which LED a mirror shows, or _SUN
+    patches_W: Array  #: (n, ROW) as of `lobes`; its light which LED a mirror shows, or _SUN
 
 
 class PointSources:
@@ -74,9 +74,9 @@ class PointSources:
     ) -> None:
         self._model, self._sheets, self._as_built, self._response = model, sheets, as_built, response
         self._sun, self._extinction_1_m = sun, extinction_1_m
-        self._bodies = model.body("receiver").id, model.body("drogue").id
-        self._roots = model.body_rootid[self._bodies[0]], model.body_rootid[self._bodies[1]]
-        self._drogue, self._count = self._bodies[1], len(as_built.led_intensity_w_sr)
+        self._camera, self._drogue = model.body("receiver").id, model.body("drogue").id
+        self._led_geom = int(np.flatnonzero(model.geom_bodyid == self._drogue)[0])
+        self._trees, self._count = (model.geom_bodyid, model.body_rootid), len(as_built.led_intensity_w_sr)
         self._mirrors, self._obstacles = Mirrors.of(model), Obstacles.of(model)
 
     def of(self, data: mujoco.MjData, pose: tuple[Array, Array], exposure_s: float, led_factors: Array) -> Sources:
@@ -112,17 +112,16 @@ class PointSources:
         all_light = self._response.led_e_m2_sr_w_s, self._response.glint_e_m2_s * beam
         total = count + len(reflections) + len(glints)
         patches, electrons, sizes = np.empty((total, ROW)), np.empty(total), np.empty(total)
-        own = leds_W, leds.die_size_m, leds.occlusion_clearance_m
+        own = leds_W, leds.die_size_m, leds.occlusion_clearance_m, self._led_geom
         _join(own, (reflections, intensity_w_sr), glints, all_light, patches, electrons, sizes)
         p_C = (patches[:, :3] - p_WC) @ R_WC
         electrons[:count] = led_electrons(
             self._response, leds, intensity, p_C[:count], axis_W @ R_WC, 1.0, self._extinction_1_m
         )
-        (receiver, drogue), roots, ways = self._bodies, self._roots, np.empty_like(p_C)
-        twists, centres = data.cvel, data.subtree_com
-        flight, tow = (twists[receiver], centres[roots[0]]), (twists[drogue], centres[roots[1]])
-        lens = self._extinction_1_m, f_px
-        _as_received(p_C, count, lens, exposure_s, pose, flight, tow, electrons, sizes, ways)
+        lens, ways = (self._extinction_1_m, f_px), np.empty_like(p_C)
+        _as_received(p_C, count, lens, exposure_s, electrons, sizes)
+        motion = data.cvel, data.subtree_com, *self._trees
+        _ways(patches[:, :3], patches[:, 10], R_WC, motion, self._camera, exposure_s, ways)
         return Sources(p_C=p_C, electrons=electrons, size_m=sizes, way_C_m=ways, patches_W=patches)
 
     def are_seen(
@@ -163,32 +162,26 @@ class PointSources:
         return reflections, intensity_w_sr, glints
 
 
-#: Angular and linear velocity (6,) in W, and the point (3,) whose the linear one is: MuJoCo's is the tree's centre.
-Twist = tuple[Array, Array]
+#: Twists (nbody, 6) about their trees' centres (nbody, 3) [MuJoCo: cvel, subtree_com]; body of a geom, tree of a body.
+Motion = tuple[Array, Array, NDArray[np.int32], NDArray[np.int32]]
 
 
 @njit(cache=True)
-def _velocity(twist: Twist, p: Vector) -> Vector:
+def _velocity(motion: Motion, body: int, p: Vector) -> Vector:
     """Of a body's point, in W [m/s]."""
-    v, at = twist
+    twists, centres, _, trees = motion
+    v, at = twists[body], centres[trees[body]]
     x, y, z = p[0] - at[0], p[1] - at[1], p[2] - at[2]
     return v[3] + v[1] * z - v[2] * y, v[4] + v[2] * x - v[0] * z, v[5] + v[0] * y - v[1] * x
 
 
 @njit(cache=True)
-def _ways(
-    p_C: Array, pose: tuple[Array, Array], camera: Twist, leds: Twist, count: int, exposure_s: float, out: Array
-) -> None:
-    """Fill (n, 3) Eq. (1) times the exposure; the first `count` points move with the LEDs' body, the others rest."""
-    R, lens = pose
-    for i in range(len(p_C)):
-        p = (
-            lens[0] + R[0, 0] * p_C[i, 0] + R[0, 1] * p_C[i, 1] + R[0, 2] * p_C[i, 2],
-            lens[1] + R[1, 0] * p_C[i, 0] + R[1, 1] * p_C[i, 1] + R[1, 2] * p_C[i, 2],
-            lens[2] + R[2, 0] * p_C[i, 0] + R[2, 1] * p_C[i, 1] + R[2, 2] * p_C[i, 2],
-        )
-        past = _velocity(camera, p)  # of the camera's body, drawn on to the point: v_lens + w x p
-        own = _velocity(leds, p) if i < count else (0.0, 0.0, 0.0)
+def _ways(places_W: Array, geoms: Array, R: Array, motion: Motion, camera: int, exposure_s: float, out: Array) -> None:
+    """Fill (n, 3) Eq. (1) times the exposure for points (n, 3) of geoms (n,); R is R_WC, `camera` the body it is on."""
+    for i in range(len(places_W)):
+        p = (places_W[i, 0], places_W[i, 1], places_W[i, 2])
+        past = _velocity(motion, camera, p)  # of the camera's body, drawn on to the point: v_lens + w x p
+        own = _velocity(motion, motion[2][int(geoms[i])], p)
         for k in range(3):
             v = R[0, k] * (own[0] - past[0]) + R[1, k] * (own[1] - past[1]) + R[2, k] * (own[2] - past[2])
             out[i, k] = exposure_s * v
@@ -196,7 +189,7 @@ def _ways(
 
 @njit(cache=True)
 def _join(
-    leds: tuple[Array, float, float],
+    leds: tuple[Array, float, float, int],
     reflections: tuple[Array, Array],
     glints: Array,
     light: tuple[float, float],
@@ -207,7 +200,7 @@ def _join(
     """Fill patches, electrons per second times m^2, and sizes: of LEDs (no electrons), their reflections, the Sun's.
 
     Args:
-        leds: (k, 3) places, size of a die, how near to one nothing hides it.
+        leds: (k, 3) places, size of a die, how near to one nothing hides it, a geom of their body.
         reflections: (n, ROW) patches and (n,) intensities [W/sr].
         glints: (m, ROW).
         light: electrons per m^2 and W/sr of an LED, per m^2 of a glint.
@@ -215,10 +208,10 @@ def _join(
         electrons: (k + n + m,), written.
         size_m: (k + n + m,), written.
     """
-    (leds_W, die_m, clearance_m), (mirrored, intensity_w_sr) = leds, reflections
+    (leds_W, die_m, clearance_m, geom), (mirrored, intensity_w_sr) = leds, reflections
     k, n = len(leds_W), len(leds_W) + len(mirrored)
     patches[:k], size_m[:k] = 0.0, die_m
-    patches[:k, :3], patches[:k, 8] = leds_W, clearance_m
+    patches[:k, :3], patches[:k, 8], patches[:k, 10] = leds_W, clearance_m, geom
     patches[k:n], electrons[k:n], size_m[k:n] = mirrored, light[0] * intensity_w_sr, 0.0
     patches[n:], electrons[n:], size_m[n:] = glints, light[1] * glints[:, 6], glints[:, 7]
     patches[n:, 9] = _SUN
@@ -261,22 +254,16 @@ def _as_received(
     leds: int,
     lens: tuple[float, float],
     exposure_s: float,
-    pose: tuple[Array, Array],
-    flight: Twist,
-    tow: Twist,
     electrons: Array,
     size_m: Array,
-    ways_C_m: Array,
 ) -> None:
     """Turn (n,) electrons per second, of what mirrors times m^2, into electrons, and round its (n,) sizes, in place.
 
     What mirrors comes after the LEDs. Its light falls with cos t/r^2 and what is left of it on its way; its sizes go
     to powers of two of a millimetre, so that few spread functions serve all. Patches under half a pixel are points;
-    those from WIDE_PX on keep their size, for they are drawn without the lens. Also fill the ways (n, 3), `_ways`.
-    `lens` is extinction and focal length.
+    those from WIDE_PX on keep their size, for they are drawn without the lens. `lens` is extinction and focal length.
     """
     extinction_1_m, focal_length_px = lens
-    _ways(p_C, pose, flight, tow, leds, exposure_s, ways_C_m)
     electrons[:leds] *= exposure_s
     for i in range(leds, len(p_C)):
         x = p_C[i, 0]

@@ -76,7 +76,7 @@ def round_spots(
             found, n = _on_ball(centre, z, balls.side[i], radius, toward, point, eye)
             if found:
                 p, (t1, t2), c, endless = _add(centre, radius, n), _frame(n), 1.0 / radius, (-_EVERYWHERE, _EVERYWHERE)
-                _write(spots, count, (p, n, t1, t2), (c, c), endless, balls.material[i], j)
+                _write(spots, count, (p, n, t1, t2), (c, c), endless, (balls.material[i], j, g))
                 count += 1
         for i in range(len(tubes.geom)):
             if not wanted[j, len(balls.geom) + i]:
@@ -89,7 +89,7 @@ def round_spots(
             found, n, x = _on_tube(centre, axis, radius, half, toward, point, eye)
             if found:
                 p, bounds = _add(_add(centre, x, axis), radius, n), (-half - x, half - x)
-                _write(spots, count, (p, n, axis, _cross(axis, n)), (0.0, 1.0 / radius), bounds, material, j)
+                _write(spots, count, (p, n, axis, _cross(axis, n)), (0.0, 1.0 / radius), bounds, (material, j, g))
                 count += 1
     return count
 
@@ -126,16 +126,15 @@ def _write(
     place: tuple[Vector, Vector, Vector, Vector],
     curvature: tuple[float, float],
     bounds: tuple[float, float],
-    material: int,
-    light: int,
+    labels: tuple[int, int, int],
 ) -> None:
-    """Fill row `at`; `place` are point, normal and tangents."""
+    """Fill row `at`; `place` are point, normal and tangents, `labels` material, light and geom."""
     row, (p, n, t1, t2) = spots[at], place
     for k in range(3):
         row[k], row[3 + k], row[6 + k], row[9 + k] = p[k], n[k], t1[k], t2[k]
     row[12], row[13], row[14] = curvature[0], 0.0, curvature[1]
     row[15], row[16], row[17], row[18] = bounds[0], bounds[1], -_EVERYWHERE, _EVERYWHERE
-    row[19], row[20], row[21] = material, _SKIN_M, light
+    row[19], row[20], row[21], row[22] = labels[0], _SKIN_M, labels[1], labels[2]
 
 
 @njit(cache=True)

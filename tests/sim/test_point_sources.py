@@ -15,6 +15,7 @@ from dockair.sim.camera.radiometry import Responses, extinction_1_m, responses
 from dockair.sim.camera.sheets import CameraSheets
 from dockair.sim.camera.sky import Sky
 from dockair.sim.camera.sky_radiance import SkyRadiance
+from dockair.sim.camera.solids import VISIBLE_GROUPS
 from dockair.sim.camera.sun_view import SunView
 from dockair.sim.camera.weather import Weather
 
@@ -127,7 +128,7 @@ def test_a_patch_is_dark_in_the_batch_when_a_box_stands_between_it_and_its_light
 
 
 def test_the_way_in_an_exposure_is_the_difference_of_places_moved_by_hand(small_world: Any) -> None:
-    """Both bodies fly and turn; LEDs move with the drogue, mirrored light stays where it is in W."""
+    """Both bodies fly and turn; LEDs move with the drogue, mirrored light as the places of the bodies it is on."""
     world = _placed(small_world)
     model, data, sources = world.model, world.data, _sources_of(world)
     rng = np.random.default_rng(2)
@@ -136,7 +137,10 @@ def test_the_way_in_an_exposure_is_the_difference_of_places_moved_by_hand(small_
     found = _seen(world, sources)
     assert len(found.p_C) > LEDS
     R_WC, p_WC = _pose(world, data)
-    mirrored_W = p_WC + found.p_C[LEDS:] @ R_WC.T
+    bodies = model.geom_bodyid[found.patches_W[LEDS:, 10].astype(int)]
+    assert len(set(bodies)) > 1
+    R_WB, mirrored_W = data.xmat[bodies].reshape(-1, 3, 3), p_WC + found.p_C[LEDS:] @ R_WC.T
+    mirrored_B = np.einsum("nji,nj->ni", R_WB, mirrored_W - data.xpos[bodies])
     dt, ends = 1e-4, []
     for half in (-0.5 * dt, 0.5 * dt):
         moved = mujoco.MjData(model)
@@ -145,10 +149,23 @@ def test_the_way_in_an_exposure_is_the_difference_of_places_moved_by_hand(small_
         moved.qpos[:] = qpos
         mujoco.mj_forward(model, moved)
         R, p = _pose(world, moved)
-        ends.append((np.vstack([sources.leds_W(moved), mirrored_W]) - p) @ R)
+        carried_W = moved.xpos[bodies] + np.einsum("nij,nj->ni", moved.xmat[bodies].reshape(-1, 3, 3), mirrored_B)
+        ends.append((np.vstack([sources.leds_W(moved), carried_W]) - p) @ R)
     by_hand = (ends[1] - ends[0]) / dt * EXPOSURE_S
     assert np.abs(by_hand).max() > 1e-5
     np.testing.assert_allclose(found.way_C_m, by_hand, rtol=0.0, atol=1e-6 * np.abs(by_hand).max())
+
+
+def test_mirrored_light_is_of_the_body_that_a_ray_from_the_lens_meets_there(small_world: Any) -> None:
+    world = _placed(small_world)
+    model, data, (_, p_WC) = world.model, world.data, _pose(world, world.data)
+    found, met, groups = _seen(world, _sources_of(world)), np.zeros(1, np.int32), np.array(VISIBLE_GROUPS, np.uint8)
+    of = [int(model.geom_bodyid[int(g)]) for g in found.patches_W[LEDS:, 10]]
+    for body, patch in zip(of, found.patches_W[LEDS:], strict=True):
+        way = patch[:3] - p_WC
+        mujoco.mj_ray(model, data, p_WC, way / np.linalg.norm(way), groups, 1, -1, met)
+        assert int(model.geom_bodyid[met[0]]) == body
+    assert len(set(of)) > 1
 
 
 def test_patches_are_points_below_half_a_pixel_and_whole_octaves_of_a_millimetre_above(small_world: Any) -> None:
