@@ -2,7 +2,9 @@
 
 A drogue that comes off the probe sideways, or out of a view that frames go on to give, is on such a hose: as the phase
 ends in which the probe was held or, where the pod's light is red, on the way back from it, before the drogue is ahead
-of the tip. On the way back before an amber light it is pulled off, and gusts may take it aside as it goes. Where the
+of the tip. So is one that has come off the probe by itself and goes out of view before it is seen ahead: it may be
+thrown aside within a frame or two of being believed ahead. On the way back before an amber light it is pulled off, and
+gusts may take it aside as it goes. Where the
 camera itself stopped it may still be on the probe, and the receiver goes straight back. A hose that has whipped once is
 not tried again (`phases`): nothing says that it will not do so again.
 
@@ -26,7 +28,7 @@ class Evasion:
 
     def __init__(self, settings: GuidanceSettings, step_s: float) -> None:
         self._limits, self._lasts_s, self._step_s = settings.limits, settings.evade_s, step_s
-        self._was_held, self._left_s = False, 0.0
+        self._was_held, self._slipped_off, self._left_s = False, False, 0.0
         self.hose_has_whipped = False  #: once, ever
 
     def step(self, before: Phase, phase: Phase, situation: Situation) -> bool:
@@ -42,20 +44,31 @@ class Evasion:
             return False
         ends_hold = before in _ON_PROBE
         self._was_held = self._was_held or ends_hold
+        slips_off = is_off_the_probe(self._limits, situation)
+        self._slipped_off = slips_off if ends_hold else self._slipped_off and not _is_seen_ahead(situation)
         self._left_s = max(self._left_s - self._step_s, 0.0)
-        if self._was_held and _comes_off_aside(self._limits, situation, ends_hold=ends_hold):
+        slipped_unseen = self._slipped_off and _is_unseen(self._limits, situation)
+        if self._was_held and (slipped_unseen or _comes_off_aside(self._limits, situation, ends_hold=ends_hold)):
             self._was_held, self._left_s, self.hose_has_whipped = False, self._lasts_s, True
         return self._left_s > 0.0
+
+
+def _is_seen_ahead(s: Situation) -> bool:
+    return s.unusable_s == 0.0 and s.ring_ahead_m > 0.0
+
+
+def _is_unseen(limits: PhaseLimits, s: Situation) -> bool:
+    """Out of the view of frames that come; where none come, what is believed of a drogue on the probe has run off."""
+    frames_come = not s.frames_stopped and s.frame_age_s <= 0.5 * limits.lost_s
+    return frames_come and s.unusable_s > limits.frames_stop_s
 
 
 def _comes_off_aside(limits: PhaseLimits, s: Situation, *, ends_hold: bool) -> bool:
     if s.frames_stopped:  # what is believed of a drogue on the probe has run off meanwhile
         return False
-    frames_come = s.frame_age_s <= 0.5 * limits.lost_s
-    out_of_view = s.track_lost_s > limits.lost_s and frames_come
-    if ends_hold:  # a belief that runs off the probe unseen says no more than that the drogue is not seen there
-        unseen = s.unusable_s > limits.frames_stop_s and frames_come and is_off_the_probe(limits, s)
-        return out_of_view or unseen or s.beside_m > limits.rim_m
+    out_of_view = s.track_lost_s > limits.lost_s and s.frame_age_s <= 0.5 * limits.lost_s
+    if ends_hold:
+        return out_of_view or s.beside_m > limits.rim_m
     if not s.light_is_red:
         return False
     if out_of_view:  # since when the receiver may have gone back a little
