@@ -52,19 +52,19 @@ class SwingSettings:
     modes: tuple[HoseMode, ...] = (
         HoseMode(
             frequency_hz=(0.45, 0.345, 0.432),
-            damping=(0.27, 0.073, 0.176),
+            damping=(0.27, 0.072, 0.176),
             gust_density=(1.0, 0.896, 2.797),
             felt_share=(0.0, 0.0, -0.651),
         ),
         HoseMode(
             frequency_hz=(0.9, 0.864, 0.901),
-            damping=(0.5, 0.03, 0.027),
+            damping=(0.5, 0.028, 0.027),
             gust_density=(0.0, -0.208, -2.001),
             felt_share=(0.0, 0.0, -0.117),
         ),
         HoseMode(
             frequency_hz=(1.5, 1.497, 1.517),
-            damping=(0.5, 0.023, 0.058),
+            damping=(0.5, 0.016, 0.058),
             gust_density=(0.0, 0.127, -0.697),
             felt_share=(0.0, 0.0, 0.428),
         ),
