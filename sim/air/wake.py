@@ -19,9 +19,8 @@ The legs stand at b_v/2 from the wing on. An elliptic loading sheds a sheet that
 from the tips that come in later would carry too much. `filaments` > 1 divides the sheet into as many nested horseshoes
 of equal strength, at the centroids of their parts of the elliptic sheet: not rolled up at all.
 
-Frame: T, axes of the tanker; the air blows
-along -x. Not modelled: roll-up, sinking and meandering of the legs, sweep and dihedral of the bound vortex, jets,
-fuselage, the wing's thickness, curvature of the legs in a turn.
+Frame: T, axes of the tanker; the air blows along -x. Not modelled: roll-up, sinking and meandering of the legs, sweep
+and dihedral of the bound vortex, jets, fuselage, the wing's thickness, curvature of the legs in a turn.
 Sources: Eq. (3) Squire 1965 with a of Bhagwat & Leishman 2002; tail as in RflySim/RflySimAAR `TankerVortexWindField.m`.
 """
 

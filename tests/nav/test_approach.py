@@ -340,18 +340,22 @@ def test_a_drogue_that_lies_beside_the_probe_has_not_been_refuelled_from(phase):
 
 @pytest.mark.parametrize("phase", [Phase.CONTACT, Phase.HOLD])
 @pytest.mark.parametrize(
-    ("where", "usable", "evades"),
+    ("where", "usable", "frame_age_s", "evades"),
     [
-        ([-DEPTH_M, 0.4, 0.3], True, True),
-        ([-DEPTH_M, 0.4, 0.3], False, True),
-        ([0.2, 0.1, 0.0], True, False),
-        ([0.2, 0.1, 0.0], False, True),
+        ([-DEPTH_M, 0.4, 0.3], True, 0.0, True),
+        ([-DEPTH_M, 0.4, 0.3], False, 0.0, True),
+        ([-DEPTH_M, 0.4, 0.3], False, np.inf, True),
+        ([0.2, 0.1, 0.0], True, 0.0, False),
+        ([0.2, 0.1, 0.0], False, 0.0, True),
+        ([0.2, 0.1, 0.0], False, np.inf, False),  # nobody says whether frames come
     ],
 )
-def test_from_a_drogue_that_came_off_the_probe_sideways_it_goes_down_for_a_moment(phase, where, usable, evades):
+def test_from_a_drogue_that_came_off_the_probe_sideways_it_goes_down_for_a_moment(
+    phase, where, usable, frame_age_s, evades
+):
     """Back and down, out of the way of a hose that may whip; from one that is seen ahead it goes straight back."""
     guidance = on_the_probe(phase)
-    now = state(where, usable=usable, frame_age_s=0.0)
+    now = state(where, usable=usable, frame_age_s=frame_age_s)
     down = np.array([guidance.step(now).velocity_m_s[2] for _ in range(6 * RATE_HZ)])
     assert guidance.phase in (Phase.BACK_OFF, Phase.BREAKAWAY)
     if not evades:
