@@ -20,6 +20,7 @@ from dockair.nav.contact_watch import ContactWatch
 from dockair.nav.frame_checks import FrameChecks, with_numbers
 from dockair.nav.fusion import FusionSettings, RelativeFilter
 from dockair.nav.guidance.approach import Guidance, GuidanceSettings, RelativeState
+from dockair.nav.guidance.field_of_view import FieldOfView
 from dockair.nav.guidance.phases import Phase
 from dockair.nav.heading.own_heading import OwnHeading, OwnHeadingSettings
 from dockair.nav.identify.code import CodeSettings, code_of
@@ -96,7 +97,8 @@ class Navigator:
         )  # fmt: skip
         mounting = sheets.mounting
         self._tip = TipMotion(mounting.p_BP - mounting.p_BI, self._settings.tip_levelling_s)
-        self._guidance = Guidance(self._settings.guidance, sheets.control_rate_hz)
+        field_of_view = FieldOfView(sheets.camera, mounting)
+        self._guidance = Guidance(self._settings.guidance, sheets.control_rate_hz, field_of_view)
         self._heading = None if self._settings.heading is None else OwnHeading(sheets, self._settings.heading)
         self._checks = FrameChecks(1.0 / sheets.camera_rate_hz, buffer_s)
         self._points_D = sheets.ring.positions_D
@@ -106,6 +108,7 @@ class Navigator:
         self._felt_time_s = 0.0
         self._contact = ContactWatch(sheets, self._filter, self._settings.contact, self._settings.coasting)
         self._status = self._finder.status
+        self._not_shown = False
         self._candidates_px: Array = np.empty((0, 2))
         self._led_pixels_px: Array = np.full((len(self._points_D), 2), np.nan)
 
@@ -164,9 +167,15 @@ class Navigator:
         else:
             seen = with_numbers(frame)
             self._candidates_px = seen.centroids_px
+        self._not_shown = self._shows_no_ring(frame)
         if lost and len(seen.led_numbers) >= _POSE_LEDS:
             self._begin_again(seen)
         return self._use(seen) if len(seen.led_numbers) else self._nothing(nothing)
+
+    def _shows_no_ring(self, frame: CameraFrame | LedObservation) -> bool:
+        """Whether a frame is of the whole field, and shows fewer spots than a ring is found by."""
+        whole = not isinstance(frame, CameraFrame) or frame.window == self._sheets.camera.full_window
+        return whole and len(self._candidates_px) < _POSE_LEDS
 
     def _begin_again(self, seen: LedObservation) -> None:
         """Believe the drogue to be where LEDs show it, whatever was believed while it was lost."""
@@ -290,6 +299,7 @@ class Navigator:
                 dv_WP_B=self._felt_change(w_WB_B),
                 sigma_lateral_m=sigma_lateral_m,
                 age_s=aged_s,
+                not_shown=self._not_shown,
                 frame_age_s=self._time_s - self._looked_time_s,
             )
         )

@@ -31,6 +31,7 @@ from dockair.nav.guidance.command_limits import CommandLimits
 from dockair.nav.guidance.controller import Controller, Sight, Wanted
 from dockair.nav.guidance.dead_reckoning import DeadReckoning
 from dockair.nav.guidance.evasion import Evasion
+from dockair.nav.guidance.field_of_view import FieldOfView
 from dockair.nav.guidance.guidance_settings import GuidanceSettings, RelativeState
 from dockair.nav.guidance.phase_clocks import PhaseClocks
 from dockair.nav.guidance.phases import Phase, PhaseLimits, Situation, next_phase
@@ -49,9 +50,15 @@ _EVADE_GAIN_1_S = 4.0  # as quickly as the limits allow
 
 
 class Guidance:
-    """Phase and command, one control tick at a time."""
+    """Phase and command, one control tick at a time.
 
-    def __init__(self, settings: GuidanceSettings, control_rate_hz: int) -> None:
+    Args:
+        settings: gains, speeds and limits.
+        control_rate_hz: of the ticks.
+        field: the camera's; None where what frames do not show says nothing.
+    """
+
+    def __init__(self, settings: GuidanceSettings, control_rate_hz: int, field: FieldOfView | None = None) -> None:
         self._settings, self._dt = settings, 1.0 / control_rate_hz
         self.phase, self.phase_reason = Phase.JOIN_UP, ""
         self._axes = StabilisedAxes(settings.levelling_s, self._dt)
@@ -65,7 +72,7 @@ class Guidance:
         self._turned: Array = np.zeros((2, 3))  # n x p and its rate
         self._commanded: Array = np.zeros(3)  # Eq. (1)
         self._aim: Array = np.zeros(2)
-        self._reckoning = DeadReckoning(settings, self._dt)
+        self._reckoning = DeadReckoning(settings, self._dt, field)
         self._passed: Array | None = None  # where the ring was when the tip last came to its plane, left and up
         self._entered_m = 0.0  # how far off when the tip last came past it
         self._station = np.array([settings.stand_off_m, 0.0, 0.0])
@@ -97,9 +104,7 @@ class Guidance:
         if self._path.is_announced:
             self._follow_path(state, ring, rate)
         self._observe(state, ring, rate)
-        middle = self._controller.middle_m if state.usable else None
-        bearable = self._controller.bears_the_gusts
-        self._reckoning.step(middle, self._controller.steady_drift_m_s, self._u, bearable=bearable)
+        self._reckon(state, ring)
         self._count(state, ring, rate, lateral_m)
         situation = self._situation(state, ring, rate, coupling, lateral_m)
         before = self.phase
@@ -147,6 +152,17 @@ class Guidance:
             self._miss.step(float(np.hypot(*(ring[1:] + self._aim_now()))))
         if self.phase is Phase.APPROACH:
             self._passed = ring[1:].copy() if ring[0] < self._settings.limits.come_along_m else None
+
+    def _reckon(self, state: RelativeState, ring: Array) -> None:
+        """Keep where the drogue should be: on the probe, a frame that does not show it says nothing."""
+        controller = self._controller
+        if state.usable:
+            drift, bearable = controller.steady_drift_m_s, controller.bears_the_gusts
+            self._reckoning.see(ring, controller.middle_m, drift, bearable=bearable)
+            return
+        frames_come = state.frame_age_s <= self._settings.limits.frames_stop_s
+        not_shown = state.not_shown and frames_come and self.phase not in _TOUCHING
+        self._reckoning.miss(self._u, self._axes.R_NB, not_shown=not_shown)
 
     def _count(self, state: RelativeState, ring: Array, rate: Array, lateral_m: float) -> None:
         """Count time and way in the phase that is flown."""
@@ -302,7 +318,7 @@ class Guidance:
         about_it = self.phase in _RETREATING and ring[0] <= 0.0  # it may come along: its drift would be one's own
         s, steady, touching = self._settings, self._controller.steady_drift_m_s, self.phase in _TOUCHING
         lost = self._clocks.unusable_s > 0.0 and not touching
-        target = self._reckoning.believed(steady) if lost else self._controller.drift_m_s
+        target = self._reckoning.drift_m_s.copy() if lost else self._controller.drift_m_s
         if touching or about_it:
             target[0] = steady[0]
         if self._path.is_announced and touching:  # the drogue has come along

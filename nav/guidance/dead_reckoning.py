@@ -1,56 +1,81 @@
 """Where a drogue that is out of view should be, and the way back to where it will come into view again.
 
-The middle of its swing p, the drift d and the receiver's own velocity u say where it is while nobody sees it:
+The middle of its swing p, the drift d and the receiver's own velocity u say where it is while nobody sees it; frames
+that show no ring say where it is not. Where p would be in the camera's field, let e be its way out, over the edge
+that the drogue was nearest to when it was last seen; else, and while no such frames come, e is nothing:
 
-    p' = d - u,     |d| on each axis no more than a drogue behind its tanker may seem to drift                (1)
+    p' = d - u + e / T,     d' = e / T^2,     |d| on each axis no more than a drogue behind its tanker            (1)
+                                              may seem to drift
 
-Its last place does not: a drogue that goes out of view has been pushed aside or is at the end of a swing.
+Its last place does not say it: a drogue that goes out of view has been pushed aside or is at the end of a swing.
 
 Not modelled: the swing, which is over the longer it is not seen.
 """
 
 import numpy as np
 
+from dockair.nav.guidance.field_of_view import FieldOfView
 from dockair.nav.guidance.guidance_settings import GuidanceSettings
 from dockair.rotations import Array
 
 
 class DeadReckoning:
-    """Eq. (1), one control tick at a time.
+    """Eq. (1), one control tick at a time; stabilised axes.
 
     Args:
         settings: of the guidance.
         step_s: control period.
+        field: the camera's; None where nobody says what frames do not show.
     """
 
-    def __init__(self, settings: GuidanceSettings, step_s: float) -> None:
-        self._settings, self._step_s = settings, step_s
+    def __init__(self, settings: GuidanceSettings, step_s: float, field: FieldOfView | None = None) -> None:
+        self._settings, self._step_s, self._field = settings, step_s, field
         self.place_m: Array = np.zeros(3)  #: (3,) p
+        self.drift_m_s: Array = np.zeros(3)  #: (3,) d: of what was learnt, what may be believed out of view
         self._most_m_s = settings.unseen_drift_m_s
+        self._ring_m: Array | None = None  # where the drogue was last seen, until it is known by which edge it went
+        self._edge = 0
 
-    def step(self, middle_m: Array | None, drift_m_s: Array, u_m_s: Array, *, bearable: bool) -> None:
-        """Advance by one control tick.
+    def see(self, ring_m: Array, middle_m: Array, drift_m_s: Array, *, bearable: bool) -> None:
+        """Take note of a drogue that is in view.
 
         Args:
-            middle_m: (3,) p of a drogue that is seen, None out of view.
-            drift_m_s: (3,) d, as learnt while it was in view.
-            u_m_s: (3,) u.
+            ring_m: (3,) its ring's centre, from the probe's tip.
+            middle_m: (3,) p.
+            drift_m_s: (3,) as learnt: it may be half a swing, or a gust's.
             bearable: whether the gusts can be borne.
         """
-        self._most_m_s = self._settings.unseen_drift_m_s if bearable else self._settings.unseen_drift_in_gusts_m_s
-        if middle_m is not None:
-            self.place_m = middle_m
-        else:
-            self.place_m = self.place_m + (self.believed(drift_m_s) - u_m_s) * self._step_s
+        s = self._settings
+        self._most_m_s = s.unseen_drift_m_s if bearable else s.unseen_drift_in_gusts_m_s
+        self._ring_m, self.place_m = ring_m, middle_m
+        self.drift_m_s = np.clip(drift_m_s, -self._most_m_s, self._most_m_s)
 
-    def believed(self, drift_m_s: Array) -> Array:
-        """(3,) of a drift that was learnt, what may be believed out of view: it may be half a swing, or a gust's."""
-        return np.clip(drift_m_s, -self._most_m_s, self._most_m_s)
+    def miss(self, u_m_s: Array, R_NB: Array, *, not_shown: bool) -> None:
+        """Advance by one control tick in which the drogue is out of view.
+
+        Args:
+            u_m_s: (3,) u.
+            R_NB: (3, 3) the body's axes in the stabilised ones.
+            not_shown: whether the newest frame shows the whole field, and no ring in it.
+        """
+        if self._field is not None and self._ring_m is not None:
+            self._edge, self._ring_m = self._field.nearest_edge(R_NB.T @ self._ring_m), None
+        out_m = np.zeros(3)
+        if self._field is not None and not_shown and self._is_ahead:
+            out_m = R_NB @ self._field.out_m(R_NB.T @ self.place_m, self._edge)
+        T = self._settings.unseen_correction_s
+        self.place_m = self.place_m + (self.drift_m_s - u_m_s + out_m / T) * self._step_s
+        drift_m_s = self.drift_m_s + out_m / T**2 * self._step_s
+        self.drift_m_s = np.clip(drift_m_s, -self._most_m_s, self._most_m_s)
 
     def astern_m_s(self) -> Array:
         """(3,) velocity across to get astern of the drogue; none beside it."""
         s, across = self._settings, np.zeros(3)
-        if self.place_m[0] > s.limits.off_axis_range_m:
+        if self._is_ahead:
             most = s.back_off_speed_m_s
             across[1:] = np.clip(s.reckoned_gain_1_s * self.place_m[1:], -most, most)
         return across
+
+    @property
+    def _is_ahead(self) -> bool:
+        return bool(self.place_m[0] > self._settings.limits.off_axis_range_m)

@@ -82,6 +82,7 @@ class GuidanceSettings:
     evade_s: float = 1.5
     unseen_drift_m_s: float = 0.5  # 2.5 sigma of an inertial velocity; a drogue keeps place behind its tanker
     unseen_drift_in_gusts_m_s: float = 0.2  # 1 sigma where the gusts cannot be borne: what was learnt there is theirs
+    unseen_correction_s: float = 2.0  # T: frames without it say the more of the middle of its swing (3 s) the longer
     reckoned_gain_1_s: float = 0.5  # back astern of a drogue that went out of view: half of its place off in 1.4 s
     funnel_s: float = 0.25  # from the ring to the coupling; what the drogue does after that is the probe's own doing
     levelling_s: float = 10.0  # of the stabilised axes: long beside the swing, short beside a turn
@@ -105,6 +106,7 @@ class RelativeState:
     w_WB_B: Array  #: (3,) the body's angular velocity, mean since the last control tick [rad/s]
     sigma_lateral_m: float  #: standard deviation of p_PD_B across the probe's line
     age_s: float = 0.0  #: since the newest frame that was used
+    not_shown: bool = False  #: the newest frame shows the camera's whole field, and no ring in it
     frame_age_s: float = float("inf")  #: since the newest frame, whatever it showed; infinite where nobody says
     dv_WP_B: Array = field(default_factory=lambda: np.full(3, np.nan))
     #: (3,) what the tip's velocity is felt to have changed by since the last control tick [m/s]; NaN: not felt

@@ -6,8 +6,10 @@ from collections import deque
 import numpy as np
 import pytest
 
+from dockair.calibration import Camera, Mounting
 from dockair.messages import PodSignal, ReceiverCommand
 from dockair.nav.guidance.approach import Guidance, GuidanceSettings, PhaseLimits, RelativeState
+from dockair.nav.guidance.field_of_view import FieldOfView
 from dockair.nav.guidance.path_plan import PlanSettings
 from dockair.nav.guidance.phases import Phase
 
@@ -676,6 +678,30 @@ def test_a_drogue_that_went_out_of_view_beside_the_probe_is_got_astern_of():
     assert beside_m > 0.9
     assert np.hypot(*now.p_PD_B[1:]) < 0.15
     assert now.p_PD_B[0] > 6.0
+
+
+MOUNTING = Mounting(R_BC=np.eye(3), p_BC=np.array([2.0, 0.0, 1.0]), p_BP=np.array([5.0, 0.0, 0.5]))
+
+
+@pytest.mark.parametrize("says", [False, True])
+def test_a_drogue_that_leaves_the_field_is_sought_beyond_the_edge_it_left_by(says):
+    """It goes down by 2.5 m in a second; half a swing before had taught a drift upward, and an inertial velocity in
+    error carries the receiver up. Without frames that say where it is not, it is lost for good."""
+
+    def path(t):
+        return np.array([0.0, 0.0, 0.5 * min(t, 1.5) - 2.5 * np.clip(t - 1.5, 0.0, 1.0)])
+
+    field = FieldOfView(Camera(), MOUNTING)
+    plant = Plant(offset=(4.0, 0.0, 0.0), drogue=path, bias=(0.0, 0.0, 0.2))
+    guidance = Guidance(SETTINGS, RATE_HZ, field if says else None)
+    now, unseen_s = plant.step(ReceiverCommand()), 0.0
+    while plant.t < 30.0 and guidance.phase is not Phase.CLEAR:
+        in_view = field.out_m(now.p_PD_B, 0).any()
+        unseen_s += 0.0 if in_view else 1.0 / RATE_HZ
+        lost = state(now.p_PD_B, usable=False, not_shown=True, frame_age_s=0.0)
+        now = plant.step(guidance.step(now if in_view else lost))
+    assert unseen_s < 6.0 if says else guidance.phase_reason == "drogue lost"
+    assert bool(np.hypot(*now.p_PD_B[1:]) < 0.05) is says
 
 
 def test_a_glimpse_of_the_drogue_does_not_count_as_found():

@@ -1,19 +1,32 @@
 """Where a drogue that is out of view should be."""
 
 import numpy as np
+import pytest
 
+from dockair.calibration import Camera, Mounting
 from dockair.nav.guidance.dead_reckoning import DeadReckoning
+from dockair.nav.guidance.field_of_view import FieldOfView
 from dockair.nav.guidance.guidance_settings import GuidanceSettings
+from dockair.rotations import exp
 
 SETTINGS, STEP_S = GuidanceSettings(), 0.01
+LEVEL, STILL = np.eye(3), np.zeros(3)
+MOUNTING = Mounting(R_BC=np.eye(3), p_BC=np.array([2.0, 0.0, 1.0]), p_BP=np.array([5.0, 0.0, 0.5]))
+FIELD = FieldOfView(Camera(), MOUNTING)
+HALF_FIELD = 544.0 / Camera().focal_length_px  # tangent of its height
 
 
 def reckoned(ring_m, drift_m_s, u_m_s, ticks, bearable=True):
     reckoning = DeadReckoning(SETTINGS, STEP_S)
-    reckoning.step(np.array(ring_m), np.zeros(3), np.zeros(3), bearable=bearable)
+    place = np.array(ring_m)
+    reckoning.see(place, place, np.array(drift_m_s), bearable=bearable)
     for _ in range(ticks):
-        reckoning.step(None, np.array(drift_m_s), np.array(u_m_s), bearable=bearable)
+        reckoning.miss(np.array(u_m_s), LEVEL, not_shown=True)
     return reckoning
+
+
+def lower_edge_m(ahead_m):
+    return 0.5 - HALF_FIELD * (ahead_m + 3.0)
 
 
 def test_flies_toward_where_the_drogue_has_drifted_by_its_own_way():
@@ -23,18 +36,18 @@ def test_flies_toward_where_the_drogue_has_drifted_by_its_own_way():
 
 
 def test_a_drift_of_half_a_swing_is_believed_only_so_far():
-    reckoning = reckoned((4.0, 0.0, 0.0), (0.0, -3.0, 0.3), (0.0, 0.0, 0.0), 100)
+    reckoning = reckoned((4.0, 0.0, 0.0), (2.0, -3.0, 0.3), (2.0, 0.0, 0.0), 100)
     most = SETTINGS.unseen_drift_m_s
-    np.testing.assert_allclose(reckoning.believed(np.array([2.0, -3.0, 0.3])), (most, -most, 0.3))
+    np.testing.assert_allclose(reckoning.drift_m_s, (most, -most, 0.3))
     np.testing.assert_allclose(reckoning.astern_m_s()[1:], SETTINGS.reckoned_gain_1_s * np.array([-most, 0.3]))
 
 
 def test_in_gusts_that_cannot_be_borne_less_of_it_is_believed():
     """A receiver in severe gusts (seed 14029, by camera) had sunk 24 m below the drogue by 0.5 m/s in 20 s."""
-    reckoning = reckoned((4.0, 0.0, 0.0), (0.0, -3.0, 0.1), (0.0, 0.0, 0.0), 100, bearable=False)
+    reckoning = reckoned((4.0, 0.0, 0.0), (2.0, -3.0, 0.1), (0.0, 0.0, 0.0), 100, bearable=False)
     most = SETTINGS.unseen_drift_in_gusts_m_s
     assert most < SETTINGS.unseen_drift_m_s
-    np.testing.assert_allclose(reckoning.believed(np.array([2.0, -3.0, 0.1])), (most, -most, 0.1))
+    np.testing.assert_allclose(reckoning.drift_m_s, (most, -most, 0.1))
 
 
 def test_no_faster_than_it_backs_off_and_not_beside_the_drogue():
@@ -46,5 +59,60 @@ def test_no_faster_than_it_backs_off_and_not_beside_the_drogue():
 
 def test_a_drogue_that_is_seen_again_is_where_it_is_seen():
     reckoning = reckoned((4.0, 1.0, 0.0), (0.0, 0.5, 0.0), (0.0, 0.0, 0.0), 300)
-    reckoning.step(np.array([4.0, 0.0, 0.0]), np.zeros(3), np.zeros(3), bearable=True)
+    reckoning.see(np.array([4.0, 0.0, 0.0]), np.array([4.0, 0.0, 0.0]), np.zeros(3), bearable=True)
     np.testing.assert_array_equal(reckoning.astern_m_s(), np.zeros(3))
+
+
+@pytest.mark.parametrize("bank_rad", [0.0, 0.2])
+def test_frames_that_do_not_show_it_where_it_is_reckoned_put_it_beyond_the_edge_that_it_went_out_by(bank_rad):
+    """Last seen at the lower edge, the middle of its swing higher, said to rise: it is below, and sinks."""
+    R_NB = exp(np.array([bank_rad, 0.0, 0.0]))
+    reckoning = DeadReckoning(SETTINGS, STEP_S, FIELD)
+    low = R_NB @ np.array([5.0, 0.0, lower_edge_m(5.0) + 0.02])
+    reckoning.see(low, np.array([5.0, 0.0, -0.9]), np.array([0.0, 0.0, 0.3]), bearable=True)
+    for _ in range(600):
+        reckoning.miss(STILL, R_NB, not_shown=True)
+    place_B = R_NB.T @ reckoning.place_m
+    assert place_B[2] == pytest.approx(lower_edge_m(place_B[0]), abs=0.1)
+    assert reckoning.drift_m_s @ R_NB[:, 2] < 0.05
+    assert reckoning.astern_m_s() @ R_NB[:, 2] < -0.4
+
+
+def test_what_is_reckoned_below_the_field_is_left_there():
+    reckoning = DeadReckoning(SETTINGS, STEP_S, FIELD)
+    below = np.array([5.0, 0.3, lower_edge_m(5.0) - 0.5])
+    reckoning.see(below, below, STILL, bearable=True)
+    for _ in range(300):
+        reckoning.miss(STILL, LEVEL, not_shown=True)
+    np.testing.assert_array_equal(reckoning.place_m, below)
+
+
+@pytest.mark.parametrize("case", ["frames show it or do not come", "no field", "beside"])
+def test_frames_say_nothing_where(case):
+    field = None if case == "no field" else FIELD
+    place = np.array([0.9 if case == "beside" else 5.0, 0.0, -0.5])
+    reckoning = DeadReckoning(SETTINGS, STEP_S, field)
+    reckoning.see(place, place, STILL, bearable=True)
+    for _ in range(300):
+        reckoning.miss(STILL, LEVEL, not_shown=case != "frames show it or do not come")
+    np.testing.assert_array_equal(reckoning.place_m, place)
+
+
+def test_a_drogue_that_nobody_has_seen_is_nowhere():
+    reckoning = DeadReckoning(SETTINGS, STEP_S, FIELD)
+    for _ in range(300):
+        reckoning.miss(STILL, LEVEL, not_shown=True)
+    np.testing.assert_array_equal(reckoning.place_m, np.zeros(3))
+
+
+def test_whatever_frames_do_not_show_it_drifts_no_faster_than_is_believed():
+    """A camera that is blind, not out of view: the receiver is not led away faster than by a drift."""
+    reckoning = DeadReckoning(SETTINGS, STEP_S, FIELD)
+    place = np.array([5.0, 0.0, -0.5])
+    reckoning.see(place, place, STILL, bearable=True)
+    for _ in range(3000):
+        u = reckoning.drift_m_s + reckoning.astern_m_s()
+        reckoning.miss(u, LEVEL, not_shown=True)
+    most = SETTINGS.unseen_drift_m_s
+    assert reckoning.drift_m_s[2] == pytest.approx(-most)
+    assert (np.abs(reckoning.drift_m_s) <= most).all()

@@ -516,6 +516,50 @@ def test_a_drogue_that_was_lost_is_found_wherever_it_comes_into_view_again(rende
         assert names_are_true(sky, solution)
 
 
+def told(sky):
+    """What guidance is told from now on."""
+    states, guided = [], sky.navigator._guidance.step
+    sky.navigator._guidance.step = lambda state: states.append(state) or guided(state)
+    return states
+
+
+@pytest.mark.parametrize(("shown", "not_shown"), [(0, True), (3, True), (4, False), (8, False)])
+def test_guidance_is_told_that_a_whole_frame_shows_fewer_spots_than_a_ring_is_found_by(render, shown, not_shown):
+    sky = Sky(render, still, hidden=range(shown, 8))
+    states = told(sky)
+    sky.run(0.2)
+    assert states[0].not_shown is False  # before the first frame
+    assert states[-1].not_shown is not_shown
+
+
+def test_of_a_window_that_shows_no_ring_guidance_is_told_nothing(render):
+    sky = Sky(render, still)
+    states = told(sky)
+    assert sky.run(0.5).window is not None
+    sky.hidden = set(range(8))
+    window, seen = sky.window, len(states)
+    while sky.window == window:  # the track gives way once the window has shown nothing
+        sky.step()
+    assert not any(state.not_shown for state in states[seen:])
+    sky.run(0.2)
+    assert states[-1].not_shown
+
+
+def test_measured_leds_too_few_for_a_ring_are_a_frame_of_the_whole_field_that_shows_none():
+    navigator = Navigator(sheets())
+    sky = SimpleNamespace(navigator=navigator)
+    states = told(sky)
+    for tick, count in enumerate((3, 0, 8), 1):
+        pixels = 500.0 + 40.0 * np.column_stack([np.cos(np.arange(count)), np.sin(np.arange(count))])
+        sigma = np.full(count, 0.1)
+        leds = LedObservation(
+            time_stamp_s=0.01 * tick, led_numbers=np.arange(count), centroids_px=pixels, sigma_px=sigma
+        )
+        times = 0.01 * (tick - 1) + 0.002 * np.arange(1, 6)
+        navigator.step([ImuSample(time_stamp_s=t, angular_rate_rad_s=np.zeros(3)) for t in times], leds)
+    assert [state.not_shown for state in states] == [True, True, False]
+
+
 @pytest.mark.parametrize(("roll_deg", "pitch_deg"), [(15.0, 0.0), (-35.0, 0.0), (0.0, 8.0)])
 def test_a_receiver_that_stands_otherwise_when_it_sees_the_drogue_again_goes_on(render, roll_deg, pitch_deg):
     """Turned by its gyro while it saw nothing: the attitude at the start says nothing any more."""
