@@ -4,8 +4,10 @@ The middle of its swing p, the drift d and the receiver's own velocity u say whe
 that show no ring say where it is not. Where p would be in the camera's field, let e be its way out, over the edge
 that the drogue was nearest to when it was last seen; else, and while no such frames come, e is nothing:
 
-    p' = d - u + e / T,     d' = e / T^2,     |d| on each axis no more than a drogue behind its tanker            (1)
-                                              may seem to drift
+    p' = d - u + 2 e / T,     d' = e / T^2                                                                  (1)
+
+with |d| on each axis no more than a drogue behind its tanker may seem to drift, and at first no more of what was learnt
+than may be believed. Both e and what is wrong in d die away with the time constant T (critically damped).
 
 Its last place does not say it: a drogue that goes out of view has been pushed aside or is at the end of a swing.
 
@@ -32,7 +34,6 @@ class DeadReckoning:
         self._settings, self._step_s, self._field = settings, step_s, field
         self.place_m: Array = np.zeros(3)  #: (3,) p
         self.drift_m_s: Array = np.zeros(3)  #: (3,) d: of what was learnt, what may be believed out of view
-        self._most_m_s = settings.unseen_drift_m_s
         self._ring_m: Array | None = None  # where the drogue was last seen, until it is known by which edge it went
         self._edge = 0
 
@@ -46,9 +47,9 @@ class DeadReckoning:
             bearable: whether the gusts can be borne.
         """
         s = self._settings
-        self._most_m_s = s.unseen_drift_m_s if bearable else s.unseen_drift_in_gusts_m_s
+        most_m_s = s.unseen_drift_m_s if bearable else s.unseen_drift_in_gusts_m_s
         self._ring_m, self.place_m = ring_m, middle_m
-        self.drift_m_s = np.clip(drift_m_s, -self._most_m_s, self._most_m_s)
+        self.drift_m_s = np.clip(drift_m_s, -most_m_s, most_m_s)
 
     def miss(self, u_m_s: Array, R_NB: Array, *, not_shown: bool) -> None:
         """Advance by one control tick in which the drogue is out of view.
@@ -63,10 +64,10 @@ class DeadReckoning:
         out_m = np.zeros(3)
         if self._field is not None and not_shown and self._is_ahead:
             out_m = R_NB @ self._field.out_m(R_NB.T @ self.place_m, self._edge)
-        T = self._settings.unseen_correction_s
-        self.place_m = self.place_m + (self.drift_m_s - u_m_s + out_m / T) * self._step_s
+        T, most_m_s = self._settings.unseen_correction_s, self._settings.unseen_drift_m_s
+        self.place_m = self.place_m + (self.drift_m_s - u_m_s + 2.0 * out_m / T) * self._step_s
         drift_m_s = self.drift_m_s + out_m / T**2 * self._step_s
-        self.drift_m_s = np.clip(drift_m_s, -self._most_m_s, self._most_m_s)
+        self.drift_m_s = np.clip(drift_m_s, -most_m_s, most_m_s)
 
     def astern_m_s(self) -> Array:
         """(3,) velocity across to get astern of the drogue; none beside it."""

@@ -82,7 +82,7 @@ class GuidanceSettings:
     evade_s: float = 1.5
     unseen_drift_m_s: float = 0.5  # 2.5 sigma of an inertial velocity; a drogue keeps place behind its tanker
     unseen_drift_in_gusts_m_s: float = 0.2  # 1 sigma where the gusts cannot be borne: what was learnt there is theirs
-    unseen_correction_s: float = 2.0  # T: frames without it say the more of the middle of its swing (3 s) the longer
+    unseen_correction_s: float = 1.0  # T: a third of a swing, by when a drogue at its end would be in the field again
     reckoned_gain_1_s: float = 0.5  # back astern of a drogue that went out of view: half of its place off in 1.4 s
     funnel_s: float = 0.25  # from the ring to the coupling; what the drogue does after that is the probe's own doing
     levelling_s: float = 10.0  # of the stabilised axes: long beside the swing, short beside a turn
