@@ -41,7 +41,6 @@ from dockair.sim.as_built import AsBuilt, AsBuiltParameters, draw_as_built
 from dockair.sim.basket import place_leds
 from dockair.sim.camera.camera import CameraNoise, NearInfraredCamera
 from dockair.sim.camera.sheets import CameraSheets, LedParameters
-from dockair.sim.camera.weather import Weather
 from dockair.sim.faults import Faults
 from dockair.sim.hose.chain import DrogueParameters, HoseParameters
 from dockair.sim.hose.coupling import CouplingParameters
@@ -67,7 +66,6 @@ STRAYING_LIMIT_M_S = {"fighter": (0.5, 0.5, 0.5), "unmanned": (0.0, 0.0, 0.5)}
 COMMANDED = 0.95  # of the accelerations that the flight control flies: what it cut off would be missing in guidance
 FRAMES_STOP = 2.5  # periods of a slow camera without a frame: one that is late is no failure
 STAND_OFF_M = 4.0  # pre-contact: procedures say 3-5 m behind the drogue
-SUN_OVERHEAD = np.array([0.0, 0.0, 1.0])  # lights the scene of a scenario without Sun
 
 T = TypeVar("T")
 
@@ -225,7 +223,6 @@ def _sheet(scenario: Scenario, name: str, cls: type[T]) -> T:
 
 
 def _world_parameters(scenario: Scenario, air: Air, mounting: Mounting) -> WorldParameters:
-    sun_W = scenario.sun.direction_W
     return WorldParameters(
         hose=_sheet(scenario, "hose", HoseParameters),
         drogue=_sheet(scenario, "drogue", DrogueParameters),
@@ -236,7 +233,7 @@ def _world_parameters(scenario: Scenario, air: Air, mounting: Mounting) -> World
         mounting=mounting,
         air=air,
         airspeed_m_s=scenario.flight.airspeed_m_s,
-        sun_direction_W=SUN_OVERHEAD if sun_W is None else sun_W,
+        sun_direction_W=scenario.sun.lit_from_W,
         receiver_outline=scenario.hardware.airframe,
     )
 
@@ -281,19 +278,14 @@ def _as_built(scenario: Scenario, seed: int, sheets: NavigationSheets) -> AsBuil
 
 
 def _camera(scenario: Scenario, seed: int, as_built: AsBuilt, faults: Faults, world: World) -> NearInfraredCamera:
-    table, weather, sheets = scenario.camera, scenario.weather, camera_sheets(scenario)
+    table, sheets = scenario.camera, camera_sheets(scenario)
     return NearInfraredCamera(
         sheets,
         as_built,
         CameraNoise.of(seed),
         world.model,
         sun_direction_W=scenario.sun_W,
-        weather=Weather(
-            cloud_cover=weather.cloud_cover,
-            cloud_optical_depth=weather.cloud_optical_depth,
-            visibility_m=weather.visibility_m,
-            night=weather.night,
-        ),
+        weather=scenario.weather.as_seen,
         altitude_m=scenario.flight.altitude_m,
         airspeed_m_s=scenario.flight.airspeed_m_s,
         faults=faults,

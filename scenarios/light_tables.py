@@ -7,6 +7,7 @@ from pydantic import Field
 
 from dockair.rotations import Array
 from dockair.scenarios.table import Table
+from dockair.sim.camera.weather import Weather as SeenWeather
 
 
 class Sun(Table):
@@ -25,6 +26,12 @@ class Sun(Table):
         across = np.cos(elevation)
         return np.array([across * np.cos(azimuth), across * np.sin(azimuth), np.sin(elevation)])
 
+    @property
+    def lit_from_W(self) -> Array:
+        """(3,) unit vector toward where the scene's sunlight comes from: the Sun, or overhead without its image."""
+        sun_W = self.direction_W
+        return np.array([0.0, 0.0, 1.0]) if sun_W is None else sun_W
+
 
 class Weather(Table):
     """What lies between and behind: clouds, haze, night."""
@@ -33,6 +40,16 @@ class Weather(Table):
     cloud_optical_depth: float = Field(default=8.0, gt=0.0, le=100.0)  #: mean, where there is cloud
     visibility_m: float = Field(default=100e3, ge=50.0, le=300e3)  #: meteorological optical range
     night: bool = False  #: no Sun, no daylight
+
+    @property
+    def as_seen(self) -> SeenWeather:
+        """As the camera takes it."""
+        return SeenWeather(
+            cloud_cover=self.cloud_cover,
+            cloud_optical_depth=self.cloud_optical_depth,
+            visibility_m=self.visibility_m,
+            night=self.night,
+        )
 
 
 class CameraOptions(Table):

@@ -7,8 +7,9 @@ A spot of N electrons is taken for a Gaussian of variance
 whose pixels the camera's own exposure control meters. What is sunlit behind it adds a texture of T electrons in an
 exposure t. The image stages state of the spot, on each axis,
 
-    sigma^2 = s_0^2 + (a w)^2 (N + N_b)/N^2 + (w T/N)^2,   T = T_0 (t/t_0)^q      no pixel at full scale           (2)
+    sigma^2 = s_0^2 + (a w)^2 (N + N_b)/N^2 + (w T/N)^2                           no pixel at full scale           (2)
     sigma^2 = s_c^2 min(n, n_c)                                                   n pixels                         (3)
+    T = T_0 (t/t_0)^q k exp(-q B z)                                               LED at depth z                   (4)
 
 and it is measured with an error of e sigma, e = e_u or e_c. Of the texture's part a share stays with the LED for a
 time (Gauss-Markov); the rest is new in every frame. An LED is seen that is on the sensor, not hidden, and whose
@@ -17,8 +18,14 @@ name, a share a wrong place. Fewer than `ring_least` LEDs are no ring, and none 
 follows does it, that is while the last LEDs that were named are not too old. In a share of the frames, in proportion to
 T, no LED is named anyway.
 
+In the light of the fit, that is in daylight, filter and air of the scenario "default", k = 1 and B = 0. Else surfaces
+make Y in place of Y_0 electrons a second, LEDs E in place of E_0, and the air takes B more per metre: texture has
+Y/Y_0 exp(-B z) of its light. In the fit t^(q-1) stood for the range, as the exposure follows from it. LEDs that are
+fainter by d = E/E_0 exp(-B z) take t/d at the same range; so it is (d t)^(q-1) here, and k = Y/Y_0 (E/E_0)^(q-1).
+
 Not modelled: sky, Sun and what they do to the picture (stray light, glints, gaps in clouds, LED-like lights); smear by
 motion; a ring that is lost and must be looked for. What a scenario has of these is refused, see `refuse_unmodelled`.
+T is the typical LED's: in direct sunlight it is not the same all round the ring.
 Source: fitted to the camera and the image stages by the reproduction measurement-model/fit (docs/measurement_model.md).
 """
 
@@ -80,6 +87,14 @@ class MeasurementParameters:
     window_margin_px: float  #: ... and beyond it
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TextureLight:
+    """What a scenario's light makes of the texture, Eq. (4); as it stands, nothing: the light of the fit."""
+
+    factor: float = 1.0  #: k
+    extinction_1_m: float = 0.0  #: B
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class View:
     """The LEDs as the lens has them, without any error."""
@@ -125,6 +140,7 @@ class MeasuredLeds:
         faults: what breaks, and when.
         followed_s: for how long after LEDs were named the navigation's belief can name LEDs too few for a ring [s].
         extinction_1_m: of the air.
+        texture_light: of the texture behind the ring.
         automatic_exposure: whether the camera sets its exposure itself.
     """
 
@@ -144,11 +160,13 @@ class MeasuredLeds:
         faults: Faults,
         followed_s: float,
         extinction_1_m: float = 0.0,
+        texture_light: TextureLight = TextureLight(),
         automatic_exposure: bool = True,
     ) -> None:
         self._p, self._sheets, self._as_built, self._response = parameters, sheets, as_built, response
         self._receiver, self._drogue = model.body("receiver").id, model.body("drogue").id
         self._obstacles, self._extinction_1_m = Obstacles.of(model), extinction_1_m
+        self._texture_light = texture_light
         self._rng, self._transfer, self._defects, self._faults = rng, transfer, defects, faults
         self._control = ExposureControl(sheets.exposure, sheets.sensor, automatic=automatic_exposure)
         self._last: LedObservation | None = None
@@ -223,17 +241,19 @@ class MeasuredLeds:
         _gaussian_levels(np.where(view.clear[:, None], view.pixels_px, 0.0), electrons, width, limits, levels)
         return levels, width
 
-    def texture_e(self, exposure_s: float) -> float:
-        """T of an exposure."""
-        p = self._p
-        return float(p.texture_e * (exposure_s / p.texture_exposure_s) ** p.texture_exponent)
+    def texture_e(self, exposure_s: float, depth_m: Array) -> Array:
+        """(n,) T of an exposure [electrons] at depths [m], Eq. (4)."""
+        p, light = self._p, self._texture_light
+        in_fit = p.texture_e * (exposure_s / p.texture_exposure_s) ** p.texture_exponent
+        faded = np.exp(-p.texture_exponent * light.extinction_1_m * np.maximum(depth_m, 0.0))
+        return np.asarray(in_fit * light.factor * faded)
 
     def variances(
-        self, electrons: Array, width_px: Array, full_pixels: NDArray[np.int64], exposure_s: float
+        self, electrons: Array, width_px: Array, full_pixels: NDArray[np.int64], texture_e: Array
     ) -> tuple[Array, Array]:
         """(n,) stated variance [px^2] of spots, Eqs. (2) and (3), and the texture's part of it."""
         p, n = self._p, np.maximum(electrons, 1.0)
-        texture = np.where(full_pixels > 0, 0.0, (width_px * self.texture_e(exposure_s) / n) ** 2)
+        texture = np.where(full_pixels > 0, 0.0, (width_px * texture_e / n) ** 2)
         clipped = p.clipped_sigma_px**2 * np.minimum(full_pixels, p.clipped_most)
         unclipped = p.sigma_floor_px**2 + (p.photon_factor * width_px) ** 2 * (n + p.background_e) / n**2
         return np.where(full_pixels > 0, clipped, unclipped + texture), texture
@@ -250,17 +270,17 @@ class MeasuredLeds:
         self, view: View, levels: NDArray[np.uint8], width_px: Array, numbers: _Numbers, time_s: float
     ) -> LedObservation:
         p, full, count, uniform = self._p, (levels == _WHITE).sum(axis=1), len(width_px), numbers.uniform
-        variance, texture = self.variances(view.electrons, width_px, full, self._exposure_s)
+        texture_e = self.texture_e(self._exposure_s, view.depth_m)
+        variance, texture = self.variances(view.electrons, width_px, full, texture_e)
         lasting = p.texture_lasting_share * texture
         ratio = np.where(full > 0, p.clipped_error_over_sigma, p.error_over_sigma)[:, None]
         error = np.sqrt(variance - lasting)[:, None] * numbers.new + np.sqrt(lasting)[:, None] * self._lasting
         error = ratio * error + np.where(uniform[:count, 1:] < p.stray_share, p.stray_px * numbers.stray, 0.0)
-        texture_e = self.texture_e(self._exposure_s)
         faintest_dn, clutter = p.faintest_dn + p.faintest_dn_per_e * texture_e, texture_e / max(p.texture_e, 1.0)
         bright = levels.max(axis=1) - self._black > faintest_dn * (1.0 + p.faintest_spread * numbers.level)
         named = np.flatnonzero(view.clear & bright & (uniform[:count, 0] >= clutter * p.unnamed_share))
         least = 1 if time_s - self._named_s <= self._followed_s else p.ring_least
-        if len(named) < least or uniform[count, 0] < clutter * p.no_ring_share:
+        if len(named) < least or uniform[count, 0] < np.median(clutter) * p.no_ring_share:  # where the ring is
             named = named[:0]
         return LedObservation(
             time_stamp_s=time_s,

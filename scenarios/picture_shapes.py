@@ -66,8 +66,7 @@ def _aircraft(sky: Sky, skins: list[Skin], eye_m: tuple[float, float, float]) ->
     x, y = _tangents()
     out = np.empty(_SHAPE, dtype=np.float32)
     sky.fill(out, R, x, y)
-    light = Lighting(toward_W=_SUN_W, ambient=sky.ambient, direct=float(sky.beam(_SUN_W[None])[0]))
-    TracedSolids(model, light).draw(out, data, (R, np.array(eye_m)), x, y, Haze())
+    TracedSolids(model, Lighting.toward(_SUN_W, sky)).draw(out, data, (R, np.array(eye_m)), x, y, Haze())
     return _grey(out)
 
 

@@ -51,7 +51,7 @@ def _out() -> list[dict[str, Any]]:
     ]
 
 
-def _standing(aft_m: float, faults: list[dict[str, Any]]) -> dict[str, Any]:
+def standing(aft_m: float, faults: list[dict[str, Any]]) -> dict[str, Any]:
     """Settings of a flight that stays at its stand-off."""
     return {"start.aft_m": aft_m, "faults": faults, "guidance.stabilise_s": 60.0}
 
@@ -60,16 +60,16 @@ FITTED: tuple[_Flight, ...] = (
     ("default", {}, 0, np.inf),
     ("default", {}, 1, np.inf),
     ("light_gusts", {}, 2, np.inf),
-    ("default", _standing(4.0, _dimmed()), 3, _STANDING_S),
-    ("default", _standing(12.0, _dimmed()), 4, _STANDING_S),
-    ("default", _standing(25.0, []), 5, _STANDING_S),
-    ("default", _standing(4.0, _out()), 6, _STANDING_S),
-    ("light_gusts", _standing(8.0, []), 7, _STANDING_S),
+    ("default", standing(4.0, _dimmed()), 3, _STANDING_S),
+    ("default", standing(12.0, _dimmed()), 4, _STANDING_S),
+    ("default", standing(25.0, []), 5, _STANDING_S),
+    ("default", standing(4.0, _out()), 6, _STANDING_S),
+    ("light_gusts", standing(8.0, []), 7, _STANDING_S),
 )
 HELD_OUT: tuple[_Flight, ...] = (
     ("default", {}, 8, np.inf),
     ("light_gusts", {}, 9, np.inf),
-    ("default", _standing(10.0, []), 10, _STANDING_S),
+    ("default", standing(10.0, []), 10, _STANDING_S),
 )
 
 
@@ -94,11 +94,15 @@ def compared(seen: Seen) -> list[dict[str, Any]]:
         one = seen.select((seen.depth_m >= low) & (seen.depth_m < high))
         if len(one) < _FEWEST:
             continue
-        case = f"{low:g} to {high:g} m, {len(one)} LEDs"
-        model = _figures(one.model_error_px, one.model_sigma_px, one.model_exposure_s, one.model_latency_s)
-        camera = _figures(*_of_camera(one), one.exposure_s, one.latency_s)
-        rows.append({"case": case, "ours": model, "reference": camera})
+        rows.append(beside(f"{low:g} to {high:g} m, {len(one)} LEDs", one))
     return rows
+
+
+def beside(case: str, seen: Seen) -> dict[str, Any]:
+    """Return one row: the model's figures as ours, the camera's as reference."""
+    model = _figures(seen.model_error_px, seen.model_sigma_px, seen.model_exposure_s, seen.model_latency_s)
+    camera = _figures(*_of_camera(seen), seen.exposure_s, seen.latency_s)
+    return {"case": case, "ours": model, "reference": camera}
 
 
 def _of_camera(seen: Seen) -> tuple[Array, Array]:
@@ -112,6 +116,7 @@ def _figures(error_px: Array, sigma_px: Array, exposure_s: Array, latency_s: Arr
     return {
         "error_rms_px": float(np.sqrt(np.nanmean(error_px**2))),
         "stated_sigma_rms_px": float(np.sqrt(np.nanmean(sigma_px**2))),
+        "stated_sigma_median_px": float(np.nanmedian(sigma_px)),
         "named_share": float(np.isfinite(sigma_px).mean()),
         "exposure_us": float(1e6 * np.median(exposure_s)),
         "latency_ms": float(1e3 * np.mean(latency_s)),

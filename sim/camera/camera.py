@@ -34,7 +34,7 @@ from dockair.sim.camera.glare import Glare
 from dockair.sim.camera.normals_ahead import NormalsAhead
 from dockair.sim.camera.optics import PointSpread
 from dockair.sim.camera.point_sources import PointSources
-from dockair.sim.camera.radiometry import extinction_1_m, led_wavelength_m, responses
+from dockair.sim.camera.radiometry import extinction_1_m, led_wavelength_m, responses_in_flight
 from dockair.sim.camera.readout import latency_s, transfer_jitter_s
 from dockair.sim.camera.sheets import CameraSheets
 from dockair.sim.camera.sky import Sky
@@ -86,17 +86,7 @@ class NearInfraredCamera:
         self._faults = faults or Faults((), len(as_built.led_intensity_w_sr))
         self._receiver, self._airspeed_m_s = model.body("receiver").id, airspeed_m_s
         camera = as_built.camera
-        elevation = np.pi / 2.0 if sun_direction_W is None else float(np.arcsin(sun_direction_W[2]))
-        self._response = responses(
-            sheets.lens,
-            sheets.filter,
-            sheets.sensor,
-            sheets.leds,
-            sheets.light,
-            camera,
-            altitude_m=altitude_m,
-            sun_elevation_rad=elevation,
-        )
+        self._response = responses_in_flight(sheets, camera, altitude_m, sun_direction_W)
         wavelength = led_wavelength_m(sheets.leds)
         self._spread = PointSpread(sheets.lens, sheets.sensor, camera, wavelength)
         self._blobs = Blobs(camera, self._spread)

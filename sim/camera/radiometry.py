@@ -45,6 +45,7 @@ from dockair.calibration import Camera
 from dockair.errors import DockairError
 from dockair.rotations import Array
 from dockair.sim.camera.sheets import (
+    CameraSheets,
     FilterParameters,
     LedParameters,
     LensParameters,
@@ -218,6 +219,29 @@ def responses(
         sun_disc_e_s=sun / disc * pixel,
         sun_flux_e_s=sun * aperture,
         glint_e_m2_s=sun * aperture,
+    )
+
+
+def responses_in_flight(
+    sheets: CameraSheets, camera: Camera, altitude_m: float, sun_direction_W: Array | None
+) -> Responses:
+    """Return the constant factors of Eqs. (3) to (8) in the sunlight of a flight.
+
+    Args:
+        sheets: of the camera and the light.
+        camera: as built, or nominal.
+        altitude_m: of the flight.
+        sun_direction_W: (3,) unit vector toward the Sun; None is overhead.
+    """
+    return responses(
+        sheets.lens,
+        sheets.filter,
+        sheets.sensor,
+        sheets.leds,
+        sheets.light,
+        camera,
+        altitude_m=altitude_m,
+        sun_elevation_rad=np.pi / 2.0 if sun_direction_W is None else float(np.arcsin(sun_direction_W[2])),
     )
 
 

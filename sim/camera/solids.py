@@ -5,12 +5,17 @@
 in units of a white Lambertian surface in normal sunlight: reflectance rho, unit normal n, unit vector s toward the
 Sun, extinction b, slant range r. `ambient` is the mean radiance of all directions, `direct` what clouds and haze let
 through of the Sun. A solid is a sphere, ellipsoid, capsule, cylinder or box, or a mesh of triangles (`meshes`), opaque
-and matt; both ways of drawing it (`drawn`, `traced`) take it from here.
+and matt; both ways of drawing it (`drawn`, `traced`) take it from here. Over the disc of a white ball, whose surface
+has every direction that can be seen, the mean of the light at phase angle a between Sun and lens is
+
+    L = ambient + direct 2/(3 pi) (sin a + (pi - a) cos a)                                                       (2)
 
 Not modelled: shadows, interreflections, gloss (glints are point sources of their own).
-Source: Koschmieder's law of air light, in Middleton, Vision through the Atmosphere, ch. 4.
+Sources: Koschmieder's law of air light, in Middleton, Vision through the Atmosphere, ch. 4; Lambert, Photometria 1760,
+for (2), whose value at phase angle 0 is the geometric albedo 2/3.
 """
 
+import math
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -103,8 +108,18 @@ class Lighting:
         """Sunlight along the model's first light, if it has one, as much as the sky lets through."""
         if model.nlight == 0:
             return cls(toward_W=np.array([0.0, 0.0, 1.0]), ambient=sky.ambient, direct=0.0)
-        toward_W = -np.array(model.light_dir[0])
-        return cls(toward_W=toward_W, ambient=sky.ambient, direct=float(sky.beam(toward_W[None])[0]))
+        return cls.toward(-np.array(model.light_dir[0]), sky)
+
+    @classmethod
+    def toward(cls, sun_W: Array, sky: Shines) -> "Lighting":
+        """Sunlight from (3,) the unit vector toward the Sun, as much as the sky lets through."""
+        return cls(toward_W=sun_W, ambient=sky.ambient, direct=float(sky.beam(sun_W[None])[0]))
+
+    def on_ball(self, lens_W: Array) -> float:
+        """Return the mean relative radiance of a white ball, Eq. (2); (3,) unit vector from it toward the lens."""
+        cosine = min(max(float(self.toward_W @ lens_W), -1.0), 1.0)
+        phase = math.acos(cosine)
+        return self.ambient + self.direct * 2.0 / (3.0 * math.pi) * (math.sin(phase) + (math.pi - phase) * cosine)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -14,7 +14,7 @@ from dockair.nav.navigator import NavigatorSettings
 from dockair.parameters import load_parameters
 from dockair.rotations import exp
 from dockair.scenarios.build_measured import SHEET, refuse_unmodelled
-from dockair.scenarios.measured_leds import MeasuredLeds, MeasurementParameters
+from dockair.scenarios.measured_leds import MeasuredLeds, MeasurementParameters, TextureLight
 from dockair.scenarios.schema import load_scenario
 from dockair.sim.as_built import AsBuilt, AsBuiltParameters, draw_as_built
 from dockair.sim.camera.electronics import output_black, output_gain
@@ -105,7 +105,7 @@ def test_the_stated_sigma_is_that_of_photons_on_a_gaussian():
 
 def test_a_clipped_spot_states_the_root_of_its_full_pixels_up_to_the_most():
     leds = Stand().leds
-    variance, texture = leds.variances(np.full(4, 2e5), np.full(4, 0.8), np.array([1, 2, 4, 9]), 14e-6)
+    variance, texture = leds.variances(np.full(4, 2e5), np.full(4, 0.8), np.array([1, 2, 4, 9]), np.full(4, 90.0))
     p = EXACT
     np.testing.assert_allclose(variance, p.clipped_sigma_px**2 * np.array([1.0, 2.0, p.clipped_most, p.clipped_most]))
     assert not texture.any()
@@ -171,7 +171,7 @@ def test_an_led_dimmed_below_the_faintest_level_is_not_seen_and_above_it_is():
     view = stand.leds.view(stand.data, 1.0, SHEETS.exposure.exposure_s)
     levels, _ = stand.leds.spots(view)
     t = SHEETS.exposure.exposure_s
-    faintest_dn = EXACT.faintest_dn + EXACT.faintest_dn_per_e * stand.leds.texture_e(t)
+    faintest_dn = EXACT.faintest_dn + EXACT.faintest_dn_per_e * float(stand.leds.texture_e(t, view.depth_m)[2])
     factor = faintest_dn / (levels[2].max() - output_black(SHEETS.sensor))
     for times, seen in ((0.5, False), (2.5, True)):  # output levels are whole numbers
         dimmed = Stand(faults=[LedDim(leds=(2,), factor=min(times * factor, 1.0))], automatic_exposure=False)
@@ -210,6 +210,42 @@ def test_shares_of_unnamed_leds_and_of_frames_without_a_ring_are_those_of_the_sh
     without = (counts == 0).mean()
     assert without == pytest.approx(0.2, abs=5.0 * np.sqrt(0.2 * 0.8 / frames))
     assert counts[counts > 0].mean() / 8.0 == pytest.approx(0.9, abs=5.0 * np.sqrt(0.09 / (8 * 0.8 * frames)))
+
+
+@pytest.mark.parametrize("factor", [0.0, 0.25, 1.0])
+def test_with_the_textures_light_go_its_part_of_the_sigma_and_the_faintest_level(factor):
+    p, t = replace(EXACT, texture_e=3000.0, texture_exposure_s=SHEETS.exposure.exposure_s), SHEETS.exposure.exposure_s
+    fixed = {"texture_light": TextureLight(factor=factor), "automatic_exposure": False}
+    stand, bare = Stand(p, **fixed), Stand(replace(p, texture_e=0.0), automatic_exposure=False)
+    view = stand.leds.view(stand.data, 1.0, t)
+    levels, width_px = stand.leds.spots(view)
+    own_px2 = (width_px * factor * 3000.0 / view.electrons) ** 2
+    np.testing.assert_allclose(stand.look().sigma_px ** 2 - bare.look().sigma_px ** 2, own_px2, rtol=1e-9, atol=1e-15)
+    faintest_dn = p.faintest_dn + p.faintest_dn_per_e * factor * 3000.0
+    dim = faintest_dn / (levels[2].max() - output_black(SHEETS.sensor))
+    for times, seen in ((0.5, False), (2.5, True)):  # output levels are whole numbers
+        dimmed = Stand(p, [LedDim(leds=(2,), factor=min(times * dim, 1.0))], **fixed)
+        assert (2 in dimmed.look().led_numbers) is seen
+
+
+@pytest.mark.parametrize("factor", [0.0, 0.25, 1.0])
+def test_with_the_textures_light_go_the_shares_without_a_name_and_without_a_ring(factor):
+    """Within five standard deviations of a binomial, as above."""
+    p = replace(EXACT, unnamed_share=0.2, no_ring_share=0.2, texture_exposure_s=SHEETS.exposure.exposure_s)
+    stand, frames = Stand(p, texture_light=TextureLight(factor=factor), automatic_exposure=False), 400
+    counts = np.array([len(stand.look(0.02 * k).led_numbers) for k in range(frames)])
+    share = 0.2 * factor
+    spread = np.sqrt(share * (1.0 - share) / frames)
+    assert (counts == 0).mean() == pytest.approx(share, abs=5.0 * spread)
+    assert counts[counts > 0].mean() / 8.0 == pytest.approx(1.0 - share, abs=5.0 * spread / np.sqrt(8.0 * 0.7))
+
+
+def test_in_haze_the_texture_fades_with_the_depth_of_each_led():
+    light, z = TextureLight(factor=0.5, extinction_1_m=0.02), np.array([5.0, 15.0, -3.0])
+    hazy, clear = (Stand(texture_light=one).leds.texture_e(60e-6, z) for one in (light, TextureLight()))
+    q = PARAMETERS.texture_exponent
+    np.testing.assert_allclose(hazy / clear, 0.5 * np.exp(-q * 0.02 * np.array([5.0, 15.0, 0.0])), rtol=1e-12)
+    np.testing.assert_array_equal(clear, PARAMETERS.texture_e * (60e-6 / PARAMETERS.texture_exposure_s) ** q)
 
 
 def test_latency_follows_the_window_of_a_ring_that_is_tracked_and_the_full_frame_before():

@@ -38,15 +38,17 @@ def _drawn(flight: int, depth_m: float, frames: int, faults=(), depth_rate_m: fl
         levels, width_px = stand.leds.spots(view)
         window = stand.leds._window
         at = {int(led): i for i, led in enumerate(drawn.led_numbers)}
-        texture = DRAWN.faintest_dn + DRAWN.faintest_dn_per_e * stand.leds.texture_e(exposure_s)
+        texture_e = stand.leds.texture_e(exposure_s, view.depth_m)
+        faintest_dn = DRAWN.faintest_dn + DRAWN.faintest_dn_per_e * texture_e
         for led in range(8):
             full, i = int((levels[led] == 255).sum()), at.get(led, -1)
-            least = (2.0 if at else 1.0) * texture  # of what is found, if unnamed: surely, or of a whole ring by half
+            # of what is found, if unnamed: surely, or of a whole ring by half
+            least = (2.0 if at else 1.0) * faintest_dn[led]
             bright = levels[led].max() - output_black(SHEETS.sensor) > least
             error = drawn.centroids_px[i] - view.pixels_px[led] if i >= 0 else np.full(2, np.nan)
             sigma = drawn.sigma_px[i] if i >= 0 else np.nan
             if i < 0 and bright:
-                sigma = np.sqrt(stand.leds.variances(view.electrons, width_px, np.zeros(8, int), exposure_s)[0][led])
+                sigma = np.sqrt(stand.leds.variances(view.electrons, width_px, np.zeros(8, int), texture_e)[0][led])
                 error = DRAWN.error_over_sigma * sigma * rng.standard_normal(2)
             off = view.pixels_px[led] - np.round(view.pixels_px[led])
             rows.append({

@@ -93,6 +93,19 @@ def test_hits_ranges_and_shades_are_those_of_mujocos_ray_cast(kind: str, seed: i
     assert np.allclose(shade, 0.1 + 0.7 * np.clip(normal[hit] @ SUN_W, 0.0, None), atol=2e-6)
 
 
+@pytest.mark.parametrize("phase_deg", [0.0, 35.0, 90.0, 130.0, 180.0])
+def test_the_mean_of_a_white_ball_from_afar_is_lamberts(phase_deg: float) -> None:
+    """A thousand radii away, 250 blocks across: perspective and the disc's edge leave a thousandth."""
+    phase = np.radians(phase_deg)
+    light = Lighting(
+        toward_W=np.array([-np.cos(phase), 0.6 * np.sin(phase), 0.8 * np.sin(phase)]), ambient=0.1, direct=0.7
+    )
+    model, data = _scene(_geom("sphere", [1000.0, 0.0, 0.0], size=[1.0, 0.0, 0.0]))
+    tangents = np.linspace(-1.05e-3, 1.05e-3, 263)
+    picture = _draw(model, data, light, x=tangents, y=tangents)
+    assert picture[picture != SKY].mean() == pytest.approx(light.on_ball(np.array([-1.0, 0.0, 0.0])), abs=1e-3)
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_of_many_solids_the_nearest_is_seen(seed: int) -> None:
     """Twenty of all kinds, through and before one another, each of another grey."""
