@@ -52,7 +52,7 @@ def _out() -> list[dict[str, Any]]:
 
 
 def standing(aft_m: float, faults: list[dict[str, Any]]) -> dict[str, Any]:
-    """Settings of a flight that stays at its stand-off."""
+    """Settings of a flight that begins so far aft and comes to its stand-off, from where no approach is begun."""
     return {"start.aft_m": aft_m, "faults": faults, "guidance.stabilise_s": 60.0}
 
 
