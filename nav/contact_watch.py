@@ -2,8 +2,9 @@
 
 The claim is that of the newest pose which was tested (`integrity.contact`), about the belief as it is now, and wider by
 what the belief foretells wrongly while no frame comes (`integrity.coasting`). A pose that the filter's gate refuses is
-one, too: close in what is refused may be tenths of a pixel, which are tenths of a millimetre. If the drogue has been
-struck it has gone the way d to that pose since the last frame that was used, in the time t, and goes on,
+one, too: close in what is refused may be off by a few hundredths of a pixel, which is tenths of a millimetre of drogue.
+If the drogue has been struck it has gone the way d to that pose since the last frame that was used, in the time t, and
+goes on,
 
     the belief is off by d (1 + age / t)                                                                  (1)
 

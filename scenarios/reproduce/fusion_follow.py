@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from dockair.messages import NavSolution
 from dockair.nav.fusion import FilterState, FusionSettings, RelativeFilter
 from dockair.nav.pose.estimate import solve_pose
 from dockair.nav.pose.planar import mirrored
@@ -101,7 +102,7 @@ def _row(filter_: RelativeFilter, flown: Flown, tick: int, taken: int, used: boo
     return float(flown.time_s[tick]), p_CD[0], error, state.covariance, error_C, nis, freedom, used, side
 
 
-def true_error(flown: Flown, tick: int, state: FilterState) -> Array:
+def true_error(flown: Flown, tick: int, state: FilterState | NavSolution) -> Array:
     """(9,) of (phi, p_PD_B, v_PD_B), true less believed."""
     R_NB, mounting = flown.R_NB[tick], flown.sheets.mounting
     tip = mounting.p_BP - mounting.p_BI

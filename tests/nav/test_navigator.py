@@ -194,7 +194,7 @@ def test_leds_out_of_the_rings_plane_are_not_refused_close_in(seed):
 def test_an_led_that_wanders_off_slower_than_any_frame_can_see_is_left_out_at_last(led):
     """It goes 0.1 mm outward in a second, 6 mm in all; the fusion follows it as if its place were being learnt.
 
-    What is claimed meanwhile counts what was learnt: without that the levels were passed by half, and for seconds.
+    What is claimed meanwhile counts what was learnt: without that errors are up to 1.8 times their levels, for seconds.
     """
     sky, over, left_out = Sky(None, still), [], []
     outward_D = sky.sheets.ring.positions_D[led] / np.linalg.norm(sky.sheets.ring.positions_D[led])
@@ -205,11 +205,12 @@ def test_an_led_that_wanders_off_slower_than_any_frame_can_see_is_left_out_at_la
         if tick >= 5000 and solution.status == "pose used":
             left_out.append(out)
         if tick >= 100:
-            error, levels = solution.p_PD_B - still(0.0), sky.navigator.contact_claim().levels
-            over.append(max(abs(error[0]) / levels.range_m, np.hypot(*error[1:]) / levels.lateral_m))
-            assert abs(error[0]) < ContactLimits().range_m and np.hypot(*error[1:]) < ContactLimits().lateral_m
+            error_C = sky.sheets.mounting.R_BC.T @ (solution.p_PD_B - still(0.0))  # the axes of the levels
+            along, across, levels = abs(error_C[0]), np.hypot(*error_C[1:]), sky.navigator.contact_claim().levels
+            over.append(max(along / levels.range_m, across / levels.lateral_m))
+            assert along < ContactLimits().range_m and across < ContactLimits().lateral_m
     assert left_out.count([led]) > 20 and left_out.count([led]) + left_out.count([]) > 0.99 * len(left_out)
-    assert np.mean(np.array(over) > 1.0) < 0.02 and max(over) < 1.2
+    assert np.mean(np.array(over) > 1.0) < 0.002 and max(over) < 1.2
 
 
 def test_fewer_than_no_tolerances_of_a_learnt_place_are_refused():
