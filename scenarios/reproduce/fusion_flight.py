@@ -56,7 +56,7 @@ class Approach:
     ramp_s: float = 1.0  # in which the steering begins
     start_sigma_m: float = 0.2
     start_sigma_rad: tuple[float, float, float] = (0.02, 0.009, 0.009)  # as scenarios start
-    drogue_pitch_rad: float = 0.12  # the drogue hangs below the tanker's line: its axis is tilted against the camera's
+    drogue_pitch_rad: float = 0.12  # of its axis against the receiver's, positive nose down: seen 7 deg off frontal
     belief: FusionSettings = field(default_factory=FusionSettings)  # what the drogue does is drawn from it
     swing_frequency_factor: float = 1.0  # truth over belief
     drive_factor: float = 1.0
