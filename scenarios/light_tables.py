@@ -44,12 +44,7 @@ class Weather(Table):
     @property
     def as_seen(self) -> SeenWeather:
         """As the camera takes it."""
-        return SeenWeather(
-            cloud_cover=self.cloud_cover,
-            cloud_optical_depth=self.cloud_optical_depth,
-            visibility_m=self.visibility_m,
-            night=self.night,
-        )
+        return SeenWeather(**self.model_dump())
 
 
 class CameraOptions(Table):

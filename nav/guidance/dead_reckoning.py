@@ -33,9 +33,9 @@ class DeadReckoning:
     def __init__(self, settings: GuidanceSettings, step_s: float, field: FieldOfView | None = None) -> None:
         self._settings, self._step_s, self._field = settings, step_s, field
         self.place_m: Array = np.zeros(3)  #: (3,) p
-        self.drift_m_s: Array = np.zeros(3)  #: (3,) d: of what was learnt, what may be believed out of view
-        self._ring_m: Array | None = None  # where the drogue was last seen, until it is known by which edge it went
-        self._edge = 0
+        self.drift_m_s: Array = np.zeros(3)  #: (3,) d: as learnt in view, what may be believed of it out of view
+        self._ring_m: Array | None = None  # of a drogue that is in view
+        self._most_m_s, self._edge = settings.unseen_drift_m_s, 0
 
     def see(self, ring_m: Array, middle_m: Array, drift_m_s: Array, *, bearable: bool) -> None:
         """Take note of a drogue that is in view.
@@ -47,9 +47,8 @@ class DeadReckoning:
             bearable: whether the gusts can be borne.
         """
         s = self._settings
-        most_m_s = s.unseen_drift_m_s if bearable else s.unseen_drift_in_gusts_m_s
-        self._ring_m, self.place_m = ring_m, middle_m
-        self.drift_m_s = np.clip(drift_m_s, -most_m_s, most_m_s)
+        self._most_m_s = s.unseen_drift_m_s if bearable else s.unseen_drift_in_gusts_m_s
+        self._ring_m, self.place_m, self.drift_m_s = ring_m, middle_m, drift_m_s
 
     def miss(self, u_m_s: Array, R_NB: Array, *, not_shown: bool) -> None:
         """Advance by one control tick in which the drogue is out of view.
@@ -59,8 +58,8 @@ class DeadReckoning:
             R_NB: (3, 3) the body's axes in the stabilised ones.
             not_shown: whether the newest frame shows the whole field, and no ring in it.
         """
-        if self._field is not None and self._ring_m is not None:
-            self._edge, self._ring_m = self._field.nearest_edge(R_NB.T @ self._ring_m), None
+        if self._ring_m is not None:
+            self._lose(R_NB.T @ self._ring_m)
         out_m = np.zeros(3)
         if self._field is not None and not_shown and self._is_ahead:
             out_m = R_NB @ self._field.out_m(R_NB.T @ self.place_m, self._edge)
@@ -68,6 +67,12 @@ class DeadReckoning:
         self.place_m = self.place_m + (self.drift_m_s - u_m_s + 2.0 * out_m / T) * self._step_s
         drift_m_s = self.drift_m_s + out_m / T**2 * self._step_s
         self.drift_m_s = np.clip(drift_m_s, -most_m_s, most_m_s)
+
+    def _lose(self, ring_B: Array) -> None:
+        """Note by which edge a drogue goes out of view, and keep of its drift what may be believed."""
+        if self._field is not None:
+            self._edge = self._field.nearest_edge(ring_B)
+        self.drift_m_s, self._ring_m = np.clip(self.drift_m_s, -self._most_m_s, self._most_m_s), None
 
     def astern_m_s(self) -> Array:
         """(3,) velocity across to get astern of the drogue; none beside it."""
