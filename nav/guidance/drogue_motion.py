@@ -54,6 +54,8 @@ class DrogueMotion:
         self._pushed_node = np.stack([held_push(A, node_s) for A in self._A])
         self._node_s = node_s
         self._x: Array = np.zeros((3, self._states))
+        self.unforeseen: Array = np.zeros((2, 3))
+        """nu^2/S and ln S of the last place seen: nu off where it was foretold, S the variance of that."""
 
     def start(self, place_m: Array, velocity_m_s: Array) -> None:
         """Begin anew, at rest but for the swing; (3,) each."""
@@ -74,7 +76,7 @@ class DrogueMotion:
         """
         _foretell(self._x, self._felt_share, blown_m_s, self._F, self._pushed, push_m_s2)
         if place_m is not None:
-            _correct(self._x, self._P, self._R, place_m)
+            _correct(self._x, self._P, self._R, place_m, self.unforeseen)
         _spread(self._P, self._F, self._Q)
 
     @property
@@ -96,8 +98,8 @@ class DrogueMotion:
         omega, s, rate = self._omega_rad_s, self._x[:, FIRST_MODE:-1:2].T, self._x[:, FIRST_MODE + 1 : -1 : 2].T
         return np.asarray(np.linalg.norm(omega * np.hypot(omega * s, rate), axis=0))
 
-    def ahead(self, push_m_s2: Array, push_then_m_s2: Array) -> tuple[Array, Array, Array]:
-        """(3,) place [m], velocity [m/s] and acceleration [m/s^2] after the lead time.
+    def ahead(self, push_m_s2: Array, push_then_m_s2: Array) -> Array:
+        """(3, 3) place [m], velocity [m/s] and acceleration [m/s^2] after the lead time, a row each.
 
         Args:
             push_m_s2: (3,) b now; until then it changes steadily, and the swing does not answer to it yet.
@@ -105,7 +107,7 @@ class DrogueMotion:
         """
         out = np.empty((3, 3))
         _predict(self._x, self._lead, self._A, self._lead_s, push_m_s2, push_then_m_s2, out)
-        return out[0], out[1], out[2]
+        return out
 
     def path(self, push_m_s2: Array) -> Array:
         """(n, 3) places [m] at the nodes after the lead time.
@@ -123,10 +125,10 @@ class DrogueMotion:
         times = self._lead_s + self._node_s * np.arange(1, nodes + 1)[:, np.newaxis]
         return np.asarray(m + times * d)
 
-    def mean_ahead(self) -> tuple[Array, Array, Array]:
-        """(3,) the same three without the swing: drift alone."""
+    def mean_ahead(self) -> Array:
+        """(3, 3) the same three without the swing: drift alone."""
         m, d = self._x[:, 0], self._x[:, 1]
-        return m + self._lead_s * d, d.copy(), np.zeros(3)
+        return np.array([m + self._lead_s * d, d, np.zeros(3)])
 
 
 @njit(cache=True)
@@ -155,7 +157,7 @@ def _foretell(x, share, blown, F, pushed, push):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _correct(x, P, R, place):  # type: ignore[no-untyped-def]
+def _correct(x, P, R, place, unforeseen):  # type: ignore[no-untyped-def]
     """Correct the state (3, n) and its covariance P (3, n, n) in place by what is seen, with variances R (3,)."""
     n = x.shape[1]
     PH = np.empty(n)
@@ -163,6 +165,7 @@ def _correct(x, P, R, place):  # type: ignore[no-untyped-def]
         for i in range(n):
             PH[i] = _at(P[axis, i], 0)
         off, variance = place[axis] - _at(x[axis], 0), _at(PH, 0) + R[axis]
+        unforeseen[0, axis], unforeseen[1, axis] = off * off / variance, np.log(variance)
         for i in range(n):
             x[axis, i] += PH[i] / variance * off
             for j in range(i + 1):

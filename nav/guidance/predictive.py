@@ -1,7 +1,7 @@
 """Follows the drogue by prediction: flies now what the drogue will do when the receiver has answered.
 
 With y_D place of the drogue and y_r that of the receiver on its own scale, both a response time ahead
-(`drogue_motion`, `own_path`), and e what the tip then still strays at, the tip goes across as planned for the next
+(`multiple_models`, `own_path`), and e what the tip then still strays at, the tip goes across as planned for the next
 second and a half (`path_plan`), from where commands and straying will have brought it to where the drogue is predicted.
 Along, the commanded velocity u goes to
 
@@ -29,8 +29,8 @@ from dataclasses import replace
 import numpy as np
 
 from dockair.nav.guidance.controller import Sight, Wanted, clipped
-from dockair.nav.guidance.drogue_motion import DrogueMotion
 from dockair.nav.guidance.guidance_settings import PredictiveSettings
+from dockair.nav.guidance.multiple_models import MultipleModels
 from dockair.nav.guidance.own_path import OwnPath
 from dockair.nav.guidance.path_plan import PathPlan
 from dockair.rotations import Array
@@ -64,7 +64,7 @@ class Predictive:
         plan = settings.plan
         straying_s, limit_m_s = np.array(settings.straying_s), np.array(settings.straying_limit_m_s)
         self._own = OwnPath(response_s, step_s, straying_s, settings.forgotten_s, limit_m_s)
-        self._motion = DrogueMotion(settings.swing, step_s, response_s, plan.node_s)
+        self._motion = MultipleModels(settings.swing, step_s, response_s, plan.node_s)
         self._plans, self._patient_plans = (
             [
                 PathPlan(plan, k * acceleration_limit_m_s2[i], k * jerk_limit_m_s3[i])
@@ -77,7 +77,7 @@ class Predictive:
         self._times: Array = np.append(0.0, nodes)
         node_times = response_s + plan.node_s * np.arange(1, plan.nodes + 1)[:, np.newaxis]  # (nodes, 3)
         self._strays_s = self._own.strays_s(node_times)
-        self._ahead: tuple[Array, Array, Array] = (np.zeros(3), np.zeros(3), np.zeros(3))
+        self._ahead: Array = np.zeros((3, 3))  # place, velocity, acceleration
         self._push: Array = np.zeros((len(self._times), 3))
         self._u_dot: Array = np.zeros(3)
         self._calm = np.array(settings.calm_share) * acceleration_limit_m_s2[1:]
@@ -181,7 +181,7 @@ class Predictive:
         """Eq. (1)."""
         s = self._settings
         gain = s.along_gain_1_s
-        place, velocity, acceleration = (v[0] for v in (self._ahead if bearable else self._motion.mean_ahead()))
+        place, velocity, acceleration = (self._ahead if bearable else self._motion.mean_ahead())[:, 0]
         velocity = velocity - self._own.straying_ahead_m_s[0]
         if wanted.distance_m is None:
             goal, change = velocity + wanted.speed_m_s, 0.0

@@ -1,8 +1,8 @@
 """How well guidance foretells the drogue in moderate gusts: the filter that is flown, beside ones that know less.
 
 Every flight is flown once, on perfect navigation and up to contact; what guidance was told and commanded is then gone
-through by each filter, so that all of them see the same drogue. A place foretold on the receiver's own scale is held
-against where the drogue was on it when the time had come.
+through by each filter, so that all of them see the same drogue; likewise on two hoses that guidance does not know. A
+place foretold on the receiver's own scale is held against where the drogue was on it when the time had come.
 
 Not in it: the camera, whose frames are old and noisy, and the IMU, whose bias turns gravity; what they add stands on
 the page. What of the receiver's own motion nobody foresees is in none of the figures.
@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from dockair.nav.guidance.drogue_motion import DrogueMotion
+from dockair.nav.guidance.multiple_models import MultipleModels
 from dockair.nav.guidance.own_path import OwnPath
 from dockair.nav.guidance.stabilised_axes import StabilisedAxes
 from dockair.nav.guidance.swing_model import SwingSettings
@@ -34,6 +34,11 @@ SEEDS = 8
 _FIRST_SEED = 21400
 _SOURCE = "none: filters beside each other, on the same flights"
 _SCENARIO, _OVERRIDES = "moderate_gusts", {"navigation.navigator": "truth"}
+HOSES: Mapping[str, Mapping[str, float]] = {  # length of the hose, drag of the drogue
+    "nominal": {},
+    "long, little drag": {"parameters.hose.length_m": 20.0, "parameters.drogue.drag_coefficient": 0.65},
+    "short, much drag": {"parameters.hose.length_m": 11.0, "parameters.drogue.drag_coefficient": 0.95},
+}
 _WAITING = ("join_up", "pre_contact", "approach")
 _FROM_S, _LONGEST_S = 6.0, 60.0  # what a filter foretells in its first seconds is not counted
 _NODE_S, _AHEAD_S = 0.05, (0.2, 0.3, 0.4, 0.6)
@@ -52,14 +57,16 @@ class Told:
 
 
 def reproduce(out: Path | None, seeds: int = SEEDS) -> dict[str, Any]:
-    """Fly, go through every flight with every filter; error against time ahead in `out`."""
-    flights = [fly(seed) for seed in range(_FIRST_SEED, _FIRST_SEED + seeds)]
+    """Fly, go through every flight with every filter; error against time ahead on the nominal hose in `out`."""
     rows, errors = [], {}
-    for name, swing in knowledge(flown_settings()).items():
-        errors[name] = [unforeseen_m(told, swing) for told in flights]
-        rows.append({"case": name, "ours": _figures(errors[name]), "reference": {}})
+    for hose in HOSES:
+        flights = [fly(seed, hose) for seed in range(_FIRST_SEED, _FIRST_SEED + seeds)]
+        for name, swing in knowledge(flown_settings()).items():
+            found = [unforeseen_m(told, swing) for told in flights]
+            errors[hose, name] = found
+            rows.append({"case": f"{hose}: {name}", "ours": _figures(found), "reference": {}})
     if out is not None:
-        _draw(errors, out / picture_name(ID))
+        _draw({name: found for (hose, name), found in errors.items() if not HOSES[hose]}, out / picture_name(ID))
     return {"id": ID, "source": _SOURCE, "rows": rows}
 
 
@@ -70,18 +77,20 @@ def flown_settings() -> SwingSettings:
 
 def knowledge(flown: SwingSettings) -> Mapping[str, SwingSettings]:
     """Return the filters: the one that flies with some of its knowledge taken away."""
+    nominal = replace(flown, frequency_ratios=(1.0,))
     modes = tuple(replace(mode, felt_share=(0.0,) * 3) for mode in flown.modes)
-    deaf = replace(flown, modes=modes, gust_felt_share=(0.0,) * 3)
+    deaf = replace(nominal, modes=modes, gust_felt_share=(0.0,) * 3)
     return {
         "one swing": replace(deaf, modes=modes[:1]),
         "three modes": deaf,
-        "three modes, and what is felt (flown)": flown,
+        "three modes, and what is felt": nominal,
+        "the same, not told which hose it is (flown)": flown,
     }
 
 
-def fly(seed: int) -> Told:
+def fly(seed: int, hose: str = "nominal") -> Told:
     """Fly a seed up to contact."""
-    scenario = load_scenario(_SCENARIO, _OVERRIDES)
+    scenario = load_scenario(_SCENARIO, {**_OVERRIDES, **HOSES[hose]})
     step_s = 1.0 / scenario.rates.control_hz
     axes = StabilisedAxes(guidance_settings(scenario).levelling_s, step_s)
     flight = Flight(scenario, seed)
@@ -111,7 +120,7 @@ def unforeseen_m(told: Told, swing: SwingSettings) -> Array:
     predictive = settings.predictive
     straying_s, limit_m_s = np.array(predictive.straying_s), np.array(predictive.straying_limit_m_s)
     own = OwnPath(np.array(settings.response_s), step_s, straying_s, predictive.forgotten_s, limit_m_s)
-    motion = DrogueMotion(swing, step_s, np.zeros(3), _NODE_S)
+    motion = MultipleModels(swing, step_s, np.zeros(3), _NODE_S)
     nodes = np.round(np.array(_AHEAD_S) / _NODE_S).astype(int) - 1
     came, foretold = np.empty_like(told.place_m), np.full((len(told.place_m), len(_AHEAD_S), 3), np.nan)
     motion.start(told.place_m[0], told.rate_m_s)

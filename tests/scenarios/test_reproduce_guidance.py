@@ -42,7 +42,8 @@ def test_of_a_drogue_that_drifts_nothing_is_unforeseen_however_the_receiver_move
         felt_m_s=np.diff(velocity, axis=0, prepend=velocity[:1]),
         commanded_m_s=commanded,
     )
-    error = foretelling.unforeseen_m(told, foretelling.flown_settings())
+    known_hose = foretelling.knowledge(foretelling.flown_settings())["three modes, and what is felt"]
+    error = foretelling.unforeseen_m(told, known_hose)
     counted = np.isfinite(error).all(axis=(1, 2))
     assert not counted[:600].any() and not counted[-60:].any() and counted[600:-60].all()
     assert np.abs(error[1500:-60]).max() < 0.001  # from 15 s on, when the drift is known
@@ -55,7 +56,18 @@ def test_three_modes_foretell_better_than_one_swing_and_what_is_felt_better_up()
         name: np.sqrt(np.nanmean(foretelling.unforeseen_m(told, swing) ** 2, axis=0))
         for name, swing in foretelling.knowledge(foretelling.flown_settings()).items()
     }
-    one, three, felt = rms.values()
+    one, three, felt, unknown = rms.values()
     assert (three[:, 1:] < 0.9 * one[:, 1:]).all()
     assert (felt[:, 2] < 0.95 * three[:, 2]).all()
     np.testing.assert_array_equal(felt[:, 1], three[:, 1])  # to the left nothing is felt
+    assert (unknown[:, 1:] < 1.05 * felt[:, 1:]).all()  # what it costs not to know which hose it is
+
+
+@pytest.mark.slow
+def test_on_another_hose_the_filter_that_learns_which_it_is_foretells_better():
+    told = foretelling.fly(21404, "long, little drag")
+    nominal, flown = list(foretelling.knowledge(foretelling.flown_settings()).values())[-2:]
+    known, learnt = (
+        np.nanmean(foretelling.unforeseen_m(told, swing) ** 2, axis=0)[:, 1:] for swing in (nominal, flown)
+    )
+    assert (learnt < 0.8 * known).all()
