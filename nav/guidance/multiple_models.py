@@ -17,9 +17,8 @@ forgotten in time T_m, and summed over left and up, for it is one hose. What is 
 Kirubarajan, Estimation with Applications to Tracking and Navigation, 2001, 11.6.2). There every nu counts; here as many
 as are independent of each other, N: what a model leaves unforeseen it leaves so for some T_n.
 
-Not modelled: other ratios between swing and overtones, left and up than the nominal hose's; other damping, other
-shares of what is felt. On hoses and drogues drawn at random each of these
-would leave up to 7 % less unforeseen.
+Not modelled: that a long hose's overtones are lower by more than its swing is; other damping, other shares of what is
+felt. On hoses and drogues drawn at random each of these would leave up to 7 % less unforeseen.
 """
 
 from collections.abc import Callable
