@@ -36,7 +36,6 @@ class DrogueMotion:
 
     def __init__(self, settings: SwingSettings, step_s: float, lead_s: Array, node_s: float) -> None:
         self._lead_s = np.asarray(lead_s)
-        self._omega_rad_s = 2.0 * np.pi * np.array([mode.frequency_hz for mode in settings.modes])  # (modes, 3)
         self._felt_share = np.array([*(mode.felt_share for mode in settings.modes), settings.gust_felt_share])
         self._states = FIRST_MODE + 2 * len(settings.modes) + 1
         self._A = np.stack([dynamics(settings, axis) for axis in range(3)])
@@ -89,14 +88,16 @@ class DrogueMotion:
         """(3,) m: the place without the swing."""
         return self._x[:, 0].copy()
 
-    @property
-    def swing_m_s2(self) -> Array:
+    def swing_m_s2(self, omega_rad_s: Array) -> Array:
         """(3,) acceleration at the ends of the swing of now, omega hypot(omega s, s'), if no gust drove it on.
 
         Of the modes, the root of the sum of squares.
+
+        Args:
+            omega_rad_s: (modes, 3) of a hose on which it would swing so.
         """
-        omega, s, rate = self._omega_rad_s, self._x[:, FIRST_MODE:-1:2].T, self._x[:, FIRST_MODE + 1 : -1 : 2].T
-        return np.asarray(np.linalg.norm(omega * np.hypot(omega * s, rate), axis=0))
+        s, rate = self._x[:, FIRST_MODE:-1:2].T, self._x[:, FIRST_MODE + 1 : -1 : 2].T
+        return np.asarray(np.linalg.norm(omega_rad_s * np.hypot(omega_rad_s * s, rate), axis=0))
 
     def ahead(self, push_m_s2: Array, push_then_m_s2: Array) -> Array:
         """(3, 3) place [m], velocity [m/s] and acceleration [m/s^2] after the lead time, a row each.

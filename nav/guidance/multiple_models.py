@@ -45,7 +45,8 @@ class MultipleModels:
     def __init__(self, settings: SwingSettings, step_s: float, lead_s: Array, node_s: float) -> None:
         ratios = np.array(settings.frequency_ratios)
         self._filters = [DrogueMotion(settings.stiffened(r), step_s, lead_s, node_s) for r in settings.frequency_ratios]
-        self._usual = 0.5 * (np.log(ratios) / settings.ratio_sigma) ** 2
+        self._usual_rad_s = 2.0 * np.pi * np.array([mode.frequency_hz for mode in settings.modes])  # (modes, 3)
+        self._prior = 0.5 * (np.log(ratios) / settings.ratio_sigma) ** 2
         self._kept, self._counts = np.exp(-step_s / settings.ratio_memory_s), step_s / settings.unforeseen_s
         self._log_ratios = np.log(ratios)
         self._count = 1.0  # N: as if one nu had been as foreseen by all
@@ -56,7 +57,7 @@ class MultipleModels:
     def _weigh(self) -> None:
         """Eqs. (2) and (3)."""
         A, B = self._sums[:, 0], self._sums[:, 1]
-        cost = 0.5 * (self._count * np.log(A / self._count) + B).sum(axis=1) + self._usual
+        cost = 0.5 * (self._count * np.log(A / self._count) + B).sum(axis=1) + self._prior
         weights = np.exp(cost.min() - cost)
         weights[weights < _LEAST * weights.sum()] = 0.0
         weights /= weights.sum()
@@ -109,8 +110,11 @@ class MultipleModels:
 
     @property
     def swing_m_s2(self) -> Array:
-        """(3,) acceleration at the ends of the swing of now."""
-        return self._mean(lambda motion: motion.swing_m_s2)
+        """(3,) acceleration at the ends of the swing of now, if it were a swing of the usual hose.
+
+        By its own frequencies a slow swing would ask for less; but on a long hose gusts do more that nobody foresees.
+        """
+        return self._mean(lambda motion: motion.swing_m_s2(self._usual_rad_s))
 
     def ahead(self, push_m_s2: Array, push_then_m_s2: Array) -> Array:
         """(3, 3) place [m], velocity [m/s] and acceleration [m/s^2] after the lead time, a row each.

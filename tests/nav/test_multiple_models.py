@@ -56,10 +56,11 @@ def test_with_one_ratio_it_is_the_filter_itself():
         for motion in (alone, one):
             motion.step(place if k % 5 else None, push[0], felt)
     assert one.frequency_ratio == 1.0
+    omega = 2.0 * np.pi * np.array([mode.frequency_hz for mode in KNOWN.modes])
+    np.testing.assert_array_equal(one.swing_m_s2, alone.swing_m_s2(omega))
     for ask in (
         lambda motion: motion.drift_m_s,
         lambda motion: motion.middle_m,
-        lambda motion: motion.swing_m_s2,
         lambda motion: motion.ahead(push[0], push[1]),
         lambda motion: motion.path(push),
         lambda motion: motion.mean_path(5),
@@ -172,3 +173,11 @@ def test_what_is_unforeseen_is_told_with_its_variance():
         P = any_moment(settings, axis, settings.drift_sigma_m_s)
         S = PLACE_ROW @ P @ PLACE_ROW + settings.position_sigma_m[axis] ** 2
         np.testing.assert_allclose(motion.unforeseen[:, axis], [(seen - begin)[axis] ** 2 / S, np.log(S)], rtol=1e-9)
+
+
+def test_a_slow_swing_is_as_unquiet_as_one_of_the_usual_hose():
+    """Of the first mode by 0.2 m: omega^2 s, with the omega of the settings."""
+    motion = MultipleModels(replace(SwingSettings(), frequency_ratios=(0.7,)), STEP_S, LEAD_S, NODE_S)
+    motion._filters[0]._x[:, 2] = 0.2
+    omega = 2.0 * np.pi * np.array(SwingSettings().modes[0].frequency_hz)
+    np.testing.assert_allclose(motion.swing_m_s2, 0.2 * omega**2, rtol=1e-12)
