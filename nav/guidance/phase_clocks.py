@@ -22,7 +22,7 @@ class PhaseClocks:
         self.steady_s = 0.0  #: steady astern of the drogue; stands still while its place is not known well
         self.unsure_s = 0.0  #: the drogue's place has not been known well
         self.patient_s = 0.0  #: waiting for a calm moment, astern or in the approach
-        self.unusable_s = 0.0  #: the relative state has been unusable, once it has been usable
+        self.unusable_s = 0.0  #: the relative state has been unusable, from the start on
         self.track_lost_s = 0.0  #: the same, or since the newest frame that was used, whichever is longer
         self.blind_s = 0.0  #: unusable beyond that for which it has been usable
         self.doubtful_s = 0.0  #: the integrity monitor has not claimed that contact may be flown
@@ -69,7 +69,7 @@ class PhaseClocks:
     def _see(self, state: RelativeState) -> None:
         dt = self._step_s
         self._has_seen = self._has_seen or state.usable
-        self.unusable_s = self.unusable_s + dt if self._has_seen and not state.usable else 0.0
+        self.unusable_s = 0.0 if state.usable else self.unusable_s + dt
         self.track_lost_s = max(self.unusable_s, state.age_s if self._has_seen else 0.0)
         self.blind_s = max(self.blind_s + (dt if self.unusable_s > 0.0 else -dt), 0.0)
         stop = self._limits.frames_stop_s < state.frame_age_s < math.inf  # infinite where nobody says

@@ -78,7 +78,7 @@ class Situation:
     radius_m: float  #: what that may be, after so much waiting
     waiting_s: float  #: time for which the approach has stood still for want of a good moment
     inside_s: float  #: time for which the tip has been past the ring's plane
-    unusable_s: float  #: time for which the relative state has been unusable, once it has been usable
+    unusable_s: float  #: time for which the relative state has been unusable, from the start on
     track_lost_s: float  #: the same, or since the newest frame that was used, whichever is longer
     blind_s: float  #: time for which it has been unusable beyond that for which it has been usable
     doubtful_s: float  #: time for which the integrity monitor has not claimed that contact may be flown

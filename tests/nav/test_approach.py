@@ -518,12 +518,19 @@ def test_a_basket_that_was_passed_on_purpose_teaches_nothing():
     np.testing.assert_array_equal(guidance._aim, np.zeros(2))
 
 
-def test_does_not_close_on_an_unusable_state():
-    guidance = Guidance(SETTINGS, RATE_HZ)
+def test_from_a_drogue_that_was_never_seen_it_falls_straight_back_and_leaves_in_the_end():
+    """From farther away the camera's field is wider; the first frames are given time."""
+    guidance, unseen = Guidance(SETTINGS, RATE_HZ), state([4.0, 0.0, 0.0], usable=False, sigma_lateral_m=1.0)
+    for _ in range(round(SETTINGS.limits.lost_s * RATE_HZ) - 1):
+        command = guidance.step(unseen)
+        assert not command.velocity_m_s.any()
     for _ in range(10 * RATE_HZ):
-        command = guidance.step(state([4.0, 0.0, 0.0], usable=False, sigma_lateral_m=1.0))
+        command = guidance.step(unseen)
     assert guidance.phase is Phase.PRE_CONTACT
-    assert not command.velocity_m_s.any()
+    np.testing.assert_allclose(command.velocity_m_s, [-SETTINGS.back_off_speed_m_s, 0.0, 0.0], atol=0.01)
+    for _ in range(round(SETTINGS.limits.lost_for_good_s - 10.0) * RATE_HZ):
+        guidance.step(unseen)
+    assert guidance.phase is Phase.CLEAR and guidance.phase_reason == "drogue lost"
 
 
 def test_without_the_integrity_s_claim_no_ring_is_passed():

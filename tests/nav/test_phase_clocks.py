@@ -39,9 +39,10 @@ def after(clocks, *steps):
     return clocks
 
 
-def test_a_drogue_never_seen_is_not_lost():
+def test_a_drogue_that_was_never_seen_is_out_of_view_from_the_start():
+    """Who waits for it where the flight began waits beside it for ever, and drifts."""
     clocks = after(PhaseClocks(STEP_S, LIMITS), *[(Phase.JOIN_UP, UNSEEN, {})] * 4)
-    assert clocks.unusable_s == clocks.track_lost_s == clocks.blind_s == 0.0
+    assert clocks.unusable_s == clocks.track_lost_s == clocks.blind_s == 2.0
     assert clocks.doubtful_s == clocks.time_s == clocks.in_phase_s == 2.0
 
 
