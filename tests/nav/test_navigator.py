@@ -373,11 +373,13 @@ def test_hidden_leds_do_not_rename_the_others(render):
     assert np.abs(solution.p_PD_B - still(0.0)).max() < 0.02
 
 
-def test_without_frames_nothing_is_valid_and_the_command_stays_still(render):
-    solution = Sky(render, still).run(0.5, camera=False)
+def test_without_frames_nothing_is_valid_and_the_receiver_stays_still_and_then_falls_straight_back(render):
+    sky = Sky(render, still)
+    solution = sky.run(0.4, camera=False)
     assert not solution.valid and solution.status == "no frame yet"
     assert np.isnan(solution.covariance).all() and np.isfinite(solution.p_PD_B).all()
     assert not solution.command.velocity_m_s.any()
+    np.testing.assert_allclose(sky.run(5.0, camera=False).command.velocity_m_s, [-1.0, 0.0, 0.0], atol=0.02)
 
 
 def test_a_camera_that_goes_dark_is_a_status_and_ends_validity(render):
