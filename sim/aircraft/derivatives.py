@@ -3,16 +3,18 @@
 With the flow angles alpha and beta, and the rates (P, Q, R) beyond those of the air, forward-right-down, taken to
 stability axes (x along the flow in the plane of symmetry: P_s = P cos alpha + R sin alpha, R_s likewise):
 
-    CL = CL0 + CLalpha alpha + CLq Q c/2Va + CLe elevator,     CD = CD0 + k CL^2                          (1)
+    CL = CL0 + CLalpha alpha + (CLq Q + CLalphadot q) c/2Va + CLe elevator,     CD = CD0 + k CL^2         (1)
     CX = CL sin alpha - CD cos alpha,                          CZ = -CL cos alpha - CD sin alpha          (2)
-    Cm = Cm0 + Cmalpha alpha + Cmq Q c/2Va + Cme elevator                                                 (3)
+    Cm = Cm0 + Cmalpha alpha + (Cmq Q + Cmalphadot q) c/2Va + Cme elevator                                (3)
     CY, Cl_s, Cn_s = D (beta, P_s b/2Va, R_s b/2Va, aileron, rudder)                                      (4)
 
-Moments are turned back into body axes; force and moment follow as Eq. (8) of `aerodynamics`. Derivatives after the rate
-of alpha are counted with those after the pitch rate, as in the short period where both are nearly the same.
+Moments are turned back into body axes; force and moment follow as Eq. (8) of `aerodynamics`. For the rate of alpha the
+aircraft's own pitch rate q is taken, as in the short period where both are nearly the same; the air's is no part of it,
+for in a wake's gradient alpha stays as it is.
 
 Valid within the ranges of the sheet, where a lift curve and a polar are straight and parabolic; beyond, alpha and beta
-hold their last value. Not modelled: stall, Mach effects, the lag of the downwash behind a plunging gust.
+hold their last value. Not modelled: stall, Mach effects; the lag of the downwash behind a gust, which would take back
+Cmalphadot of the Cmq by which the gust's gradient pitches the aircraft.
 Source: Roskam, Airplane Flight Dynamics and Automatic Flight Controls, part I, chapters 3 and 5.
 """
 
@@ -33,9 +35,9 @@ class DerivativeAirframe(AirframeData):
 
     angle_of_attack_ends_rad: Array  #: (2,)
     sideslip_end_rad: float
-    lift: Array  #: (4,) CL0, CLalpha, CLq, CLe
+    lift: Array  #: (5,) CL0, CLalpha, CLq, CLalphadot, CLe
     drag: Array  #: (2,) CD0, k
-    pitching_moment: Array  #: (4,) Cm0, Cmalpha, Cmq, Cme
+    pitching_moment: Array  #: (5,) Cm0, Cmalpha, Cmq, Cmalphadot, Cme
     side_force: Array  #: (5,) after beta, P, R, aileron, rudder
     rolling_moment: Array  #: (5,)
     yawing_moment: Array  #: (5,)
@@ -58,7 +60,7 @@ class DerivativeAirframe(AirframeData):
 class DerivativeAerodynamics:
     """Eqs. (1) to (4)."""
 
-    constants: Array  #: (17,) density, S, b, c, ends of alpha and beta, lift, drag, pitching moment
+    constants: Array  #: (19,) density, S, b, c, ends of alpha and beta, lift, drag, pitching moment
     lateral: Array  #: (3, 5) D of Eq. (4)
 
     def force_and_moment(
@@ -84,11 +86,12 @@ def _force_and_moment(k, lateral, v_B, w_B, surfaces, air_rotation_B, wrench):  
     S, b, c = k[1], k[2], k[3]
     P = _FLIP[0] * (w_B[0] - air_rotation_B[0]) * 0.5 * b / airspeed
     Q = _FLIP[1] * (w_B[1] - air_rotation_B[1]) * 0.5 * c / airspeed
+    own_Q = _FLIP[1] * w_B[1] * 0.5 * c / airspeed
     R = _FLIP[2] * (w_B[2] - air_rotation_B[2]) * 0.5 * b / airspeed
     cosine, sine = np.cos(direction), np.sin(direction)
-    CL = k[7] + k[8] * alpha + k[9] * Q + k[10] * surfaces[0]  # Eq. (1)
-    CD = k[11] + k[12] * CL * CL
-    Cm = k[13] + k[14] * alpha + k[15] * Q + k[16] * surfaces[0]  # Eq. (3)
+    CL = k[7] + k[8] * alpha + k[9] * Q + k[10] * own_Q + k[11] * surfaces[0]  # Eq. (1)
+    CD = k[12] + k[13] * CL * CL
+    Cm = k[14] + k[15] * alpha + k[16] * Q + k[17] * own_Q + k[18] * surfaces[0]  # Eq. (3)
     z = (beta, P * cosine + R * sine, R * cosine - P * sine, surfaces[1], surfaces[2])
     CY = Cl = Cn = 0.0
     for j in range(5):  # Eq. (4)

@@ -86,11 +86,19 @@ def test_lateral_derivatives_are_the_sheets_about_stability_axes(alpha: float) -
 
 
 def test_air_that_turns_with_the_aircraft_is_not_felt() -> None:
-    rates = (0.01, 0.002, -0.01)
+    rates = (0.01, 0.0, -0.01)  # a pitch rate is, as a rate of alpha
     b, c = AIRFRAME.span_m, AIRFRAME.chord_m
     w_B = np.array([1.0, -1.0, -1.0]) * np.array(rates) * 2.0 * V / np.array([b, c, b])
     np.testing.assert_allclose(in_stability_axes(rates_s=rates, air_rotation_B=w_B), in_stability_axes(), atol=1e-15)
     assert in_stability_axes(air_rotation_B=np.array([0.1, 0.0, 0.0]))[3] > 1e-4  # rolls to the right with the air
+
+
+def test_gradient_of_the_air_pitches_it_by_what_the_tail_feels_and_not_by_the_downwashs_lag() -> None:
+    """Upwash that grows forward is air that pitches up: felt as a nose that pitches down, without a rate of alpha."""
+    c, q = AIRFRAME.chord_m, 0.004
+    air = np.array([0.0, -q * 2.0 * V / c, 0.0])  # nose up is about -y
+    felt = in_stability_axes(air_rotation_B=air) - in_stability_axes()
+    assert felt[[2, 4]] == pytest.approx([-4.1 * q, 14.9 * q], abs=1e-12)
 
 
 def test_beyond_its_range_the_flow_angles_hold() -> None:
