@@ -138,7 +138,8 @@ def build(scenario: Scenario, seed: int) -> Parts:
         settle_s=SETTLE_S,
     )
     path, announcer = _tanker_path(scenario, seed, parameters)
-    world = World(parameters, receiver, motion, start, clock, faults.reel_locked, path, faults.reel_known_dead)
+    pod_light = PodLight(faults.reel_seen_dead, _sheet(scenario, "pod_light", PodLightParameters))
+    world = World(parameters, receiver, motion, start, clock, faults.reel_locked, path, pod_light.is_red)
     place_leds(world.model, world.data, sheets.ring)
     as_built = _as_built(scenario, seed, sheets)
     if scenario.navigation.is_truth:
@@ -169,7 +170,7 @@ def build(scenario: Scenario, seed: int) -> Parts:
         clock=clock,
         periods=periods,
         announcer=announcer,
-        pod_light=PodLight(faults.reel_known_dead, _sheet(scenario, "pod_light", PodLightParameters)),
+        pod_light=pod_light,
     )
 
 

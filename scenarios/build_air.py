@@ -97,6 +97,6 @@ def _single_gusts(scenario: Scenario, world: WorldParameters, clock: Clock, sett
         ],
         world.airspeed_m_s,
         clock.step_s,
-        met_at_m=float(rest.p_WH[-1, 0]),
+        met_at_m=float(rest.air_places_W(world.drogue)[-1, 0]),
         start_s=-round(settle_s / clock.step_s) * clock.step_s,
     )

@@ -221,8 +221,8 @@ class Faults:
         """Whether the reel is dead at a time."""
         return bool(self._faults) and bool(self._acting(DeadReel, time_s))
 
-    def reel_known_dead(self, time_s: float) -> bool:
-        """Whether the hose unit knows at a time that the reel is dead."""
+    def reel_seen_dead(self, time_s: float) -> bool:
+        """Whether the reel at a time is dead in a way that the hose unit can notice."""
         return bool(self._faults) and any(not fault.unnoticed for fault in self._acting(DeadReel, time_s))
 
     def _acting(self, kind: type[T], time_s: float) -> list[T]:

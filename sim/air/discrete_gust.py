@@ -5,9 +5,9 @@ A point that lies a distance s inside the gust's front meets
     v(s) = v_max (1 - cos(pi s / H)) / 2    for 0 <= s <= 2 H, and nothing before and after      (1)
     s    = x - x_0 + V (t - t_0)                                                                 (2)
 
-The front meets x_0, the drogue's place at rest, at t_0, and bodies farther aft later. H is the distance from the front
-to the peak: the gust gradient distance of CS-25.341, the gust length d_m of MIL-F-8785C. The latter's gust stays at its
-peak from there on; two of them, the second turned round and 1 H later, make Eq. (1).
+The front meets x_0, where the drogue at rest feels the air (its canopy), at t_0, bodies farther aft later. H is
+the distance from the front to the peak: the gust gradient distance of CS-25.341, the gust length d_m of MIL-F-8785C.
+The latter's gust stays at its peak from there on; two of them, the second turned round and 1 H later, make Eq. (1).
 
 Not modelled: a gust that differs from place to place across the path.
 Sources: CS-25.341 (a)(2); MIL-F-8785C (1980), section 3.7.1.3.

@@ -52,7 +52,7 @@ def _faults(*faults: Fault) -> Faults:
         (GyroSaturation(limit_rad_s=0.5, **TIMES), lambda f, t: f.imu(t).range_rad_s, 0.5, None),
         (GyroDropOut(**TIMES), lambda f, t: f.imu(t).dropped, True, False),
         (DeadReel(**TIMES), lambda f, t: f.reel_locked(t), True, False),
-        (DeadReel(**TIMES), lambda f, t: f.reel_known_dead(t), True, False),
+        (DeadReel(**TIMES), lambda f, t: f.reel_seen_dead(t), True, False),
     ],
     ids=lambda value: type(value).__name__ if isinstance(value, Fault) else "",
 )

@@ -6,7 +6,7 @@ from dockair.sim.hose.pod_light import PodLight, PodLightParameters
 
 
 def _seen(*faults: DeadReel, until_s: float = 20.0, delay_s: float = 1.0) -> list[PodSignal]:
-    light = PodLight(Faults(faults, 8).reel_known_dead, PodLightParameters(delay_s=delay_s))
+    light = PodLight(Faults(faults, 8).reel_seen_dead, PodLightParameters(delay_s=delay_s))
     shown = [light.due(0.25 * k) for k in range(round(4 * until_s) + 1)]
     return [signal for signal in shown if signal is not None]
 
