@@ -21,8 +21,8 @@ They start from their stationary covariance, so that the field is stationary fro
 and between them the gust is linear: the same seed makes the same gusts at any physics rate and any airspeed. Over a
 cell the straight line loses (1 - R(h)/R(0))/3 of the variance, h/(2 L) of v and w, h/(3 L) of u, h/(3 l) of p.
 
-Not modelled: below 2000 ft (another length, anisotropic), change across the path but for the rolling, pitching and
-yawing gusts but for what the field's change along x makes of them, decay of the field on its way. Ahead of the front
+Not modelled: below 2000 ft (another length, anisotropic); change across the path but for the rolling gust; pitching and
+yawing gusts but for what the field's change along x makes of them; decay of the field on its way. Ahead of the front
 the front's gust is taken, beyond the field's end that of its end.
 Source: MIL-F-8785C (1980), section 3.7; the table is its figure 7, in feet and ft/s as printed in public tabulations
 (the curves at 500, 1750, ... ft; probabilities 1e-2, 1e-3, 1e-5).

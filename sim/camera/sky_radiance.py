@@ -100,12 +100,6 @@ class SkyRadiance:
         cosine = (x * a + y * b + z * c) / math.sqrt(x * x + y * y + z * z)
         return float(self._haze(np.array(min(max(cosine, -1.0), 1.0))))
 
-    @property
-    def diffuse_share(self) -> float:
-        """Share of the light on a surface that faces the Sun which does not come from the Sun's direction."""
-        direct = float(self.beam(self._sun[None])[0])  # 0 at night
-        return self.ambient / (self.ambient + direct)
-
     def radiance(self, directions_W: Array) -> Array:
         """Return (n,) relative radiances toward (n, 3) directions at the start: what `fill` reads between nodes."""
         return self._radiance(unit(directions_W), with_aureole=True)

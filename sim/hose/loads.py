@@ -104,13 +104,12 @@ def drogue_force(t: Array, u: Array, k: Array) -> Array:
 
 
 @njit(cache=True)
-def tow_loads(position: Array, R: Array, v: Array, w: Array, air: Array, drawn_in: float, k: Array) -> Array:
+def tow_loads(R: Array, v: Array, w: Array, air: Array, drawn_in: float, k: Array) -> Array:
     """Air loads on every body of the tow: the links from the exit on, then the drogue.
 
     Args:
-        position: (n + 1, 3) centres of mass in W [m]; a link's is its middle.
         R: (n + 1, 3, 3) axes in W; x along the body toward the tanker.
-        v: (n + 1, 3) velocities of the centres of mass in W [m/s].
+        v: (n + 1, 3) velocities of the centres of mass in W [m/s]; a link's is its middle.
         w: (n + 1, 3) angular velocities in W [rad/s].
         air: (n + 1, 3) velocity of the air there, in W [m/s].
         drawn_in: length of hose inside the pod [m]; it feels no air.
@@ -119,7 +118,7 @@ def tow_loads(position: Array, R: Array, v: Array, w: Array, air: Array, drawn_i
     Returns:
         (n + 1, 6) force [N] and moment about the centre of mass [N m], in W.
     """
-    wrench = np.zeros((position.shape[0], 6))
+    wrench = np.zeros((R.shape[0], 6))
     _add_loads(R, v, w, air, drawn_in, k, wrench)
     return wrench
 
@@ -132,7 +131,7 @@ def write_tow_loads(
     """`tow_loads` into an array that is there already (n + 1, 6), of what MuJoCo knows.
 
     Args:
-        position: as above.
+        position: (n + 1, 3) centres of mass in W [m].
         R: as above.
         spatial: (n + 1, 6) angular velocity, and velocity of the body's material at `reference`, in W.
         reference: (3,) point of W.

@@ -113,7 +113,7 @@ class HoseRig:
         v = velocities_at(place, spatial, data.subtree_com[self._tree])
         R = data.xmat[self._tow].reshape(-1, 3, 3)
         w = np.ascontiguousarray(spatial[:, :3])
-        data.xfrc_applied[self._tow] = tow_loads(place, R, v, w, air, 0.0, self._loads)
+        data.xfrc_applied[self._tow] = tow_loads(R, v, w, air, 0.0, self._loads)
         mujoco.mj_step2(model, data)
 
     def relax(self, duration_s: float, brake_1_s: float) -> None:
@@ -158,8 +158,8 @@ class HoseRig:
         v, w = velocities_at(place, spatial, data.subtree_com[self._tree]), np.ascontiguousarray(spatial[:, :3])
         air = np.tile(self._wind_W, (self._bodies, 1))
         rates = np.hstack([v, w])
-        loads = tow_loads(place, R, v, w, air, 0.0, self._loads)
-        at_rest = tow_loads(place, R, np.zeros_like(v), np.zeros_like(w), air, 0.0, self._loads)
+        loads = tow_loads(R, v, w, air, 0.0, self._loads)
+        at_rest = tow_loads(R, np.zeros_like(v), np.zeros_like(w), air, 0.0, self._loads)
         return float(np.sum(at_rest * rates)), float(np.sum((loads - at_rest) * rates))
 
     def energy_j(self) -> float:

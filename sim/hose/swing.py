@@ -126,11 +126,11 @@ class LinearSwing:
         """(n,) generalised forces of air and weight, Eq. (3)."""
         t = self._directions(q)
         slope = np.cos(q)[:, None] * self._n - np.sin(q)[:, None] * self._t0
-        place, v, w = -self._arms @ t, -self._arms @ (rate[:, None] * slope), rate[:, None] * self._axis
+        v, w = -self._arms @ (rate[:, None] * slope), rate[:, None] * self._axis
         R = np.zeros((len(t), 3, 3))
         R[:, :, 0] = t
         air = np.tile(self._wind_W, (len(t), 1))
-        wrench = tow_loads(place, R, v, w, air, 0.0, self._loads)
+        wrench = tow_loads(R, v, w, air, 0.0, self._loads)
         wrench[:, 2] -= self._mass * STANDARD_GRAVITY_M_S2
         by_place = np.einsum("bi,ij,bj->i", -self._arms, slope, wrench[:, :3])
         return np.asarray(by_place + np.einsum("ij,ij->i", self._axis, wrench[:, 3:]))
