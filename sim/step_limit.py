@@ -1,15 +1,22 @@
 """Which physics step a world can bear, found out before it flies.
 
-Semi-implicit integration of an oscillation of angular frequency w is stable while w dt < 2; the fastest of the tow is
-bounded by the sum of the squares of what would be fastest alone,
+Semi-implicit integration of y'' = -c y' - w^2 y, the damping explicit, is stable while
 
-    w^2 <= max eig(M^-1 K)  +  4 T/(m l)  +  4 k_g/m                                                      (1)
+    4 - 2 c dt - w^2 dt^2 > 0                                                                             (1)
 
-bending (M, K: mass and hinge stiffness of the chain), tension T of a string of masses m at distances l, and the tube in
-the pod of stiffness k_g. Contacts and stops as soft springs need two steps in their time constant, or MuJoCo makes them
-softer in silence.
-Not modelled: the damping of hinges, which is implicit, and of air and tube, which is explicit but slower.
-Source: Hairer, Lubich & Wanner, Geometric Numerical Integration, ch. I; MuJoCo's documentation on solver parameters.
+(Schur's condition on its step; without damping w dt < 2). A chain of links of mass m and length l moves fastest when
+its joints go up and down by turns: then each joint moves m/3, and the tow is bounded by the sum of what each part does,
+
+    w^2 <= max eig(M^-1 K)  +  12 T/(m l)  +  15 k_g/m                                                    (2)
+    c    = (6 + 24/sqrt(3)) z_g sqrt(k_g/m)                                                               (3)
+
+bending (M, K: mass and hinge stiffness of the chain), tension T, and the tube in the pod, which holds each joint by
+k_g, its stiffness times l, with a damping ratio z_g, and turns each link by k_g l^2 (`hose.reel.guide_loads`). It is
+the bound of an endless chain in the tube: whatever length of hose is wound in, it holds. Contacts and stops as soft
+springs need two steps in their time constant, or MuJoCo makes them softer in silence.
+Not modelled: the damping of hinges, which is implicit, and that of the air, which is explicit but slower.
+Source: Hairer, Lubich & Wanner, Geometric Numerical Integration, ch. I; MuJoCo's documentation on solver parameters;
+Eqs. (2) and (3) derived from the chain's kinetic and potential energy in that motion.
 """
 
 import mujoco
@@ -36,7 +43,7 @@ def check_step(model: mujoco.MjModel, parameters: WorldParameters, root_tension_
     }
     key = min(softest, key=lambda name: softest[name])
     needed_hz = {key: _STEPS_IN_CONTACT / softest[key]}
-    needed_hz["hose and reel"] = 0.5 * fastest_rad_s(model, parameters, root_tension_n)
+    needed_hz["hose and reel"] = lowest_rate_hz(model, parameters, root_tension_n)
     cause = max(needed_hz, key=lambda name: needed_hz[name])
     if step_s * needed_hz[cause] > 1.0 + 1e-9:  # rounding of a step that just fits
         lowest = int(np.ceil(needed_hz[cause] - 1e-9))
@@ -44,8 +51,8 @@ def check_step(model: mujoco.MjModel, parameters: WorldParameters, root_tension_
         raise DockairError("rates.physics_hz", expected=expected, got=round(1.0 / step_s))
 
 
-def fastest_rad_s(model: mujoco.MjModel, parameters: WorldParameters, root_tension_n: float) -> float:
-    """Bound of Eq. (1) on the tow's angular frequencies."""
+def lowest_rate_hz(model: mujoco.MjModel, parameters: WorldParameters, root_tension_n: float) -> float:
+    """Physics rate at which Eq. (1) is just met, with hose in the tube."""
     hose, reel = parameters.hose, parameters.reel
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
@@ -55,6 +62,8 @@ def fastest_rad_s(model: mujoco.MjModel, parameters: WorldParameters, root_tensi
     hinges = slice(first, last + 1)
     stiffness = np.array([model.jnt_stiffness[j].ravel()[0] for j in model.dof_jntid[hinges]])
     bending = eigh(np.diag(stiffness), M[hinges, hinges], eigvals_only=True)[-1]
-    string = 4.0 * root_tension_n / (hose.link_mass_kg * hose.link_length_m)
-    tube = 4.0 * reel.guide_stiffness_n_m / hose.link_mass_kg
-    return float(np.sqrt(bending + string + tube))
+    string = 12.0 * root_tension_n / (hose.link_mass_kg * hose.link_length_m)
+    tube = reel.guide_stiffness_n_m2 / hose.line_density_kg_m
+    squared = bending + string + 15.0 * tube  # Eq. (2)
+    damping = (6.0 + 24.0 / np.sqrt(3.0)) * reel.guide_damping_ratio * np.sqrt(tube)  # Eq. (3)
+    return float(0.25 * (damping + np.sqrt(damping**2 + 4.0 * squared)))

@@ -1,11 +1,12 @@
 """The reel: holds a tension, within limits of speed and stroke; and the tube that leads the hose inside the pod.
 
     tau dF/dt = T_s + k (T_s - T) - F                                                                    (1)
-    F_hose    = F g(v) + F_b b(v) - d v + max(0, F_0 - k_s q - d_s v)                                    (2)
+    F_hose    = F g(v) + F_b b(v) - d v + max(0, S - d_s v min(1, S/F_0)),   S = max(0, F_0 - k_s q)     (2)
 
 F is the motor's pull on the hose (positive winds in), T the hose's tension at the exit, T_s the set-point. g falls from
 1 to 0 as the winding speed v comes within a band of the take-up limit; b rises from 0 to 1 beyond the pay-out limit: a
-brake. The last term is the outer stop's buffer, with F_0 such that the hose rests on it at q = 0, its full trail.
+brake. The last term is the outer stop's buffer, with F_0 such that the hose rests on it at q = 0, its full trail; S is
+its spring's push. It touches nothing from q = F_0/k_s on, and its damper takes hold as the spring is pressed.
 
 The set-point is a fraction of the static tension T_0 at full trail, but never more than lets the hose run out again by
 itself after the receiver has left, all of the reel's range being wound in, with a force F_m over:
@@ -31,7 +32,7 @@ capped where it is as stiff as the tube. So the drogue moves smoothly while join
 
 Not modelled: the drum's changing diameter, friction of the hose in the tube, slack on the drum; stretch of the hose
 but for Eq. (3); a brake that slips. The reel acts along the pod's axis, so that it balances T cos(theta) of the hose's
-tension: 2 per cent at the usual 12 degrees.
+tension, 2 per cent less than T at the usual 12 degrees; the motor is ruled by T, as a load cell on the hose is.
 Sources: RflySim/RflySimAAR (gain); limits in assets/parameters/reel.toml; Eq. (4) derived from the link's balance.
 """
 
@@ -71,7 +72,7 @@ class ReelParameters:
     lock_stiffness_n_m: float
     lock_damping_n_s_m: float
     stop_time_constant_s: float
-    guide_stiffness_n_m: float
+    guide_stiffness_n_m2: float  #: per metre of hose
     guide_damping_ratio: float
 
 
@@ -99,6 +100,7 @@ class Reel:
     Args:
         parameters: the reel's sheet.
         static_root_tension_n: T_0, tension at the exit at rest at full trail.
+        static_pull_n: T_0 cos(theta_0), what of it pulls along the pod's axis.
         set_point_n: T_s, of `set_point_n`.
         step_s: physics step.
 
@@ -107,13 +109,19 @@ class Reel:
     """
 
     def __init__(
-        self, parameters: ReelParameters, static_root_tension_n: float, set_point_n: float, step_s: float
+        self,
+        parameters: ReelParameters,
+        *,
+        static_root_tension_n: float,
+        static_pull_n: float,
+        set_point_n: float,
+        step_s: float,
     ) -> None:
         _check_limits(parameters)
         self._parameters, self.set_point_n = parameters, set_point_n
         self._blend = float(1.0 - np.exp(-step_s / parameters.response_time_s))
         self.motor_force_n = self._wanted(static_root_tension_n)
-        self._buffer_preload_n = static_root_tension_n - self.motor_force_n
+        self._buffer_preload_n = static_pull_n - self.motor_force_n
         self._held: tuple[float, float] | None = None  # position and tension at which the drum locked
 
     @property
@@ -146,8 +154,11 @@ class Reel:
 
     def _buffer(self, position_m: float, rate_m_s: float) -> float:
         """Last term of Eq. (2)."""
-        p = self._parameters
-        push = self._buffer_preload_n - p.buffer_stiffness_n_m * position_m - p.buffer_damping_n_s_m * rate_m_s
+        p, preload = self._parameters, self._buffer_preload_n
+        spring = preload - p.buffer_stiffness_n_m * position_m
+        if spring <= 0.0:
+            return 0.0
+        push = spring - p.buffer_damping_n_s_m * rate_m_s * min(1.0, spring / preload)
         return 0.0 if push < 0.0 else push
 
     def _locked(self, tension_n: float, position_m: float, rate_m_s: float) -> float:
@@ -188,11 +199,10 @@ def _check_limits(parameters: ReelParameters) -> None:
 
 def guide_coefficients(hose: HoseParameters, reel: ReelParameters, static_root_tension_n: float) -> Array:
     """(6,) vector that `guide_loads` needs: link length and mass, T l, tube stiffness and damping, damping ratio."""
-    length, mass = hose.link_length_m, hose.link_mass_kg
-    damping = 2.0 * reel.guide_damping_ratio * np.sqrt(reel.guide_stiffness_n_m * mass)
-    k = np.array(
-        [length, mass, static_root_tension_n * length, reel.guide_stiffness_n_m, damping, reel.guide_damping_ratio]
-    )
+    length, mass, ratio = hose.link_length_m, hose.link_mass_kg, reel.guide_damping_ratio
+    stiffness = reel.guide_stiffness_n_m2 * length
+    damping = 2.0 * ratio * np.sqrt(stiffness * mass)
+    k = np.array([length, mass, static_root_tension_n * length, stiffness, damping, ratio])
     k.setflags(write=False)
     return k
 

@@ -69,7 +69,11 @@ class Tow:
             raise DockairError("parameters.reel.range_m", expected=expected, got=reel.range_m)
         shorter = replace(hose, length_m=hose.length_m - reel.range_m)
         holds_n = set_point_n(reel, self.rest, rest_shape(shorter, drogue, wind_W, rho, nu))
-        self.reel = Reel(reel, self.rest.root_tension_n, holds_n, step_s)
+        tension_n = self.rest.root_tension_n
+        pull_n = tension_n * float(self.rest.t_W[0, 0])
+        self.reel = Reel(
+            reel, static_root_tension_n=tension_n, static_pull_n=pull_n, set_point_n=holds_n, step_s=step_s
+        )
         self._link_length_m, self._links = hose.link_length_m, hose.links
         self._wind_W = np.array(wind_W, dtype=float)
         self._rates = np.empty((3, hose.links + 1, 3))  # room for velocities; written anew whenever they are asked for
@@ -110,10 +114,8 @@ class Tow:
                 wrench[:-1] += self._guided(*links, drawn_in_m, pod)
         return wrench
 
-    def _guided(self, position: Array, R: Array, v: Array, w: Array, drawn_in_m: float, pod: PodMotion | None) -> Array:
+    def _guided(self, position: Array, R: Array, v: Array, w: Array, drawn_in_m: float, pod: PodMotion) -> Array:
         """(links, 6) what the tube in the pod does to the links, in W; the tube moves with the tanker."""
-        if pod is None:
-            return guide_loads(position, R, v, w, drawn_in_m, self._guide)
         to_T = pod.R_WT  # row vectors of W times this are rows of T
         from_exit = position - pod.p_WO
         wrench_T = guide_loads(

@@ -1,4 +1,4 @@
-"""A camera on a small world of its own, so that the sensors' tests do not depend on the whole scene."""
+"""A camera on a small world of its own, so that the sensors' tests do not depend on the whole scene; hose wound in."""
 
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -13,6 +13,8 @@ from dockair.sim.as_built import AsBuilt
 from dockair.sim.camera.camera import CameraNoise, NearInfraredCamera
 from dockair.sim.camera.sheets import CameraSheets
 from dockair.sim.faults import Fault, Faults
+from dockair.sim.hose.rest import hinge_angles
+from dockair.sim.world import World
 
 AS_BUILT = AsBuilt(
     camera=Camera(principal_point_px=(1020.7, 545.1), focal_length_m=0.01601),
@@ -114,3 +116,21 @@ def make_camera(request: pytest.FixtureRequest) -> Iterator[Callable[..., tuple[
     yield build
     for camera in opened:
         camera.close()
+
+
+def wind_in(world: World, length_m: float) -> None:
+    """Put the world's hose at rest with a length of it in the pod."""
+    parameters, links = world.parameters, world.parameters.hose.links
+    directions = np.vstack([world.rest.t_W, world.rest.t_D_W])
+    directions[: int(length_m / parameters.hose.link_length_m)] = [1.0, 0.0, 0.0]
+    assert len(directions) == links + 1
+    first, last = world.model.joint("hose_0_y").qposadr[0], world.model.joint("drogue_z").qposadr[0]
+    world.data.qpos[first : last + 1] = hinge_angles(directions).ravel()
+    world.data.qpos[world.model.joint("reel").qposadr[0]] = length_m
+    mujoco.mj_step1(world.model, world.data)
+    world._observe(0)
+
+
+@pytest.fixture(name="wind_in")
+def _wind_in() -> Callable[[World, float], None]:
+    return wind_in

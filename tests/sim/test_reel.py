@@ -19,16 +19,22 @@ from dockair.sim.hose.reel import (
     reel_light,
     set_point_n,
 )
-from dockair.sim.hose.rest import hinge_angles, rest_shape
+from dockair.sim.hose.rest import rest_shape
 
 REEL = load_parameters("reel", ReelParameters)
 STATIC, STEP = 1900.0, 1e-3
 SET_POINT = REEL.set_point_fraction * STATIC
+STATIC_PULL = 0.98 * STATIC  # of a hose that leaves the pod at an angle
 FREE_M = 1.0  # a place clear of the outer stop's buffer
 
 
+def _reel(**sheet):
+    forces = {"static_root_tension_n": STATIC, "static_pull_n": STATIC_PULL, "set_point_n": SET_POINT}
+    return Reel(replace(REEL, **sheet), **forces, step_s=STEP)
+
+
 def test_motor_follows_a_step_in_tension_as_a_first_order_lag():
-    reel = Reel(REEL, STATIC, SET_POINT, STEP)
+    reel = _reel()
     start = reel.motor_force_n
     wanted = reel.set_point_n + REEL.tension_gain * (reel.set_point_n - 1000.0)
     ticks = round(REEL.response_time_s / STEP)
@@ -37,15 +43,38 @@ def test_motor_follows_a_step_in_tension_as_a_first_order_lag():
     assert reel.motor_force_n == pytest.approx(wanted + (start - wanted) * np.exp(-1.0), rel=1e-9)
 
 
-def test_hose_rests_on_its_outer_stop_at_full_trail():
-    """At rest the force on the hose is the static tension exactly at q = 0: motor and buffer together."""
-    reel = Reel(REEL, STATIC, SET_POINT, STEP)
-    assert reel.step(STATIC, 0.0, 0.0) == pytest.approx(STATIC, rel=1e-12)
-    assert reel.step(STATIC, 0.05, 0.0) < reel.set_point_n < STATIC
+def test_hose_rests_on_its_outer_stop_at_full_trail(make_world):
+    """In the whole world, to a twentieth of a millimetre; the tension's part across the pod's axis would be 0.84 mm."""
+    world = make_world(p_PD_B=(60.0, 0.0, 0.0), settle_s=3.0)
+    assert abs(world.truth.reel_position_m) < 5e-5
+    assert world.truth.root_tension_n == pytest.approx(world.rest.root_tension_n, rel=1e-3)
+
+
+def _buffer_n(position_m, rate_m_s):
+    """The buffer's part of Eq. (2): the reel's force less that at the same speed and tension clear of the stop."""
+    return _reel().step(STATIC, position_m, rate_m_s) - _reel().step(STATIC, FREE_M, rate_m_s)
+
+
+@pytest.mark.parametrize("rate_m_s", [-2.0, -0.5, 0.0, 0.5])
+def test_buffer_does_not_touch_a_hose_that_has_not_come_to_it(rate_m_s):
+    """Its spring ends some millimetres from full trail; before, its damper has nothing to press on."""
+    end_m = _buffer_n(0.0, 0.0) / REEL.buffer_stiffness_n_m
+    assert 0.001 < end_m < 0.02
+    for position_m in (end_m + 1e-6, 0.03, 0.07):
+        assert _buffer_n(position_m, rate_m_s) == 0.0
+    assert abs(_buffer_n(end_m - 1e-6, rate_m_s)) < 1.0  # and takes hold without a jump
+
+
+def test_buffer_is_spring_and_damper_where_it_is_pressed_and_never_pulls_the_hose_out():
+    preload = _buffer_n(0.0, 0.0)
+    assert preload == pytest.approx(STATIC_PULL - _reel().motor_force_n)
+    expected = preload + REEL.buffer_stiffness_n_m * 0.05 + REEL.buffer_damping_n_s_m * 0.8
+    assert _buffer_n(-0.05, -0.8) == pytest.approx(expected)
+    assert _buffer_n(-0.001, 3.0) == 0.0
 
 
 def test_motor_gives_no_pull_beyond_the_take_up_speed_and_brakes_beyond_the_pay_out_speed():
-    reel = Reel(REEL, STATIC, SET_POINT, STEP)
+    reel = _reel()
     drag = REEL.drum_damping_n_s_m
     too_fast_in = REEL.take_up_speed_m_s + 0.01
     assert reel.step(0.0, FREE_M, too_fast_in) == pytest.approx(-drag * too_fast_in)
@@ -55,7 +84,7 @@ def test_motor_gives_no_pull_beyond_the_take_up_speed_and_brakes_beyond_the_pay_
 
 
 def test_motor_never_pushes_the_hose_out():
-    reel = Reel(REEL, STATIC, SET_POINT, STEP)
+    reel = _reel()
     for _ in range(5000):
         assert reel.step(20.0 * STATIC, FREE_M, 0.0) >= 0.0
 
@@ -63,7 +92,7 @@ def test_motor_never_pushes_the_hose_out():
 @pytest.mark.parametrize(("position_m", "rate_m_s"), [(0.0, 0.0), (-0.04, 0.0), (0.03, -1.5), (1.0, 5.0)])
 def test_locked_drum_is_a_spring_about_where_it_stood_with_the_tension_it_had_whatever_the_speed(position_m, rate_m_s):
     """Eq. (3): no limit of speed, no buffer, no set-point."""
-    reel = Reel(REEL, STATIC, SET_POINT, STEP)
+    reel = _reel()
     at_m, held_n = 0.2, 1500.0
     assert reel.step(held_n, at_m, 0.0, locked=True) == pytest.approx(held_n)
     stretch = REEL.lock_stiffness_n_m * (at_m - position_m)
@@ -73,7 +102,7 @@ def test_locked_drum_is_a_spring_about_where_it_stood_with_the_tension_it_had_wh
 
 
 def test_reel_that_comes_to_life_begins_with_the_pull_that_the_lock_held_and_goes_back_to_its_own():
-    reel = Reel(REEL, STATIC, SET_POINT, STEP)
+    reel = _reel()
     reel.step(1500.0, FREE_M, 0.0, locked=True)
     assert reel.step(1500.0, FREE_M, 0.0) == pytest.approx(1500.0, rel=1e-2)
     for _ in range(5000):
@@ -103,25 +132,12 @@ def test_light_says_where_in_its_range_the_reel_is_and_whether_it_is_dead(positi
 def test_refuelling_range_outside_the_reels_own_is_refused_with_the_keys_name(key, value):
     named = "inner_limit_m" if key == "refuelling_from_m" else key
     with pytest.raises(DockairError, match=rf"parameters\.reel\.{named}: expected"):
-        Reel(replace(REEL, **{key: value}), STATIC, SET_POINT, STEP)
+        _reel(**{key: value})
 
 
-def _wind_in(world, length_m):
-    """Put the world's hose at rest with a length of it in the pod."""
-    parameters, links = world.parameters, world.parameters.hose.links
-    directions = np.vstack([world.rest.t_W, world.rest.t_D_W])
-    directions[: int(length_m / parameters.hose.link_length_m)] = [1.0, 0.0, 0.0]
-    assert len(directions) == links + 1
-    first, last = world.model.joint("hose_0_y").qposadr[0], world.model.joint("drogue_z").qposadr[0]
-    world.data.qpos[first : last + 1] = hinge_angles(directions).ravel()
-    world.data.qpos[world.model.joint("reel").qposadr[0]] = length_m
-    mujoco.mj_step1(world.model, world.data)
-    world._observe(0)
-
-
-def test_hose_taken_in_by_five_metres_runs_out_again_unaided(make_world):
+def test_hose_taken_in_by_five_metres_runs_out_again_unaided(make_world, wind_in):
     world = make_world(p_PD_B=(60.0, 0.0, 0.0))
-    _wind_in(world, 5.0)
+    wind_in(world, 5.0)
     fastest, deepest = 0.0, 0.0
     for _ in range(9000):
         truth = world.step(ReceiverCommand())
@@ -147,7 +163,7 @@ def test_tension_at_the_exit_stays_near_the_set_point_while_the_probe_pushes_the
     assert abs(relative.mean()) < 0.01 and np.sqrt(np.mean(relative**2)) < 0.03
 
 
-def test_links_inside_the_pod_feel_no_air(make_world):
+def test_links_inside_the_pod_feel_no_air(make_world, wind_in):
     """A gale that blows only within the pod changes nothing, to the bit."""
 
     class InThePod:
@@ -164,7 +180,7 @@ def test_links_inside_the_pod_feel_no_air(make_world):
     places = []
     for gusts in (None, InThePod()):
         world = make_world(p_PD_B=(60.0, 0.0, 0.0), gusts=gusts)
-        _wind_in(world, 5.0)
+        wind_in(world, 5.0)
         for _ in range(300):
             world.step(ReceiverCommand())
         assert (world.truth.p_WH[:, 0] > 1.0).sum() >= 3
@@ -188,10 +204,10 @@ def test_dead_reel_neither_takes_up_nor_pays_out_and_the_tow_swings_on_the_hoses
     assert crossings[1] - crossings[0] == pytest.approx(1e3 * expected_s, rel=0.1)
 
 
-def test_a_drum_that_locks_takes_its_inertia_out_of_the_hoses_way_and_a_restored_world_does_so_too(make_world):
+def test_a_drum_that_locks_takes_its_inertia_out_of_the_hoses_way_and_a_restored_world_does_so_too(make_world, wind_in):
     """To the bit: what the restored world does next is what the saved one did."""
     world = make_world(p_PD_B=(60.0, 0.0, 0.0), reel_locked=lambda time_s: 0.02 <= time_s < 0.06)
-    _wind_in(world, 3.0)
+    wind_in(world, 3.0)
     dof, seen = world.model.joint("reel").dofadr[0], []
     states = []
     for _ in range(100):
@@ -206,9 +222,9 @@ def test_a_drum_that_locks_takes_its_inertia_out_of_the_hoses_way_and_a_restored
         assert again[-1] == world.truth.reel_position_m
 
 
-def test_reel_that_dies_during_the_push_holds_the_hose_where_it_was_until_it_lives_again(make_world):
+def test_reel_that_dies_during_the_push_holds_the_hose_where_it_was_until_it_lives_again(make_world, wind_in):
     world = make_world(p_PD_B=(60.0, 0.0, 0.0), reel_locked=lambda time_s: 0.5 <= time_s < 2.0)
-    _wind_in(world, 3.0)
+    wind_in(world, 3.0)
     position = np.array([world.step(ReceiverCommand()).reel_position_m for _ in range(2600)])
     assert np.ptp(position[600:2000]) < 0.02  # the hose runs out only before and after
     assert position[500] < 2.98 and position[-1] < position[1999] - 0.05
@@ -217,10 +233,10 @@ def test_reel_that_dies_during_the_push_holds_the_hose_where_it_was_until_it_liv
 @pytest.mark.parametrize(
     ("airspeed_m_s", "altitude_m"), [(180.0, 6000.0), (150.0, 6000.0), (120.0, 3000.0), (100.0, 3000.0)]
 )
-def test_all_of_the_reels_range_runs_out_again_in_slow_flight_too(make_world, airspeed_m_s, altitude_m):
+def test_all_of_the_reels_range_runs_out_again_in_slow_flight_too(make_world, wind_in, airspeed_m_s, altitude_m):
     """A fraction of the static tension alone would keep 6.5 m of hose in at 120 m/s and below."""
     world = make_world(p_PD_B=(60.0, 0.0, 0.0), airspeed_m_s=airspeed_m_s, altitude_m=altitude_m)
-    _wind_in(world, REEL.range_m)
+    wind_in(world, REEL.range_m)
     for _ in range(25000):
         truth = world.step(ReceiverCommand())
         if abs(truth.reel_position_m) < 0.01:
@@ -255,12 +271,12 @@ def test_reel_that_would_wind_in_all_of_the_hose_is_refused(make_world):
         make_world(hose={"length_m": 10.0}, reel={"range_m": 11.0})
 
 
-def test_set_point_equal_to_the_static_tension_would_keep_the_hose_in(make_world):
+def test_set_point_equal_to_the_static_tension_would_keep_the_hose_in(make_world, wind_in):
     """Why the set-point is below it: without the margin the same hose does not come back."""
     world = make_world(p_PD_B=(60.0, 0.0, 0.0))
     reel = world._tow.reel
     reel.set_point_n = world.rest.root_tension_n
-    _wind_in(world, 5.0)
+    wind_in(world, 5.0)
     for _ in range(9000):
         truth = world.step(ReceiverCommand())
     assert truth.reel_position_m > 4.0
@@ -361,8 +377,9 @@ def test_joint_in_the_pod_is_pressed_to_the_axis_and_its_motion_damped():
     position, R = np.array([[-0.5, 0.02, -0.03], [-1.5, 0.02, -0.03]]) * [length, 1.0, 1.0], np.array([np.eye(3)] * 2)
     v = np.array([[0.0, 0.4, -0.5], [0.0] * 3])
     wrench = guide_loads(position, R, v, np.zeros((2, 3)), 1.5 * length, GUIDE)
-    damping = 2.0 * REEL.guide_damping_ratio * np.sqrt(REEL.guide_stiffness_n_m * HOSE.link_mass_kg)
-    force = -0.5 * (REEL.guide_stiffness_n_m * position[0] + damping * v[0]) * [0.0, 1.0, 1.0]  # half of link 1 is in
+    stiffness = REEL.guide_stiffness_n_m2 * HOSE.link_length_m
+    damping = 2.0 * REEL.guide_damping_ratio * np.sqrt(stiffness * HOSE.link_mass_kg)
+    force = -0.5 * (stiffness * position[0] + damping * v[0]) * [0.0, 1.0, 1.0]  # half of link 1 is in
     carried = [0.0, 0.0, HOSE.link_mass_kg * 9.80665]
     np.testing.assert_allclose(wrench[0, :3], force + carried, rtol=1e-9)
     np.testing.assert_allclose(wrench[0, 3:], np.cross([-0.5 * length, 0.0, 0.0], force), rtol=1e-9, atol=1e-9)

@@ -176,7 +176,10 @@ def test_hose_in_a_steady_turn_rests_where_the_turning_axes_say(make_world):
     Rolled in within 3 s, then flown for 22 s; a Hann window over the last 10 s leaves 1e-3 of a swing at 0.33 Hz.
     """
     racetrack = TankerPathParameters(manoeuvre="racetrack", bank_rad=BANK, roll_rate_rad_s=np.radians(17.0))
-    world = make_world(p_PD_B=FAR, tanker_path=racetrack, rate_hz=500, hose={"bending_damping_n_m2_s": 100.0})
+    soft = {"guide_stiffness_n_m2": 24000.0}  # bears 500 Hz; no hose comes in
+    world = make_world(
+        p_PD_B=FAR, tanker_path=racetrack, rate_hz=500, hose={"bending_damping_n_m2_s": 100.0}, reel=soft
+    )
     exit_T, turn = world.parameters.tanker.exit_m, STANDARD_GRAVITY_M_S2 * np.tan(BANK) / 180.0
     _flown(world, 7500)
     ours, tensions, weights = [], [], np.hanning(5000)
