@@ -7,7 +7,7 @@ from dockair.parameters import load_parameters
 from dockair.rotations import exp
 from dockair.sim.air.atmosphere import standard_atmosphere
 from dockair.sim.hose.chain import DrogueParameters, HoseParameters, velocities_at
-from dockair.sim.hose.reel import ReelParameters
+from dockair.sim.hose.reel import ReelParameters, guide_loads
 from dockair.sim.hose.tow import PodMotion, Tow
 
 HOSE = load_parameters("hose", HoseParameters)
@@ -82,6 +82,6 @@ def test_pod_turned_displaced_and_moving_with_the_whole_scene_guides_the_hose_as
     turned = np.hstack([spatial[:, :3] @ Q.T + w_W, spatial[:, 3:] @ Q.T + v_at_reference])
     turned[:, 3:] -= np.cross(spatial[:, :3] @ Q.T, shift)
     pod = PodMotion(R_WT=Q, p_WO=shift, v_WO=v, w_WT=w_W)
-    expected = tow._guided(place, R, *_rates(place, spatial, reference), 3.0, None)
+    expected = guide_loads(place, R, *_rates(place, spatial, reference), 3.0, tow._guide)
     got = tow._guided(moved, Q @ R, *_rates(moved, turned, np.zeros(3)), 3.0, pod)
     np.testing.assert_allclose(got, np.hstack([expected[:, :3] @ Q.T, expected[:, 3:] @ Q.T]), rtol=1e-7, atol=1e-5)
