@@ -70,18 +70,18 @@ def test_the_sheets_values_of_the_scenario_reach_wake_and_bow_wave(make):
     assert bare._wake[-1, 4] == 0.0 and bare._wake[0, 4] > 0.0
 
 
-def test_a_gusts_front_meets_the_hoses_end_at_its_time_after_the_settling(make):
+def test_a_gusts_front_meets_the_drogues_canopy_at_its_time_after_the_settling(make):
     air = make({"gusts": [GUST]})
     assert isinstance(air._discrete, DiscreteGusts)
-    end, p_WT = np.array([[-14.75, 0.0, -2.7]]), -air._exit_T
+    canopy, p_WT = np.array([[-15.24, 0.0, -2.7]]), -air._exit_T
     for _ in range(round(1000 * SETTLE_S)):
         air.step()
     place = np.array([-21.0, 0.0, -3.0])
-    before = air.at(end, np.eye(3), place, np.eye(3), p_WT)
+    before = air.at(canopy, np.eye(3), place, np.eye(3), p_WT)
     assert np.abs(before.tow_W).max() < 1e-3  # a few centimetres into its front
     for _ in range(round(1000 * 30.0 / 180.0)):
         air.step()
-    peak = air.at(end, np.eye(3), place, np.eye(3), p_WT)
+    peak = air.at(canopy, np.eye(3), place, np.eye(3), p_WT)
     np.testing.assert_allclose(peak.tow_W[0], [0.0, 0.0, -4.0], atol=1e-3)
 
 
