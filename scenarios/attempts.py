@@ -3,7 +3,8 @@
 An attempt begins whenever the phase becomes "approach". It ends when the coupling holds the probe, or when the phase
 next leaves {"approach", "contact"}; what the probe does after that and before the next attempt is still put down to it,
 for a probe that has been called back may be too quick to miss the rim. Where nobody announces phases, the first attempt
-begins when the tip touches the drogue or crosses the ring's plane within 1 m of its centre; farther off it passes by.
+begins when the tip touches the drogue or crosses the ring's plane within 1 m of its centre. Farther off it passes by,
+before the first attempt and after one that is over.
 
 Radial offset, closing speed and angle of an attempt are those of the tip in drogue axes
 
@@ -46,9 +47,8 @@ class RefereeLimits:
     angle_deg: float = 10.0  # of the coupling
     closure_speed_m_s: float = 2.6  # 5 kt, service limit; above it a touch is unsafe
     rim_radius_m: float = 0.25  # half the ring's diameter: what is touched from farther out is the basket's outside
-    aside_m: float = (
-        1.0  # as of breakaway practice: who crosses the plane farther off without an approach tries nothing
-    )
+    #: As of breakaway practice: who crosses the plane farther off, and is in no approach, tries nothing.
+    aside_m: float = 1.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

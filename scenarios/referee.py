@@ -155,7 +155,8 @@ class Referee:
 
     def _enter(self, truth: Truth) -> None:
         now = passing(truth)
-        if self._open is None and now.radial_offset_m > self._limits.aside_m:
+        trying = self._open is not None and not self._open.is_over
+        if not trying and now.radial_offset_m > self._limits.aside_m:
             return
         attempt = self._attempt(truth)
         if attempt.latched is None:  # a probe that has been let go may swing to and fro

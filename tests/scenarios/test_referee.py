@@ -212,6 +212,18 @@ def test_who_passes_the_plane_far_aside_without_an_approach_has_not_tried():
     assert judged(referee, through(referee, 1.1), "clear") is Outcome.MISS
 
 
+def test_who_passes_the_plane_far_aside_after_an_attempt_that_is_over_has_not_tried_again():
+    """Near the rim it is still put down to that attempt."""
+    for aside_m, outcome, attempt in ((1.1, Outcome.ABORT, "breakaway"), (0.9, Outcome.MISS, "miss")):
+        referee = Referee()
+        referee.judge(truth_at(0.0, (-1.0, 0.2, 0.0)), "approach", 60.0)
+        referee.judge(truth_at(0.1, (-0.9, 0.2, 0.0)), "breakaway", 60.0)
+        truth = through(referee, aside_m)
+        assert judged(referee, truth, "clear") is outcome
+        (only,) = referee.attempt_log(truth.time_s, outcome)
+        assert only.outcome == attempt
+
+
 def test_a_miss_after_which_time_ran_out_before_the_receiver_was_clear_is_no_clean_end():
     referee = Referee()
     truth = through(referee, 0.4)
