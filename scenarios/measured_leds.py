@@ -108,7 +108,14 @@ class View:
 class Senses(Protocol):
     """What a flight has in the camera's place: the camera, or a model of what is made of its frames."""
 
-    def expose(self, data: mujoco.MjData, time_s: float, frame_number: int, window: Window | None) -> Any:
+    def expose(
+        self,
+        data: mujoco.MjData,
+        time_s: float,
+        frame_number: int,
+        window: Window | None,
+        exposure_s: float = np.nan,
+    ) -> Any:
         """Return a message with a time stamp; None when there is none."""
 
     def latency_s(self, frame: Any) -> float:
@@ -177,7 +184,12 @@ class MeasuredLeds:
         self._gain, self._black = output_gain(sheets.sensor), output_black(sheets.sensor)
 
     def expose(
-        self, data: mujoco.MjData, time_s: float, frame_number: int, window: Window | None
+        self,
+        data: mujoco.MjData,
+        time_s: float,
+        frame_number: int,
+        window: Window | None,
+        exposure_s: float = np.nan,
     ) -> LedObservation | None:
         """Return the LEDs that are named in the frame of the world as it stands; None when the camera has dropped out.
 
@@ -186,6 +198,7 @@ class MeasuredLeds:
             time_s: middle of the exposure.
             frame_number: not used: frames take their numbers from the stream, one after the other.
             window: not used: what would be read follows from where the ring is.
+            exposure_s: asked for, within the sheet's limits, and no business of the exposure control; NaN: its own.
         """
         fault, numbers = self._faults.camera(time_s), self._draw(time_s)
         if fault.dropped:
@@ -193,12 +206,15 @@ class MeasuredLeds:
             return None
         if fault.stuck and self._last is not None:
             return replace(self._last, time_stamp_s=time_s)
-        exposure_s = self._control.exposure_s if fault.exposure_s is None else fault.exposure_s
+        asked = bool(np.isfinite(exposure_s)) and fault.exposure_s is None
+        own_s = self._control.exposure_s if fault.exposure_s is None else fault.exposure_s
+        exposure_s = self._control.within_limits(exposure_s) if asked else own_s
         view = self.view(data, time_s, exposure_s, fault)
         levels, width_px = self.spots(view)
         self._window = self.window(view) if self._tracking else self._as_built.camera.full_window
         self._exposure_s = exposure_s
-        self._control.step(levels.reshape(1, -1), exposure_s)
+        if not asked:
+            self._control.step(levels.reshape(1, -1), exposure_s)
         self._last = self._measured(view, levels, width_px, numbers, time_s)
         self._tracking = len(self._last.led_numbers) > 0
         self._named_s = time_s if self._tracking else self._named_s

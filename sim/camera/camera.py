@@ -135,8 +135,8 @@ class NearInfraredCamera:
             return None
         if fault.stuck and self._last is not None:
             return replace(self._last, time_stamp_s=time_s)
-        asked, sheet = bool(np.isfinite(exposure_s)) and fault.exposure_s is None, self._sheets.exposure
-        exposure_s = min(max(exposure_s, sheet.shortest_s), sheet.longest_s) if asked else self.exposure_s(fault)
+        asked = bool(np.isfinite(exposure_s)) and fault.exposure_s is None
+        exposure_s = self._control.within_limits(exposure_s) if asked else self.exposure_s(fault)
         start = window.row_start, window.column_start
         expected = self.expected_electrons(data, window, time_s, exposure_s, self._room_for(window))
         pixels = digitise(

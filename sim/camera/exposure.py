@@ -45,6 +45,10 @@ class ExposureControl:
         """Of the next frame [s]."""
         return self._exposure_s
 
+    def within_limits(self, exposure_s: float) -> float:
+        """Return the exposure nearest to one asked for that the hardware can make [s]."""
+        return min(max(exposure_s, self._p.shortest_s), self._p.longest_s)
+
     def reset(self) -> None:
         """Forget all frames."""
         self._exposure_s = self._p.exposure_s

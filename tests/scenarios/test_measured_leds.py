@@ -202,6 +202,22 @@ def test_a_stuck_exposure_is_the_one_in_use():
     assert stand.leds.exposure_s == 200e-6
 
 
+def test_an_exposure_asked_for_is_made_within_the_limits_and_leaves_the_cameras_own_control_alone():
+    asked, alone = Stand(), Stand()
+    for k in range(6):
+        alone.look(0.02 * k)
+        asked.look(0.02 * k)
+    for exposure_s, made_s in ((200e-6, 200e-6), (1.0, SHEETS.exposure.longest_s), (1e-9, SHEETS.exposure.shortest_s)):
+        asked.leds.expose(asked.data, 1.0, 7, None, exposure_s)
+        assert asked.leds.exposure_s == made_s
+    asked.look(2.0)
+    alone.look(2.0)
+    assert asked.leds.exposure_s == alone.leds.exposure_s
+    stuck = Stand(faults=[ExposureStuck(exposure_s=200e-6)])
+    stuck.leds.expose(stuck.data, 0.0, 0, None, 50e-6)
+    assert stuck.leds.exposure_s == 200e-6  # whatever is asked for
+
+
 def test_shares_of_unnamed_leds_and_of_frames_without_a_ring_are_those_of_the_sheet():
     """Within five standard deviations of a binomial: a false alarm in 1.7e6; the seed is fixed."""
     p = replace(EXACT, unnamed_share=0.1, no_ring_share=0.2, texture_exposure_s=SHEETS.exposure.exposure_s)
