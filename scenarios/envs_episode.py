@@ -28,12 +28,12 @@ from dockair.scenarios.referee import Outcome
 from dockair.scenarios.schema import Scenario
 from dockair.sim.truth import Truth
 from dockair.sim.view import ThirdPersonView
+from dockair.streams import LARGEST_SEED
 
 RENDER_MODES = ("human", "rgb_array")
 REWARDS = ("dense", "sparse")
 PICTURE_PX = (640, 480)  # width, height of `render`
 _TRUNCATED = (Outcome.TIMEOUT, Outcome.DIVERGED)
-_SEEDS = 2**63  # from which the environment draws
 _NO_NAMES = ("self", "options", "unknown")  # of what an environment is made with
 
 Obs = TypeVar("Obs")
@@ -115,14 +115,15 @@ class Episodes(gymnasium.Env[Obs, NDArray[np.float32]], Generic[Obs]):
         """
         options = {} if options is None else options
         scenario = self.chosen_scenario(options)
-        seed = None if seed is None else check_integer("seed", seed, 0)
-        chosen = seed if options.get("seed") is None else check_integer("options.seed", options["seed"], 0)
+        seed = None if seed is None else check_integer("seed", seed, 0, LARGEST_SEED)
+        own = options.get("seed")
+        chosen = seed if own is None else check_integer("options.seed", own, 0, LARGEST_SEED)
         # a look ahead: only a reset that succeeds draws
-        flight_seed = int(deepcopy(self.np_random).integers(_SEEDS)) if chosen is None else chosen
+        flight_seed = int(deepcopy(self.np_random).integers(LARGEST_SEED, endpoint=True)) if chosen is None else chosen
         flight, judge, tick = self._begun(scenario, flight_seed)
         super().reset(seed=seed)
         if chosen is None:
-            self.np_random.integers(_SEEDS)
+            self.np_random.integers(LARGEST_SEED, endpoint=True)
         self.close()
         self._flight, self._judge, self._outcome, self.imu = flight, judge, None, None
         self._seed = flight_seed
@@ -244,7 +245,7 @@ class Episodes(gymnasium.Env[Obs, NDArray[np.float32]], Generic[Obs]):
         if self.render_mode == "human":
             assert self._flight is not None
             self._viewer = self._viewer or LiveViewer()
-            self._viewer.show(self._flight, tick)
+            self._viewer.show(self._flight, tick, is_last=self._outcome is not None)
 
     def chosen_scenario(self, options: Mapping[str, Any]) -> Scenario:
         """Return the scenario that reset's options ask for, with the environment's own sensing, checked."""

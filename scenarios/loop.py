@@ -27,6 +27,7 @@ from dockair.scenarios.schema import Scenario
 from dockair.scenarios.truth_navigation import TruthNavigator
 from dockair.sim.truth import Truth
 from dockair.sim.world import DivergedError
+from dockair.streams import LARGEST_SEED
 
 Progress = Callable[[Truth, NavSolution], None]
 
@@ -187,7 +188,7 @@ def fly(
     if not isinstance(scenario, Scenario):
         expected = "a Scenario, as load_scenario(name) returns it"
         raise DockairError("fly: scenario", expected=expected, got=type(scenario).__name__)
-    seed = scenario.seed if seed is None else check_integer("fly: seed", seed, 0)
+    seed = scenario.seed if seed is None else check_integer("fly: seed", seed, 0, LARGEST_SEED)
     begun = time.perf_counter()
     flight = Flight(scenario, seed, full_frames=record == "full", overlap=overlap)
     try:

@@ -20,13 +20,13 @@ def report(
     as_json: Json = False,
 ) -> None:
     """Make one self-contained HTML page of campaigns: rates with intervals, scatter, errors, causes of failure."""
-    from dockair.scenarios.campaign.folder import is_own_file
+    from dockair.scenarios.campaign.folder import REPORT, is_own_file
     from dockair.scenarios.output_folder import is_flights_file
     from dockair.scenarios.report import evidence as table
     from dockair.scenarios.report.folders import read_campaigns
     from dockair.scenarios.report.page import page, write_text
 
-    out = out or folders[0] / "report.html"
+    out = out or folders[0] / REPORT
     if evidence is not None and os.path.realpath(evidence) == os.path.realpath(out):
         raise DockairError(f"--evidence {evidence}", expected="a file of its own", got="the page's")
     for option, path in (("--out", out), ("--evidence", evidence)):

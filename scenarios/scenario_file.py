@@ -12,6 +12,7 @@ from dockair.scenarios.toml_files import TomlFiles, read_toml, toml_value
 _SCENARIOS = TomlFiles("scenario", "a scenario of the library", "library")
 #: Setting the one replaces the other, which the file may have given.
 _ALTERNATIVES = {"turbulence.sigma_m_s": "intensity", "turbulence.intensity": "sigma_m_s"}
+_MODEL = "turbulence.model"  # the file's goes with its strength: it would overrule one that is set in its place
 _PATHS = ("camera", "ring")  # keys of [hardware] that name a file
 
 
@@ -52,6 +53,8 @@ class ScenarioFile:
         self._settings = tuple(settings)
         self.table = read_toml(path)
         _resolve_hardware(self.table, path.parent)
+        if _MODEL not in settings and any(key in _ALTERNATIVES for key in settings):
+            _drop(self.table, _MODEL)
         for key, value in settings.items():
             _set(self.table, key, toml_value(value) if isinstance(value, str) else _plain(value))
 
@@ -80,6 +83,12 @@ def _plain(value: Any) -> Any:
     if isinstance(value, dict):
         return {key: _plain(entry) for key, entry in value.items()}
     return value
+
+
+def _drop(table: dict[str, Any], key: str) -> None:
+    owner, name = key.split(".")
+    if isinstance(table.get(owner), dict):
+        table[owner].pop(name, None)
 
 
 def _set(table: dict[str, Any], key: str, value: object) -> None:

@@ -24,6 +24,7 @@ from dockair.scenarios.light_tables import CameraOptions, Sun, Weather
 from dockair.scenarios.refusal import Expected, refusal
 from dockair.scenarios.scenario_file import ScenarioFile
 from dockair.scenarios.table import Table, tuple_from_list
+from dockair.streams import LARGEST_SEED
 
 ReceiverSheet = Literal["airframe", "flight_control", "mounting", "bow_wave"]
 _OF_RECEIVER: tuple[ReceiverSheet, ...] = get_args(ReceiverSheet)
@@ -55,7 +56,7 @@ class Scenario(Table):
     #: Of the scenario, and of the folder that its flights are written to.
     name: Annotated[str, Field(pattern=r"^\w[\w.-]*$"), Expected("a name of letters, digits, _ . -")]
     claim: str = ""  #: the sentence that the flight is there to show
-    seed: int = Field(default=0, ge=0, le=2**63 - 1)  #: of every random stream, where `--seed` says no other
+    seed: int = Field(default=0, ge=0, le=LARGEST_SEED)  #: of every random stream, where `--seed` says no other
     flight: FlightConditions = FlightConditions()
     tanker: Tanker = Tanker()
     rates: Rates = Rates()

@@ -9,6 +9,7 @@ from dockair.scenarios.campaign.whole_file import PART
 
 SUMMARY, TIMING = "summary.json", "timing.json"
 RESULTS = (table.FILE_NAME, SUMMARY, TIMING)  #: written at the end
+REPORT = "report.html"  #: `dockair report` writes it there unless it is told otherwise
 _OWN = (journal.FILE_NAME, manifest.FILE_NAME, *RESULTS)
 
 
@@ -93,8 +94,8 @@ def remove_parts(folder: Path) -> None:
 
 
 def remove_results(folder: Path) -> None:
-    """Remove table, summary and timing, which are of other flights than the journal will be; `rows_of` reads that."""
-    for name in RESULTS:
+    """Remove table, summary, timing and report: they are of other flights than the journal, which `rows_of` reads."""
+    for name in (*RESULTS, REPORT):
         (folder / name).unlink(missing_ok=True)
 
 

@@ -25,6 +25,7 @@ from dockair.scenarios.schema import Scenario, load_scenario
 
 _SAYS_NOTHING_OF_THE_FLIGHT = {"seed", "claim", "accept"}  # of a scenario's keys; the seed is the job's
 _SHEETS = ("camera", "ring")  # of the keys of [hardware]: paths
+_STRENGTHS = ("turbulence.sigma_m_s", "turbulence.intensity")
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 
 #: Where the keys were written ("{key}" stands for each), and what they are set to; the later hold.
@@ -166,11 +167,20 @@ def _sheets_by_content(hardware: Mapping[str, Any]) -> dict[str, Any]:
 
 def _layers(source: PlanFile, index: int, entry: Entry, point: Point) -> Layers:
     return (
-        (source.place("set.{key}"), source.plan.set),
-        (source.place(f"scenarios[{index}].set.") + "{key}", entry.set),
-        (source.place('draw."{key}"'), point),
+        (source.place("set.{key}"), _from_folder(source.plan.set, source.folder)),
+        (source.place(f"scenarios[{index}].set.") + "{key}", _from_folder(entry.set, source.folder)),
+        (source.place('draw."{key}"'), _from_folder(point, source.folder)),
         ("--set {key}", source.settings),
     )
+
+
+def _from_folder(settings: Mapping[str, Any], folder: Path) -> dict[str, Any]:
+    """Return settings with the paths of sheets taken from the plan's folder, as those of scenarios are."""
+    sheets = {f"hardware.{key}" for key in _SHEETS}
+    return {
+        key: str(folder / value) if key in sheets and isinstance(value, str) else value
+        for key, value in settings.items()
+    }
 
 
 def _merged(layers: Layers) -> dict[str, Any]:
@@ -210,6 +220,9 @@ def _require_as_drawn(source: PlanFile, scenario: Scenario, point: Point) -> Non
         if flown != drawn:
             where, expected = source.place(f'draw."{key}"'), "a key in whose place nothing else is set or drawn"
             raise DockairError(where, expected=expected, got=f"{flown} flown, {drawn} drawn")
+        if key in _STRENGTHS and scenario.turbulence.model == "none":
+            expected = "turbulence.model that is not set to none, or no strength to draw"
+            raise DockairError(source.place(f'draw."{key}"'), expected=expected, got="still air flown")
 
 
 def _value_at(scenario: Scenario, key: str) -> Any:

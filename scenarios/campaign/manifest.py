@@ -26,6 +26,7 @@ SCHEMA_VERSION = 1
 
 _TABLES = ("plug_ins", "versions", "files")
 _SAME = ("code", "versions", "background")
+OF_THE_BEGINNING = ("commit", "uncommitted_changes", "machine", "begun")  #: of the first run, whichever goes on with it
 
 
 def manifest_of(plan: Plan, jobs: Sequence[Job], flight: str, code: Code) -> dict[str, Any]:

@@ -11,6 +11,7 @@ from pydantic import BeforeValidator, Field
 from dockair.scenarios.campaign.draws import Draw, SamplerName
 from dockair.scenarios.refusal import Expected
 from dockair.scenarios.table import Table, tuple_from_list
+from dockair.streams import LARGEST_SEED
 
 MOST_SEEDS = 100_000
 
@@ -33,12 +34,12 @@ def flat(value: Any) -> Any:
     return level
 
 
-_Seed = Annotated[int, Field(ge=0, le=2**62)]
+_Seed = Annotated[int, Field(ge=0, le=LARGEST_SEED)]
 _Seeds = Annotated[
     tuple[_Seed, ...],
     Field(min_length=1),
     BeforeValidator(_seeds),
-    Expected(f"how many seeds, from 1 to {MOST_SEEDS}, or a list of seeds, each 0 or more"),
+    Expected(f"how many seeds, from 1 to {MOST_SEEDS}, or a list of seeds, each from 0 to 2^63 - 1"),
 ]
 _Set = Annotated[dict[str, Any], BeforeValidator(flat)]
 _Rate = Annotated[Annotated[float, Field(gt=0.0, le=1.0)] | None, Expected("a number above 0, up to 1")]

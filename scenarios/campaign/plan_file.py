@@ -54,17 +54,26 @@ class PlanFile:
         if isinstance(table.get("scenarios"), list):
             table["scenarios"] = _expanded(table["scenarios"], own_seeds="seeds" not in (changes or {}))
         self.plan = self._checked(Plan, table | dict(changes or {}), "")
-        self._check_draws()
+        self._check_draws(own_sampler=table.get("sampler", self.plan.sampler))
         self._check_gate()
 
     def place(self, key: str) -> str:
         """Return where a key of the plan was written."""
         return f"{self._shown}: {key}"
 
-    def _check_draws(self) -> None:
+    def _check_draws(self, own_sampler: str) -> None:
+        """Refuse draws that say nothing, or two things.
+
+        Args:
+            own_sampler: the file's; the command line may have another for a plan that has points.
+        """
         plan = self.plan
         for key, table in plan.draw.items():
-            self._checked(Draw, table, f'draw."{key}"').check(self.place(f'draw."{key}"'))
+            draw = self._checked(Draw, table, f'draw."{key}"')
+            draw.check(self.place(f'draw."{key}"'))
+            if draw.points is not None and "grid" not in (own_sampler, plan.sampler):
+                expected = 'none, or sampler = "grid": only a grid has points'
+                raise DockairError(self.place(f'draw."{key}".points'), expected=expected, got=draw.points)
             if key in self.settings:
                 raise DockairError(f"--set {key}", expected="a key that the plan does not draw", got=key)
         if plan.draws is not None and (not plan.draw or plan.sampler == "grid"):

@@ -9,9 +9,9 @@ from dockair.errors import DockairError
 from dockair.scenarios.campaign.draws import Point, grid, samples
 from dockair.scenarios.campaign.plan import Entry
 from dockair.scenarios.campaign.plan_file import PlanFile
+from dockair.streams import LARGEST_SEED
 
 MOST_JOBS = 200_000
-MOST_SEED = 2**63 - 1  # of a scenario's `seed`, and of the table's column
 
 
 def seeds_of(source: PlanFile, entry: Entry) -> list[int]:
@@ -21,8 +21,8 @@ def seeds_of(source: PlanFile, entry: Entry) -> list[int]:
         DockairError: one that no scenario and no table takes.
     """
     seeds = [source.plan.first_seed + seed for seed in entry.seeds or source.plan.seeds]
-    if max(seeds) > MOST_SEED:
-        expected = f"seeds up to {MOST_SEED}, first_seed added"
+    if max(seeds) > LARGEST_SEED:
+        expected = f"seeds up to {LARGEST_SEED}, first_seed added"
         raise DockairError(source.place("first_seed"), expected=expected, got=max(seeds))
     return seeds
 

@@ -13,7 +13,14 @@ from dockair.scenarios.campaign.code import code_of
 from dockair.scenarios.campaign.gate import Verdict, judge, require_power
 from dockair.scenarios.campaign.jobs import Job, jobs_of, with_background
 from dockair.scenarios.campaign.journal import Journal
-from dockair.scenarios.campaign.manifest import FILE_NAME, manifest_of, read_manifest, require_same, write_json
+from dockair.scenarios.campaign.manifest import (
+    FILE_NAME,
+    OF_THE_BEGINNING,
+    manifest_of,
+    read_manifest,
+    require_same,
+    write_json,
+)
 from dockair.scenarios.campaign.plan_file import PlanFile
 from dockair.scenarios.campaign.pool import Done, Pool
 from dockair.scenarios.campaign.row import as_asked, row_of, unflown
@@ -135,7 +142,7 @@ def _begun_once(journal: Journal, out: Path, now: dict[str, Any], jobs: Sequence
         raise DockairError(f"--out {out}", expected=f"{FILE_NAME} beside {journal.path.name}", got="none (or --fresh)")
     earlier = read_manifest(out)
     require_same(earlier, now, set(journal.entries), jobs, f"--out {out}")
-    return now | {"begun": earlier.get("begun")}
+    return now | {key: earlier[key] for key in OF_THE_BEGINNING if key in earlier}
 
 
 def _seed_by_seed(jobs: list[Job]) -> list[Job]:

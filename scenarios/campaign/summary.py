@@ -44,10 +44,16 @@ def _group(group: Group, claimed: Accept | None) -> dict[str, Any]:
         "causes_of_flights_without_attempt": dict(group.causes_without_attempt),
         "unsafe": len(group.unsafe),
         "errors": len(group.failed_to_fly),
-        "shortfalls": None if claimed is None else claimed.judge(group.rows),
+        "shortfalls": None if claimed is None else _shortfalls(claimed, group.rows),
         "radial_offset_m": _spread(group.offsets_m),
         "closure_speed_m_s": _spread(group.closing_m_s),
     }
+
+
+def _shortfalls(claimed: Accept, rows: Sequence[Row]) -> list[str] | None:
+    """Return what was claimed in vain; None where no figure is claimed, and nothing was unsafe nor an error."""
+    found = claimed.judge(rows)
+    return found if found or claimed.claims_figures else None
 
 
 def _share(share: Share) -> dict[str, Any]:

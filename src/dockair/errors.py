@@ -47,11 +47,13 @@ class MachineError(DockairError):
             self.args = (f"{self}; {remedy}",)
 
 
-def check_integer(name: str, value: Any, least: int) -> int:
-    """Return a whole number, numpy's too, as an int; refuse what is none, or less than the least."""
-    if not isinstance(value, bool) and isinstance(value, Integral) and int(value) >= least:
+def check_integer(name: str, value: Any, least: int, most: int | None = None) -> int:
+    """Return a whole number, numpy's too, as an int; refuse what is none, or outside the limits."""
+    is_whole = not isinstance(value, bool) and isinstance(value, Integral)
+    if is_whole and int(value) >= least and (most is None or int(value) <= most):
         return int(value)
-    raise DockairError(name, expected=f"an integer from {least} on", got=value)
+    limits = f"from {least} on" if most is None else f"from {least} to {most}"
+    raise DockairError(name, expected=f"an integer {limits}", got=value)
 
 
 def check_choice(name: str, value: Any, exists: tuple[str | None, ...]) -> None:

@@ -8,6 +8,9 @@ from hashlib import blake2b
 
 import numpy as np
 
+#: Of a scenario: what a table's column of whole numbers holds.
+LARGEST_SEED = 2**63 - 1
+
 #: Every source of randomness there is; a new one is added here so that no two modules share a name by accident.
 STREAM_NAMES = (
     "start",
@@ -39,7 +42,7 @@ def random_stream(seed: int, name: str) -> np.random.Generator:
     """Generator of the named source.
 
     Args:
-        seed: the scenario's seed, 0 to 2**63 - 1.
+        seed: the scenario's seed, 0 to LARGEST_SEED.
         name: one of STREAM_NAMES.
     """
     return np.random.Generator(np.random.PCG64DXSM(np.random.SeedSequence((seed, *_words(name)))))

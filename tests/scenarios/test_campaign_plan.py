@@ -2,6 +2,7 @@
 
 import os
 import shlex
+from importlib.resources import files
 from pathlib import Path
 
 import pytest
@@ -326,6 +327,16 @@ def test_every_packaged_plan_can_be_flown_and_says_what_for(name):
             'scenarios = ["default"]\n[set]\n"faults" = [{ kind = "exposure_stuck", exposure_us = 5000.0 }]',
             "p.toml: scenarios: default: faults[0].exposure_us: expected 14 to 500 us, the hardware's limits",
         ),
+        (
+            'scenarios = ["still_air"]\n[set]\n"turbulence.model" = "none"\n'
+            '[draw."turbulence.sigma_m_s"]\nlow = 0.1\nhigh = 1.0',
+            'p.toml: draw."turbulence.sigma_m_s": expected turbulence.model that is not set to none',
+        ),
+        (
+            'scenarios = ["default"]\n[draw."start.aft_m"]\nlow = 3.0\nhigh = 5.0\npoints = 7',
+            'p.toml: draw."start.aft_m".points: expected none, or sampler = "grid": only a grid has points, got 7',
+        ),
+        ('scenarios = ["default"]\nseeds = [9223372036854775808]', "p.toml: seeds"),
         ("scenarios = [", "p.toml: expected TOML"),
     ],
 )
@@ -465,3 +476,13 @@ def test_too_many_flights_are_refused_before_any_is_made(plan, monkeypatch, text
     if "grid" not in text:
         ranges = ranges.replace("points = 10000", "")
     assert said in refusal_of(plan, f"{scenarios}{text}\n{ranges}")
+
+
+def test_paths_of_sheets_in_a_plan_are_taken_from_its_folder_as_those_of_scenarios(plan, monkeypatch, tmp_path):
+    """Whoever calls it from elsewhere flies the same sheet."""
+    source = plan('scenarios = ["default"]\n[set]\n"hardware.ring" = "ring.toml"')
+    sheet = files("dockair.assets") / "calibration" / "ring.toml"
+    (source.folder / "ring.toml").write_text(sheet.read_text(encoding="utf-8"))
+    monkeypatch.chdir(tmp_path.parent)
+    (job,) = jobs_of(source)[:1]
+    assert job.scenario.hardware.ring == str(source.folder / "ring.toml")

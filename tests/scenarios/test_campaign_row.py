@@ -138,3 +138,13 @@ def test_the_summary_counts_why_flights_began_no_attempt(tmp_path):
     assert group["causes"] == {}
     assert group["causes_of_flights_without_attempt"] == {"never_steady": 3}
     assert group["independent"]
+
+
+def test_of_a_scenario_without_a_claim_nothing_is_told_but_what_is_unsafe_or_an_error(tmp_path):
+    (tmp_path / "mine.toml").write_text('name = "mine"')
+    (group,) = claims(tmp_path, '"./mine.toml"').values()
+    assert group["shortfalls"] is None
+    path = tmp_path / "p.toml"
+    jobs = jobs_of(PlanFile(path))
+    (group,) = summary_of([row_of(job, Answer(columns=None, error="broke")) for job in jobs], jobs)
+    assert group["shortfalls"] != [] and group["shortfalls"] is not None

@@ -635,6 +635,21 @@ def test_while_a_campaign_grows_its_rows_are_those_that_are_done(here, tmp_path)
     assert len(results(tmp_path / "out")) == 3
 
 
+def test_a_report_goes_when_more_is_flown_and_the_manifest_is_the_first_runs(here, tmp_path, monkeypatch):
+    out = tmp_path / "out"
+    fly(plan(tmp_path, 2), out)
+    (out / "report.html").write_text("of two flights")
+    first = read_manifest(out)
+    monkeypatch.setattr(manifest, "commit_of_the_code", lambda: ("another", True))
+    monkeypatch.setattr(manifest.platform, "machine", lambda: "another")
+    fly(plan(tmp_path, 2), out)
+    assert (out / "report.html").exists() and read_manifest(out) == first
+    fly(plan(tmp_path, 3), out)
+    last = read_manifest(out)
+    assert not (out / "report.html").exists() and last["flights"] == 3
+    assert all(last[key] == first[key] for key in ("commit", "uncommitted_changes", "machine", "begun"))
+
+
 def test_while_errors_are_flown_again_the_rows_are_the_newer_ones(here, tmp_path):
     fly(plan(tmp_path, 3), tmp_path / "out", "never")
     assert [bool(row["error"]) for row in rows_of(tmp_path / "out")] == [True] * 3

@@ -196,6 +196,15 @@ def test_setting_the_intensity_replaces_the_files_sigma_and_back():
     assert load_scenario("light_gusts", {"turbulence.sigma_m_s": "2"}).turbulence.intensity is None
 
 
+@pytest.mark.parametrize(("key", "value"), [("turbulence.intensity", "light"), ("turbulence.sigma_m_s", "2")])
+def test_setting_a_strength_replaces_a_files_still_air(key, value):
+    assert load_scenario("still_air", {}).turbulence.model == "none"
+    assert load_scenario("still_air", {key: value}).turbulence.model == "dryden"
+    for order in ((key, "turbulence.model"), ("turbulence.model", key)):  # what is asked for itself holds
+        settings = {key: value, "turbulence.model": "none"}
+        assert load_scenario("still_air", {name: settings[name] for name in order}).turbulence.model == "none"
+
+
 def test_model_none_switches_gusts_off_and_a_strength_alone_switches_them_on(scenario_file):
     assert load_scenario("default", {"turbulence.model": "none"}).turbulence.model == "none"
     assert load_scenario(scenario_file('name = "mine"\n[turbulence]\nsigma_m_s = 1')).turbulence.model == "dryden"
