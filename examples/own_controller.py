@@ -69,7 +69,7 @@ def action_for(controller: Controller, observation: np.ndarray) -> np.ndarray:
 def main(scenario: str = "default", seed: str = "0", environment: str = "dockair/Dock-v0") -> None:
     """Fly one episode and say how it ended."""
     env = gymnasium.make(environment, scenario=scenario)
-    controller = Controller(step_s=0.01)
+    controller = Controller(step_s=1.0 / env.unwrapped.metadata["render_fps"])
     observation, info = env.reset(seed=int(seed))
     total, over = 0.0, False
     while not over:

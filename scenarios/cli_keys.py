@@ -106,9 +106,9 @@ def _defaults() -> str:
         f"flies {s.tanker.manoeuvre}; from {s.start.aft_m:g} m astern, for at most {s.flight.duration_s:g} s, by "
         f"camera (`{s.camera.sensing}`), without clouds, the Sun at azimuth {s.sun.azimuth_deg:g} and elevation "
         f"{s.sun.elevation_deg:g} degrees; with up to {s.guidance.attempts_max} attempts at "
-        f"{s.guidance.closure_speed_m_s:g} m/s and {s.guidance.hold_s:g} s on the probe. It claims nothing and is "
-        "held to nothing. The scenario `default` of the [library](scenarios.md#the-library) has more in its file, "
-        "gusts among it."
+        f"{s.guidance.closure_speed_m_s:g} m/s and {s.guidance.hold_s:g} s on the probe. It claims no figures; nothing "
+        "unsafe is asked of it as of any (`accept.unsafe_max`). The scenario `default` of the "
+        "[library](scenarios.md#the-library) has more in its file, gusts among it."
     )
     return textwrap.fill(words, _COLUMNS, break_long_words=False, break_on_hyphens=False)
 

@@ -45,14 +45,14 @@ class LiveViewer:
         self._p_TE: Array = np.zeros(3)
         self._path: list[Array] = []
 
-    def show(self, flight: Flight, tick: Tick) -> None:
-        """Draw a control tick, if it is time for one; a new flight begins a new recording."""
+    def show(self, flight: Flight, tick: Tick, *, is_last: bool = False) -> None:
+        """Draw a control tick, if it is the last or it is time for one; a new flight begins a new recording."""
         if flight is not self._flight:
             self._begin(flight)
         if isinstance(tick.frame, CameraFrame):
             self._frame = tick.frame
         time_s = tick.truth.time_s
-        if time_s < self._next_s and tick.outcome is None:
+        if time_s < self._next_s and not is_last:
             return
         self._next_s = time_s + 1.0 / _SHOWN_HZ
         self._draw(flight, tick)

@@ -75,7 +75,10 @@ def _check_range(where: str, parameter: Parameter, value: Any) -> None:
     expected = f"{np.asarray(parameter.value).size} number(s) in [{parameter.low}, {parameter.high}] {parameter.unit}"
     if not all(isinstance(v, Real) and not isinstance(v, bool) for v in np.asarray(value, dtype=object).ravel()):
         raise DockairError(where, expected=expected, got=value)
-    array = np.asarray(value, dtype=float)
+    try:
+        array = np.asarray(value, dtype=float)
+    except OverflowError:  # a whole number beyond all floats
+        raise DockairError(where, expected=expected, got=value) from None
     right_shape = array.shape == np.shape(parameter.value)
     if not right_shape or not np.all(array >= parameter.low) or not np.all(array <= parameter.high):
         raise DockairError(where, expected=expected, got=value)

@@ -62,6 +62,7 @@ def test_overrides_replace_values_and_keep_their_kind(sheet):
     [
         ("length_m", 30.0),
         ("length_m", 9.99),
+        ("length_m", 10**400),
         ("length_m", float("nan")),
         ("length_m", "long"),
         ("length_m", "20"),

@@ -151,3 +151,15 @@ def test_every_phase_keeps_its_name_and_colour(hand_made, monkeypatch, tmp_path)
     rows = _episode(hand_made, monkeypatch, tmp_path / "phases.rrd", ticks)
     (names, *_) = [names for names in rows["/states/phase:StateConfiguration:values"] if names]
     assert {"pre contact", "approach", "contact", "hold", "breakaway", "back off"} <= set(names)
+
+
+def test_the_last_tick_of_an_episode_is_drawn_whenever_it_comes(hand_made, monkeypatch):
+    """An episode ends by the environment's own rules, of which the flight's outcome knows nothing."""
+    monkeypatch.setattr(envs_viewer, "shapes_of", lambda model: ())
+    drawn = []
+    monkeypatch.setattr(envs_viewer, "log_moving", lambda recording, log, *_: drawn.append(log.truths[0].time_s))
+    viewer, flight = LiveViewer(lambda recording: None), _flight(hand_made)
+    for k, (truth, imu, frame, solution) in enumerate(hand_made.ticks(3)):
+        tick = Tick(truth=truth, imu=imu, frame=frame, solution=solution, outcome=None)
+        viewer.show(flight, tick, is_last=k == 2)
+    assert drawn == [0.01, 0.03]
