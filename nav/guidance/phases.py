@@ -59,6 +59,7 @@ class PhaseLimits:
     # is one in contact with the coupling farther off its line
     clear_range_m: float = 0.6  # assumed: who is not committed and comes nearer than this ...
     beside_m: float = 0.6  # ... outside the rim keeps so far from the axis: rim, probe and what a gust may do
+    recall_m: float = 0.4  # assumed: who is committed and nearer the ring than this goes on before a red light, too
     closure_limit_m_s: float = 2.6  # 5 kt, service limit
     breakaway_s: float = 10.0  # assumed: backing off at 1 m/s clears any attempt in this time
 
@@ -116,6 +117,11 @@ def _doubtful(limits: PhaseLimits, s: Situation) -> bool:
 
 def _off_axis(limits: PhaseLimits, s: Situation) -> bool:
     return s.lateral_m > limits.off_axis_m and s.ring_ahead_m < limits.off_axis_range_m
+
+
+def _is_recalled(limits: PhaseLimits, s: Situation) -> bool:
+    """By a red light: too late not to come to the ring at all is not too late to meet it slowly, or not."""
+    return s.light_is_red and (not s.committed or s.ring_ahead_m > limits.recall_m)
 
 
 def _beside(limits: PhaseLimits, s: Situation) -> bool:
@@ -193,7 +199,7 @@ TRANSITIONS: dict[Phase, tuple[Transition, ...]] = {
         Transition(Phase.BREAKAWAY, "far off axis", _off_axis),
         Transition(Phase.BREAKAWAY, "beside the basket", _beside),
         _LOST_FOR_GOOD,
-        Transition(Phase.BACK_OFF, "red light", lambda limits, s: s.light_is_red and not s.committed),
+        Transition(Phase.BACK_OFF, "red light", _is_recalled),
         Transition(Phase.BACK_OFF, "time slot over", lambda limits, s: s.time_s >= limits.slot_s and s.waiting_s > 0.0),
         Transition(Phase.BACK_OFF, "no good moment to close", lambda limits, s: s.waiting_s >= limits.waiting_s),
         Transition(Phase.BACK_OFF, "coupling not reached", lambda limits, s: s.inside_s >= limits.inside_s),
