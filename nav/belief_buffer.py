@@ -104,7 +104,11 @@ class BeliefBuffer:
             self.renew_head()
             assert self._head is not None  # no frame is newer
             self._nodes.append(self._head)
-        oldest_s = time_s - self._span_s
+        self._forget(time_s)
+
+    def _forget(self, now_s: float) -> None:
+        """Drop what is older than the span, but for the last node before it."""
+        oldest_s = now_s - self._span_s
         if len(self._nodes) > 1 and self._nodes[1].time_s <= oldest_s:
             del self._nodes[: bisect_right(self._nodes, oldest_s, key=_time) - 1]
             self._record.forget(self._nodes[0].time_s)
@@ -124,6 +128,7 @@ class BeliefBuffer:
         self._nodes.insert(index, node)
         self._run_from(index + 1)
         self.renew_head()
+        self._forget(self._nodes[-1].time_s)  # where no sample comes, frames pile up
 
     def renew_head(self) -> None:
         """Bring the belief to the newest sample, unless a frame is newer."""

@@ -59,9 +59,10 @@ class ContactWatch:
             points_D: (n, 3) places of its LEDs by the sheet [m].
             time_s: stamp of its frame.
         """
-        if not self._tested(checked, points_D, time_s):
+        is_newest = self._tested(checked, points_D, time_s)
+        self._used_time_s = float(np.fmax(time_s, self._used_time_s))  # a late one, too, has corrected the belief
+        if not is_newest:
             return
-        self._used_time_s = time_s
         if self._coasting.due(time_s):
             self._ask_coasting(time_s)
 

@@ -50,7 +50,7 @@ class FusionSettings:
     rest_walk_rad_rts: float = (
         0.0017  # 0.3 degrees in 10 s: slow wander of the receiver's heading and of the air's direction
     )
-    start_velocity_sigma_m_s: float = 1.0  # assumed: joining up ends within this of the drogue's velocity
+    start_velocity_sigma_m_s: float = 1.0  # assumed: joining up ends within this of the drogue's, its swing not counted
     #: A rate that is not measured departs from that of the last sample: 3 degrees/s within a quarter of a second, the
     #: rolling of a receiver that flies in light gusts; then nothing is known of it but this.
     held_rate_sigma_rad_s: float = 0.05

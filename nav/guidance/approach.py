@@ -80,7 +80,7 @@ class Guidance:
         self._closure = Closure(settings.closing, *speeds, self._dt)
         self._clocks = PhaseClocks(self._dt, settings.limits)
         self._attempts, self._pushed_in_m = 0, 0.0
-        self._light_is_red = self._is_evading = False
+        self._light_is_red = self._is_evading = self._is_recalled = False
         self._evasion = Evasion(settings, self._dt)
 
     def announce(self, announcement: TankerAnnouncement) -> None:
@@ -258,6 +258,7 @@ class Guidance:
         elif self.phase is Phase.CONTACT:  # what is commanded already will still be flown
             self._pushed_in_m = self._closure.speed_m_s * self._settings.response_s[0]
         elif self.phase in (Phase.BACK_OFF, Phase.BREAKAWAY):
+            self._is_recalled = self.phase is Phase.BACK_OFF and self._closure.committed
             if self._passed is not None and self._closure.committed:  # else it did not mean to meet the drogue
                 self._aim = self._settings.bow_wave.learnt(self._aim, self._passed)
             self._closure.begin()
@@ -265,7 +266,9 @@ class Guidance:
 
     def _follows(self, state: RelativeState, ring: Array) -> bool:
         """Whether the drogue is followed; not while it is on the probe or about it, or out of view."""
-        clear = self.phase in (Phase.BACK_OFF, Phase.BREAKAWAY) and ring[0] > self._settings.limits.off_axis_range_m
+        on_its_way = self._is_recalled and self._u[0] > 0.0  # may still come to the ring: then inside the rim
+        clear_m = 0.0 if on_its_way else self._settings.limits.off_axis_range_m
+        clear = self.phase in (Phase.BACK_OFF, Phase.BREAKAWAY) and ring[0] > clear_m
         past = self.phase is Phase.APPROACH and self._clocks.inside_s > self._settings.funnel_s
         return state.usable and not past and not self._is_evading and (self.phase in _FOLLOWING or clear)
 

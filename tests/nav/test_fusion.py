@@ -214,6 +214,24 @@ def test_coasting_through_dropped_frames_the_covariance_grows_and_stays_honest()
     assert_mean_nees(at_end, 9)
 
 
+def test_frames_that_come_without_any_sample_are_kept_for_no_longer_than_others():
+    """An IMU that drops out for the rest of the flight: what is run again at each frame does not grow with it."""
+    world = World(sheets(5.0), SETTINGS, np.random.default_rng(3))
+    filter_ = RelativeFilter(world.sheets, SETTINGS)
+    for _ in fly(world, filter_, 0.3):
+        pass
+    most = 2 * SETTINGS.buffer_s * 50  # before, nodes without frames lay among them
+    for _ in range(150):
+        for _ in range(5):
+            world.step()
+        filter_.update(solve(filter_, world.pixels(0.1), world.time_s, 0.1), world.time_s)
+        assert len(filter_._buffer._nodes) <= most
+    before_s = world.time_s
+    filter_.propagate([world.step()])
+    assert filter_._buffer._nodes[0].time_s >= before_s - SETTINGS.buffer_s - 0.021
+    assert np.isfinite(filter_.state(world.time_s).p_PD_B).all()
+
+
 def test_before_the_first_message_the_drogue_has_swung_in_gusts_for_ever():
     """Its swing is as uncertain a second later, and the drogue's velocity as much as the rate of its swing more."""
     start, motion = start_of(SETTINGS, sheets(5.0)), motion_of(SETTINGS, GYRO)
