@@ -178,12 +178,18 @@ class Navigator:
         return whole and len(self._candidates_px) < _POSE_LEDS
 
     def _begin_again(self, seen: LedObservation) -> None:
-        """Believe the drogue to be where LEDs show it, whatever was believed while it was lost."""
-        pose = solve_pose(
-            seen.centroids_px, self._points_D[seen.led_numbers], self._sheets.camera, sigma_px=seen.sigma_px
-        )
-        if pose.status is PoseStatus.CONVERGED:
-            self._filter.begin_again(pose, seen.time_stamp_s)
+        """Believe the drogue to be where LEDs that agree show it, whatever was believed while it was lost."""
+        pixels, points_D, camera = seen.centroids_px, self._points_D[seen.led_numbers], self._sheets.camera
+        pose = solve_pose(pixels, points_D, camera, sigma_px=seen.sigma_px)
+        if pose.status is not PoseStatus.CONVERGED:
+            return
+        sigma_px = np.hypot(seen.sigma_px, self._misplaced_px(pose.p_CD))
+        pose = solve_pose(pixels, points_D, camera, sigma_px=sigma_px, initial=(pose.R_CD, pose.p_CD))
+        if pose.status is not PoseStatus.CONVERGED:
+            return
+        checked = check_integrity(pose, None, self._settings.integrity)
+        if checked.status is not IntegrityStatus.INCONSISTENT:
+            self._filter.begin_again(checked.pose, seen.time_stamp_s)
             self._contact.found_again()
 
     def _nothing(self, status: str) -> str:

@@ -692,6 +692,27 @@ def test_with_named_leds_a_lost_drogue_is_found_again(render):
     assert np.abs(solution.p_PD_B - [6.0, -1.1, 0.5])[1:].max() < 0.005
 
 
+@pytest.mark.parametrize("bent", [{2: 30.0}, {0: 40.0, 1: -35.0, 5: 30.0}])
+def test_a_lost_drogue_is_believed_again_where_leds_that_agree_show_it(render, bent):
+    """Lost for 3 s. One LED that is bent away is left out; where three are nothing begins."""
+    sky = Sky(render, lambda t: still(t) if t < 0.5 else np.array([6.0, -1.1, 0.5]))
+    for _ in range(50):
+        step_on_leds(sky, range(8))
+    for _ in range(300):
+        step_on_leds(sky, ())
+    before = sky.navigator._filter.state().p_PD_B
+    for led, bent_px in bent.items():
+        sky.bent_px[led] = bent_px, -bent_px
+    imu = sky.imu()
+    seen = named(sky, range(8), imu[-1].time_stamp_s)
+    solution = sky.navigator.step(imu, replace(seen, centroids_px=seen.centroids_px + sky.bent_px))
+    if len(bent) == 1:
+        assert np.abs(solution.p_PD_B - [6.0, -1.1, 0.5]).max() < 0.03
+    else:
+        assert np.linalg.norm(solution.p_PD_B - before) < 0.1 and not solution.valid
+        assert solution.status == "pose inconsistent"
+
+
 @pytest.mark.parametrize("count", [1, 2, 3])
 def test_one_to_three_leds_keep_a_belief_and_begin_none(render, count):
     """Belief with all LEDs for 0.3 s, then for 0.5 s with some: across as good as a pixel or two at 5 m."""
