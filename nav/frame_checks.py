@@ -63,6 +63,11 @@ def with_numbers(seen: LedObservation) -> LedObservation:
     kept = np.isfinite(seen.centroids_px).all(axis=1) & np.isfinite(seen.sigma_px) & (seen.sigma_px > 0.0)
     if kept.all():
         return seen
+    return only(seen, kept)
+
+
+def only(seen: LedObservation, kept: NDArray[np.bool_]) -> LedObservation:
+    """Return an observation with some of its LEDs, (n,) which."""
     return replace(
         seen, led_numbers=seen.led_numbers[kept], centroids_px=seen.centroids_px[kept], sigma_px=seen.sigma_px[kept]
     )

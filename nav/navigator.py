@@ -17,7 +17,7 @@ from dockair.calibration import LedRing, NavigationSheets
 from dockair.errors import DockairError
 from dockair.messages import CameraFrame, ImuSample, LedObservation, NavSolution, PodSignal, TankerAnnouncement
 from dockair.nav.contact_watch import ContactWatch
-from dockair.nav.frame_checks import FrameChecks, with_numbers
+from dockair.nav.frame_checks import FrameChecks, only, with_numbers
 from dockair.nav.fusion import FusionSettings, RelativeFilter
 from dockair.nav.guidance.approach import Guidance, GuidanceSettings, RelativeState
 from dockair.nav.guidance.field_of_view import FieldOfView
@@ -224,6 +224,8 @@ class Navigator:
         if checked.led is not None:
             self._led_pixels_px[named[checked.led]] = np.nan
         kept = np.arange(len(named)) != (-1 if checked.led is None else checked.led)
+        if kept.sum() < _LEAST_POSE_LEDS:  # what is left makes no pose, whose claim it could be
+            return self._use_few(only(seen, kept), R_CD, p_CD)
         sight = lines_of_sight_from_pixels(
             seen.centroids_px[kept],
             self._points_D[named[kept]],

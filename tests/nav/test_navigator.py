@@ -778,6 +778,24 @@ def test_three_leds_claim_contact_with_the_attitude_alone_and_not_with_one_that_
     assert not by_attitude.navigator.contact_claim().usable
 
 
+def test_of_three_leds_one_that_is_left_out_leaves_no_pose_and_its_claim_ages(render):
+    """The two that are left correct the belief, as two LEDs do, and begin no doubt in it."""
+    sky = Sky(render, still)
+    for _ in range(50):
+        step_on_leds(sky, range(8))
+    for _ in range(20):
+        assert step_on_leds(sky, (2, 5, 7)).status == "pose used"
+    bent_px, statuses = np.array([[25.0, 0.0], [0.0, 0.0], [0.0, 0.0]]), set()
+    for _ in range(100):
+        imu = sky.imu()
+        seen = named(sky, (2, 5, 7), imu[-1].time_stamp_s) if sky.tick % 2 == 0 else None
+        if seen is not None:
+            seen = replace(seen, centroids_px=seen.centroids_px + bent_px)
+        statuses.add(sky.navigator.step(imu, seen).status)
+    assert statuses == {"pose used", "LEDs used"}
+    assert Doubt.AGE in sky.navigator.contact_claim().doubts
+
+
 def test_with_the_attitude_one_of_four_leds_that_is_bent_away_is_seen(render):
     """LED 4 is 4 px off: nothing is corrected by it."""
     sky = with_four_leds(render, 6)
