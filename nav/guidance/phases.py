@@ -92,7 +92,7 @@ class Situation:
     frame_age_s: float  #: since the newest frame, whatever it showed
     frames_stopped: bool  #: for `frames_stop_s` or longer, and none that has come since was used
     closing_m_s: float  #: rate at which `ring_ahead_m` shrinks
-    committed: bool  #: too near to be called back
+    committed: bool  #: too near to be called back, but by a red light
     pushed_in_m: float  #: way flown toward the tanker since the coupling was reached
     attempts: int  #: approaches begun
     light_is_red: bool = False  #: of the pod: the hose is dead
