@@ -735,6 +735,30 @@ def test_a_belief_that_a_blow_unsettles_does_not_end_an_entry_inside_the_rim():
     assert guidance.phase is Phase.HOLD and Phase.BREAKAWAY not in phases
 
 
+def test_who_is_called_back_by_a_red_light_follows_the_drogue_until_it_stands():
+    """Committed, 1.2 m before the ring, at 1.2 m/s: it still comes to the ring, which has gone 0.3 m aside by then."""
+    red_s = np.inf
+
+    def aside(t):
+        share = 0.5 - 0.5 * np.cos(np.pi * np.clip((t - red_s) / 1.5, 0.0, 1.0)) if t > red_s else 0.0
+        return np.array([0.0, 0.3 * share, 0.0])
+
+    plant, guidance = Plant(drogue=aside, holds=False), Guidance(SETTINGS, RATE_HZ)
+    now = plant.step(ReceiverCommand())
+    while not (guidance._closure.committed and now.p_PD_B[0] < 1.2):
+        now = plant.step(guidance.step(now))
+    red_s = plant.t
+    guidance.signal(PodSignal(time_stamp_s=red_s, red=True))
+    offsets, ahead = [], []
+    for _ in range(4 * RATE_HZ):
+        now = plant.step(guidance.step(now))
+        offsets.append(float(np.hypot(*now.p_PD_B[1:])))
+        ahead.append(float(now.p_PD_B[0]))
+    assert guidance.phase in (Phase.BACK_OFF, Phase.PRE_CONTACT) and guidance.phase_reason
+    assert -DEPTH_M < min(ahead) < 0.2
+    assert offsets[int(np.argmin(ahead))] < 0.12
+
+
 def test_until_committed_a_share_of_the_limits_across_is_enough():
     """The drogue hops aside by 1.5 m while the receiver runs up."""
     plant, guidance, most = Plant(), Guidance(SETTINGS, RATE_HZ), 0.0
