@@ -34,7 +34,7 @@ from dockair.nav.guidance.evasion import Evasion
 from dockair.nav.guidance.field_of_view import FieldOfView
 from dockair.nav.guidance.guidance_settings import GuidanceSettings, RelativeState
 from dockair.nav.guidance.phase_clocks import PhaseClocks
-from dockair.nav.guidance.phases import Phase, PhaseLimits, Situation, next_phase
+from dockair.nav.guidance.phases import RED_LIGHT, Phase, PhaseLimits, Situation, next_phase
 from dockair.nav.guidance.pid import Pid
 from dockair.nav.guidance.predictive import Predictive
 from dockair.nav.guidance.stabilised_axes import StabilisedAxes
@@ -250,7 +250,7 @@ class Guidance:
         transition = next_phase(self.phase, self._settings.limits, situation)
         if transition is None:
             return
-        self.phase, self.phase_reason = transition.to, transition.reason
+        before, self.phase, self.phase_reason = self.phase, transition.to, transition.reason
         self._clocks.begin(self.phase)
         if self.phase is Phase.APPROACH:
             self._attempts, self._passed = self._attempts + 1, None
@@ -258,7 +258,7 @@ class Guidance:
         elif self.phase is Phase.CONTACT:  # what is commanded already will still be flown
             self._pushed_in_m = self._closure.speed_m_s * self._settings.response_s[0]
         elif self.phase in (Phase.BACK_OFF, Phase.BREAKAWAY):
-            self._is_recalled = self.phase is Phase.BACK_OFF and self._closure.committed
+            self._is_recalled = before is Phase.APPROACH and transition.reason == RED_LIGHT and situation.committed
             if self._passed is not None and self._closure.committed:  # else it did not mean to meet the drogue
                 self._aim = self._settings.bow_wave.learnt(self._aim, self._passed)
             self._closure.begin()

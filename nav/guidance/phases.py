@@ -25,6 +25,7 @@ class Phase(Enum):
     CLEAR = "clear"
 
 
+RED_LIGHT = "red light"  #: the reason to go back from a hose that is dead
 REFUELLED = "refuelled"  #: the reason to end a hold that was flown to its end
 
 
@@ -199,7 +200,7 @@ TRANSITIONS: dict[Phase, tuple[Transition, ...]] = {
         Transition(Phase.BREAKAWAY, "far off axis", _off_axis),
         Transition(Phase.BREAKAWAY, "beside the basket", _beside),
         _LOST_FOR_GOOD,
-        Transition(Phase.BACK_OFF, "red light", _is_recalled),
+        Transition(Phase.BACK_OFF, RED_LIGHT, _is_recalled),
         Transition(Phase.BACK_OFF, "time slot over", lambda limits, s: s.time_s >= limits.slot_s and s.waiting_s > 0.0),
         Transition(Phase.BACK_OFF, "no good moment to close", lambda limits, s: s.waiting_s >= limits.waiting_s),
         Transition(Phase.BACK_OFF, "coupling not reached", lambda limits, s: s.inside_s >= limits.inside_s),
@@ -208,7 +209,7 @@ TRANSITIONS: dict[Phase, tuple[Transition, ...]] = {
     Phase.CONTACT: (
         _TOO_FAST,
         Transition(Phase.BREAKAWAY, "beside the basket", _beside),
-        Transition(Phase.BACK_OFF, "red light", lambda limits, s: s.light_is_red),
+        Transition(Phase.BACK_OFF, RED_LIGHT, lambda limits, s: s.light_is_red),
         Transition(Phase.BACK_OFF, "drogue has not come along", _left),
         Transition(
             Phase.HOLD, "in the refuelling range", lambda limits, s: s.pushed_in_m >= limits.taken_in * limits.take_in_m
@@ -216,7 +217,7 @@ TRANSITIONS: dict[Phase, tuple[Transition, ...]] = {
     ),
     Phase.HOLD: (
         Transition(Phase.BREAKAWAY, "drogue has left the probe", _left),
-        Transition(Phase.DISCONNECT, "red light", lambda limits, s: s.light_is_red),
+        Transition(Phase.DISCONNECT, RED_LIGHT, lambda limits, s: s.light_is_red),
         Transition(Phase.DISCONNECT, REFUELLED, lambda limits, s: s.in_phase_s >= limits.hold_s),
     ),
     Phase.DISCONNECT: (Transition(Phase.CLEAR, "drogue well ahead", _far_enough),),

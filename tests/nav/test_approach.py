@@ -759,6 +759,20 @@ def test_who_is_called_back_by_a_red_light_follows_the_drogue_until_it_stands():
     assert offsets[int(np.argmin(ahead))] < 0.12
 
 
+@pytest.mark.parametrize("red", [False, True])
+def test_who_goes_back_from_contact_does_not_follow_a_drogue_that_has_come_off(red):
+    """Half a metre ahead and 0.2 m aside, while the receiver still moves forward: it may be thrown about."""
+    plant, guidance = Plant(holds=False), Guidance(SETTINGS, RATE_HZ)
+    now = plant.step(ReceiverCommand())
+    while guidance.phase is not Phase.CONTACT:
+        now = plant.step(guidance.step(now))
+    if red:
+        guidance.signal(PodSignal(time_stamp_s=plant.t, red=True))
+    commands = [guidance.step(state([0.5, 0.2, 0.0])) for _ in range(4 * RATE_HZ // 5)]
+    assert guidance.phase is Phase.BACK_OFF and commands[-1].velocity_m_s[0] > 0.0
+    assert max(abs(command.velocity_m_s[1]) for command in commands) < 0.05
+
+
 def test_until_committed_a_share_of_the_limits_across_is_enough():
     """The drogue hops aside by 1.5 m while the receiver runs up."""
     plant, guidance, most = Plant(), Guidance(SETTINGS, RATE_HZ), 0.0
