@@ -103,15 +103,16 @@ class RelativeFilter:
         """Of the newest frame offered: its chi-square against the prediction, and the degrees of freedom."""
         return None if self._last is None else (self._last.chi2, self._last.degrees_of_freedom)
 
-    def propagate(self, imu: Sequence[ImuSample]) -> int:
-        """Take samples of the IMU, oldest first; return how many could be used."""
-        taken, record, believed = 0, self._record, self._imu_stamps.believed
+    def propagate(self, imu: Sequence[ImuSample]) -> list[ImuSample]:
+        """Take samples of the IMU, oldest first; return those that could be used."""
+        taken: list[ImuSample] = []
+        record, believed = self._record, self._imu_stamps.believed
         for sample in imu:
             before_s = record.newest_s
             if sample.time_stamp_s <= before_s or not believed(sample.time_stamp_s, self._buffer.newest_s):
                 continue
             if record.take(sample):
-                taken += 1
+                taken.append(sample)
                 if not self._felt:
                     self._feel(record.forces_B[-1])
                 self._buffer.after_sample(before_s)

@@ -122,17 +122,17 @@ class Navigator:
 
     def step(self, imu: Sequence[ImuSample], frame: CameraFrame | LedObservation | None) -> NavSolution:
         """Take the gyro samples and the frame, or its LEDs, that arrived since the last control tick."""
-        if self._filter.propagate(imu):
+        taken = self._filter.propagate(imu)
+        if taken:
             self._time_s = self._filter.imu_time_s
         else:  # the IMU has dropped out, or says nothing that can be used: the last rate is held
             self._time_s += 1.0 / self._sheets.control_rate_hz
-        if self._heading is not None:
-            asked = frame if isinstance(frame, CameraFrame) and self._heading.was_asked(frame) else None
-            centre_C = np.zeros(3) if asked is None else self._filter.predicted_pose(self._time_s)[1]
-            self._heading.step(imu, asked, centre_C)
-            frame = frame if asked is None else None
         if np.isnan(self._begun_s):
             self._begun_s = self._time_s
+        if frame is not None:
+            frame = self._checked(frame)
+        if self._heading is not None:
+            frame = self._give_heading(self._heading, taken, frame)
         if frame is not None:
             self._status = self._look(frame)
         return self._solution()
@@ -151,13 +151,28 @@ class Navigator:
         since_s = self._begun_s if np.isnan(self._used_time_s) else self._used_time_s
         return time_s - since_s > self._settings.search_anew_s
 
+    def _checked(self, frame: CameraFrame | LedObservation) -> CameraFrame | LedObservation | None:
+        """Return a frame to look at; of one that says nothing only the status is left."""
+        clock_s = self._time_s if np.isfinite(self._filter.imu_time_s) else float("nan")
+        refused = self._checks.refused(frame, clock_s)
+        if refused is None:
+            return frame
+        self._candidates_px, self._status = np.empty((0, 2)), self._nothing(refused)
+        return None
+
+    def _give_heading(
+        self, heading: OwnHeading, taken: Sequence[ImuSample], frame: CameraFrame | LedObservation | None
+    ) -> CameraFrame | LedObservation | None:
+        """Let the heading have its samples and the frame that it asked for; return one that it did not ask for."""
+        if not (isinstance(frame, CameraFrame) and heading.was_asked(frame)):
+            heading.step(taken, None, np.zeros(3))
+            return frame
+        heading.step(taken, frame, self._filter.predicted_pose(self._time_s)[1])
+        return None
+
     def _look(self, frame: CameraFrame | LedObservation) -> str:
         """Frame to named LEDs to belief; what became of it is the status."""
         self._candidates_px = np.empty((0, 2))
-        clock_s = self._time_s if np.isfinite(self._filter.imu_time_s) else float("nan")
-        refused = self._checks.refused(frame, clock_s)
-        if refused is not None:
-            return self._nothing(refused)
         self._looked_time_s = self._time_s
         time_s = frame.time_stamp_s
         lost, nothing = self._lost(time_s), "ring not found"
@@ -221,9 +236,8 @@ class Navigator:
         if checked.status is IntegrityStatus.INCONSISTENT:
             self._contact.contradicted(time_s)
             return f"pose {checked.status.value}"
-        if checked.led is not None:
-            self._led_pixels_px[named[checked.led]] = np.nan
-        kept = np.arange(len(named)) != (-1 if checked.led is None else checked.led)
+        kept = np.isfinite(checked.pose.led_chi2)  # neither left out nor beyond the lens's edge, where no ray goes
+        self._led_pixels_px[named[~kept]] = np.nan
         if kept.sum() < _LEAST_POSE_LEDS:  # what is left makes no pose, whose claim it could be
             return self._use_few(only(seen, kept), R_CD, p_CD)
         sight = lines_of_sight_from_pixels(

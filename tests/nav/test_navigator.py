@@ -677,6 +677,22 @@ def test_named_leds_may_come_in_place_of_frames(render):
     assert step_on_leds(sky, ()).status == "ring not found"
 
 
+def test_a_named_led_where_no_ray_goes_is_not_seen():
+    """Beyond the edge of a lens whose distortion folds the picture there."""
+    sky = Sky(None, still)
+    sky.sheets = replace(sky.sheets, camera=replace(sky.sheets.camera, distortion=(-0.3, 0.0, 0.0, 0.0, 0.0)))
+    sky.navigator = Navigator(sky.sheets)
+    for _ in range(40):
+        step_on_leds(sky, range(8))
+    imu = sky.imu() + sky.imu()
+    seen = named(sky, range(8), imu[-1].time_stamp_s)
+    seen.centroids_px[2] = 9e3, 500.0
+    solution = sky.navigator.step(imu, seen)
+    assert solution.status == "pose used" and sky.navigator.contact_claim().usable
+    assert np.flatnonzero(~np.isfinite(solution.led_pixels_px).all(axis=1)).tolist() == [2]
+    assert np.abs(solution.p_PD_B - still(0.0))[1:].max() < 0.003
+
+
 def test_with_named_leds_a_lost_drogue_is_found_again(render):
     """The belief goes on with 3 m/s toward the lens and behind it."""
     sky = Sky(render, lambda t: still(t) - [3.0 * t, 0.0, 0.0] if t < 0.5 else np.array([6.0, -1.1, 0.5]))

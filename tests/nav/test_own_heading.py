@@ -11,7 +11,7 @@ from dockair.errors import DockairError
 from dockair.messages import CameraFrame, ImuSample, Window
 from dockair.nav.heading.levelling import without_yaw
 from dockair.nav.heading.own_heading import OwnHeading, OwnHeadingSettings
-from dockair.nav.heading.turn import TurnStatus
+from dockair.nav.heading.turn import Turn, TurnStatus
 from dockair.nav.heading.visual import VisualHeading
 from dockair.nav.navigator import Navigator, NavigatorSettings
 from dockair.rotations import exp, matrix_from_yaw_pitch_roll
@@ -177,7 +177,35 @@ def test_a_navigator_asks_for_the_frame_in_full_and_does_not_look_for_leds_in_it
     after = navigator.step(imu(0.04, 0.05), frame(500e-6))
     assert after.status == before == "no frame yet"
     assert abs(after.heading_rad) < 1e-6 and after.heading_sigma_rad > 0.0
-    assert navigator.step(imu(0.05, 0.06), frame(20e-6, stamp_s=0.04)).status == "ring not found"
+    other = frame(20e-6, stamp_s=0.04)
+    other.pixels[0, 0] = 1  # two that are equal to the last bit are one
+    assert navigator.step(imu(0.05, 0.06), other).status == "ring not found"
+
+
+def test_samples_that_the_belief_does_not_take_the_heading_does_not_take_either():
+    """One stamp an hour ahead, and a rate at the gyro's limit, which may be any beyond it."""
+    sheets = replace(SHEETS, gyro=replace(SHEETS.gyro, range_rad_s=1.0))
+    navigator = Navigator(sheets, NavigatorSettings(heading=SETTINGS))
+    navigator.step(imu(0.0, 0.1), None)
+    (last,) = imu(0.1, 0.102)
+    navigator.step([replace(last, time_stamp_s=3600.0)], None)
+    navigator.step([replace(last, angular_rate_rad_s=np.array([0.0, 0.0, 1.0]))], None)
+    solution = navigator.step(imu(0.1, 0.2), None)
+    assert abs(solution.heading_rad) < 1e-6 and solution.heading_sigma_rad < 0.01
+
+
+def test_a_picture_that_comes_again_shows_the_heading_nothing(monkeypatch):
+    navigator = Navigator(SHEETS, NavigatorSettings(heading=SETTINGS))
+    hung = np.random.default_rng(0).integers(0, 255, CAMERA.full_window.shape, np.uint8)
+    seen, statuses = [], []
+    monkeypatch.setattr(VisualHeading, "step", lambda *_, **__: seen.append(True) or Turn.none(TurnStatus.FIRST))
+    solution = navigator.step(imu(-4.5, 0.0), None)
+    for k in range(450):
+        asked = k % 2 == 0 and np.isfinite(solution.exposure_s)
+        picture = replace(frame(500e-6, stamp_s=0.01 * k), pixels=hung) if asked else None
+        solution = navigator.step(imu(0.01 * k, 0.01 * (k + 1)), picture)
+        statuses += [solution.status] if asked else []
+    assert len(seen) == 1 and statuses == ["no frame yet", "frame stuck", "frame stuck"]
 
 
 def test_a_navigator_without_heading_asks_for_nothing():
