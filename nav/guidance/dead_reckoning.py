@@ -35,7 +35,8 @@ class DeadReckoning:
         self.place_m: Array = np.zeros(3)  #: (3,) p
         self.drift_m_s: Array = np.zeros(3)  #: (3,) d: as learnt in view, what may be believed of it out of view
         self._ring_m: Array | None = None  # of a drogue that is in view
-        self._most_m_s, self._edge = settings.unseen_drift_m_s, 0
+        self._most_m_s = settings.unseen_drift_m_s
+        self._edge: int | None = None  # by which it went out of view; none of a drogue that nobody has seen
 
     def see(self, ring_m: Array, middle_m: Array, drift_m_s: Array, *, bearable: bool) -> None:
         """Take note of a drogue that is in view.
@@ -61,7 +62,7 @@ class DeadReckoning:
         if self._ring_m is not None:
             self._lose(R_NB.T @ self._ring_m)
         out_m = np.zeros(3)
-        if self._field is not None and not_shown and self._is_ahead:
+        if self._field is not None and self._edge is not None and not_shown and self._is_ahead:
             out_m = R_NB @ self._field.out_m(R_NB.T @ self.place_m, self._edge)
         T, most_m_s = self._settings.unseen_correction_s, self._settings.unseen_drift_m_s
         self.place_m = self.place_m + (self.drift_m_s - u_m_s + 2.0 * out_m / T) * self._step_s

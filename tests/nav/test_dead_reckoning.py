@@ -105,6 +105,16 @@ def test_a_drogue_that_nobody_has_seen_is_nowhere():
     np.testing.assert_array_equal(reckoning.place_m, np.zeros(3))
 
 
+def test_a_drogue_that_nobody_has_seen_went_out_by_no_edge():
+    """The receiver falls straight back; once it had, it climbed away from an imagined drogue above the field."""
+    reckoning, backward = DeadReckoning(SETTINGS, STEP_S, FIELD), np.array([-1.0, 0.0, 0.0])
+    for _ in range(2000):
+        reckoning.miss(backward, LEVEL, not_shown=True)
+    np.testing.assert_array_equal(reckoning.drift_m_s, np.zeros(3))
+    np.testing.assert_array_equal(reckoning.place_m[1:], np.zeros(2))
+    assert reckoning.place_m[0] > 19.0
+
+
 @pytest.mark.parametrize("bearable", [True, False])
 def test_whatever_frames_do_not_show_it_drifts_no_faster_than_an_inertial_velocity_errs(bearable):
     """A camera that is blind, not out of view: the receiver is not led away faster than that, nor in gusts slower."""
