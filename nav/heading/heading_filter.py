@@ -4,7 +4,7 @@
     theta' = -R db + noise,         db' = noise,     dpsi_f' = 0                                                 (2)
     up:     l = R (f - (w_gyro - b) x V),   e_z - l/|l| = theta x e_z + R (db x V)/|l| + v_up                    (3)
     turn:   psi(frame) - psi_f = seen + v,      v ~ N(0, q^2 dt)                                                 (4)
-            dpsi = theta_z - tan(pitch) (theta_x cos psi + theta_y sin psi)                                      (5)
+            dpsi = theta_z + tan(pitch) (theta_x cos psi + theta_y sin psi)                                      (5)
 
 N has z up and x along the heading at the start; psi, the heading, is counted from there, to the left; psi_f is that at
 the frame before. What the accelerometers read beyond the lift that a turn asks for points up, but who does not know
