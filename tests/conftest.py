@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import settings
 
 from dockair.calibration import Mounting
 from dockair.clock import Clock
@@ -21,6 +22,9 @@ from dockair.sim.hose.fuel import FuelParameters
 from dockair.sim.hose.reel import ReelParameters
 from dockair.sim.outlines import TankerParameters
 from dockair.sim.world import World, WorldParameters, WorldStart
+
+settings.register_profile("dockair", deadline=None, derandomize=True)  # the same on any day, however busy the machine
+settings.load_profile("dockair")
 
 SHEETS: dict[str, type[Any]] = {
     "hose": HoseParameters,
