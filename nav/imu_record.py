@@ -2,7 +2,9 @@
 
 Not taken are samples that are not newer than the last, whose stamp or rate is not a number, or with a rate at the
 gyro's limit, which says no more than that the true one is beyond. A stamp that jumps ahead is not believed until a
-second one near it says the same.
+second one near it says the same, and by more than a minute never: then it is no gap but another clock.
+
+Not modelled: a first stamp that is wrong. It sets the clock, and those of a right one that is behind it are too old.
 """
 
 import math
@@ -16,6 +18,7 @@ from dockair.rotations import Array
 
 _FIRST_ROOM = 256  # samples; doubled when needed
 _STAMP_S = 1e-6  # to which stamps are even
+_LONGEST_LEAP_S = 60.0  # no drogue is foretold for as long: a flight whose IMU was away for it has to be begun anew
 
 
 class Stamps:
@@ -30,9 +33,9 @@ class Stamps:
 
     def believed(self, time_s: float, newest_s: float) -> bool:
         """Whether a stamp is, where the newest of all that is known is `newest_s` (-inf: nothing)."""
-        near = time_s - newest_s <= self._leap_s or not math.isfinite(newest_s)
-        again = 0.0 < time_s - self._doubtful_s <= self._leap_s
-        if math.isfinite(time_s) and (near or again):
+        leap_s = time_s - newest_s if math.isfinite(newest_s) else 0.0
+        near, again = leap_s <= self._leap_s, 0.0 < time_s - self._doubtful_s <= self._leap_s
+        if math.isfinite(time_s) and leap_s <= _LONGEST_LEAP_S and (near or again):
             self._doubtful_s = np.nan
             return True
         self._doubtful_s = time_s

@@ -1,11 +1,12 @@
 """What the navigation is told before it flies: nominal calibration, mounting and geometry, and the gyro's data sheet.
 
-Nominal values only: nothing that is drawn, or changed in hose, drogue and airframe, for this flight goes in. A tanker's
-mass, span and units are published to its receivers, and with them its wake; so the geometry at the start is that of a
-flight in that wake without gusts: the hose hangs in it, the receiver is trimmed in the air where it waits. As the air
-depends on the places and the places on the air, both are found in a few rounds.
+Nominal values only: nothing that is drawn, or changed in hose, drogue and airframe, for this flight goes in. What can
+be measured on the ground goes in as a scenario sets it: where probe and camera are mounted, how deep the coupling is.
+A tanker's mass, span and units are published to its receivers, and with them its wake; so the geometry at the start is
+that of a flight in that wake without gusts: the hose hangs in it, the receiver is trimmed in the air where it waits. As
+the air depends on the places and the places on the air, both are found in a few rounds.
 
-Not told: the bow wave's push.
+Not told: the bow wave's push; what guidance anticipates of it is of the nominal sheet (`bow_wave_push`).
 """
 
 import numpy as np

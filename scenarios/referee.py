@@ -10,9 +10,9 @@ clear, when the receiver collides, when time is over.
 Radial offset and closure speed are taken where the tip crosses the ring's plane from behind (the last crossing before
 the coupling holds); the angle between probe and drogue axis when it holds.
 
-Unsafe is a touch at more than 2.6 m/s, one with the tip outside the rim (also by a drogue that the coupling has let
-go), a contact while the navigation itself marked its solution unusable (as the tip entered the basket or as it was
-held), any collision, and a receiver that departs from controlled flight (`departure`).
+Unsafe is a touch at more than 2.6 m/s along the drogue's axis, one with the tip outside the rim (also by a drogue that
+the coupling has let go), a contact while the navigation itself marked its solution unusable (as the tip entered the
+basket or as it was held), any collision, and a receiver that departs from controlled flight (`departure`).
 """
 
 from dataclasses import dataclass

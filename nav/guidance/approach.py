@@ -135,6 +135,7 @@ class Guidance:
         coasts = state.age_s > self._settings.limits.frames_stop_s  # a forecast of the fusion's is nothing measured
         if not state.usable or touches or coasts:  # a drogue that is pushed about by the probe would lead it astray
             self._controller.observe(None, change)
+            self._miss.skip()
             return
         times = self._controller.looks_ahead_s
         later = np.empty((len(times), 3))

@@ -51,15 +51,22 @@ class PredictedMiss:
     def __init__(self, settings: ClosingSettings, step_s: float) -> None:
         self._settings = settings
         self._squares: deque[float] = deque(maxlen=round(settings.swing_s / step_s))
-        self._sum = 0.0
+        self._sum, self._skipped = 0.0, 0
 
     def forget(self) -> None:
         """Begin anew: nothing is known of how well the drogue is followed."""
         self._squares.clear()
         self._sum = 0.0
 
+    def skip(self) -> None:
+        """Take note of a tick in which it could not be told; after a whole swing of them nothing is known any more."""
+        self._skipped += 1
+        if self._skipped == self._squares.maxlen:
+            self.forget()
+
     def step(self, error_m: float) -> None:
         """Take note of how far off the drogue the probe's line is now."""
+        self._skipped = 0
         if len(self._squares) == self._squares.maxlen:
             self._sum -= self._squares[0]
         self._squares.append(error_m**2)

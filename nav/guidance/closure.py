@@ -2,7 +2,7 @@
 
 The closure speed c is ramped up and down,
 
-    dc/dt = +-a_c                                                                                         (1)
+    dc/dt = +-a_c,   and +-a_r while it is called back                                                    (1)
 
 so that it is what the coupling wants whatever the drogue does. Until the last moment, when no more than the room to
 stop (`closing`) is left, the receiver runs up at less than that, as long as the moment is hopeful. At the last moment

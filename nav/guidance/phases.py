@@ -141,10 +141,9 @@ def _left(limits: PhaseLimits, s: Situation) -> bool:
 
 
 def _far_enough(limits: PhaseLimits, s: Situation) -> bool:
-    """Seen clear, or not for long; never with the drogue seen on the probe, where nobody may wait astern of it."""
-    seen = s.unusable_s == 0.0
-    seen_clear = seen and s.ring_ahead_m >= limits.clear_m and s.closing_m_s <= 0.0
-    about_it = seen and s.ring_ahead_m <= 0.0
+    """Seen clear, or not for long; never with the drogue on the probe, where nobody may wait astern of it."""
+    seen_clear = s.unusable_s == 0.0 and s.ring_ahead_m >= limits.clear_m and s.closing_m_s <= 0.0
+    about_it = s.unusable_s <= limits.lost_s and s.ring_ahead_m <= 0.0
     return seen_clear or (s.in_phase_s >= limits.breakaway_s and not about_it)
 
 

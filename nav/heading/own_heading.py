@@ -69,7 +69,7 @@ class OwnHeading:
 
     def ask(self, time_s: float) -> float:
         """Return the exposure to ask of the next frame [s], a full one; NaN for none. One frame takes it."""
-        if self._filter.is_level and time_s >= self._next_s:
+        if self._is_known and self._filter.is_level and time_s >= self._next_s:
             self._next_s = time_s + self._settings.every_s
             self._until_s = time_s + 1.0 / self._sheets.camera_rate_hz
         half_tick_s = 0.5 / self._sheets.control_rate_hz
@@ -139,5 +139,6 @@ class OwnHeading:
         for place, radius_m in discs:
             if place[0] > _NEAREST_M:
                 (u, v), radius = camera.pixels_from_points(place)[0], camera.focal_length_px * radius_m / place[0]
-                cv2.circle(mask, (round(u), round(v)), round(radius), 0, thickness=-1)
+                if -radius < u < size[0] + radius and -radius < v < size[1] + radius:  # far off, OpenCV overflows
+                    cv2.circle(mask, (round(u), round(v)), round(radius), 0, thickness=-1)
         return np.asarray(mask > 0)

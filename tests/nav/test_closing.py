@@ -29,6 +29,19 @@ def test_nothing_is_known_before_a_whole_swing_nor_after_forgetting():
     assert miss.spread_m == np.inf
 
 
+def test_nothing_is_known_after_a_whole_swing_in_which_the_drogue_was_not_seen():
+    miss = _fed(np.full(300, 0.1))
+    for _ in range(299):
+        miss.skip()
+    assert miss.spread_m == pytest.approx(0.1)
+    miss.step(0.1)
+    for _ in range(299):
+        miss.skip()
+    assert miss.spread_m == pytest.approx(0.1)
+    miss.skip()
+    assert miss.spread_m == np.inf
+
+
 def test_the_error_to_come_counts_whole_at_the_ring_and_hardly_from_afar():
     miss = _fed(np.full(300, 0.03))
     assert miss.at_contact_m(0.04, 0.0, 1.2) == pytest.approx(0.05)

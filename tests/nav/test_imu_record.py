@@ -89,11 +89,18 @@ def test_mean_rate_is_of_the_samples_in_the_interval_or_else_the_rate_there():
 def test_a_stamp_that_leaps_needs_a_second_one():
     stamps = Stamps(1.0)
     assert stamps.believed(5.0, -np.inf)
-    assert not stamps.believed(107.0, 5.0)
+    assert not stamps.believed(47.0, 5.0)
     assert stamps.believed(5.02, 5.0)
-    assert not stamps.believed(107.02, 5.02)
-    assert stamps.believed(107.04, 5.02)
-    assert not stamps.believed(np.nan, 107.04)
+    assert not stamps.believed(47.02, 5.02)
+    assert stamps.believed(47.04, 5.02)
+    assert not stamps.believed(np.nan, 47.04)
+
+
+def test_a_stamp_that_leaps_by_more_than_a_minute_is_of_another_clock():
+    stamps = Stamps(1.0)
+    assert stamps.believed(5.0, -np.inf)
+    assert not any(stamps.believed(3605.0 + 0.02 * k, 5.0) for k in range(10))
+    assert stamps.believed(5.02, 5.0)
 
 
 def test_a_gap_between_samples_is_told_wherever_it_is():

@@ -99,6 +99,13 @@ def test_features_lie_below_the_level_and_off_drogue_and_probe():
     assert row > 560 and not mask[round(row), round(column)]
 
 
+def test_a_drogue_believed_far_out_of_view_masks_nothing():
+    heading = OwnHeading(SHEETS, SETTINGS)
+    heading.step(imu(0.0, 0.1), None, DROGUE_C)
+    for far in ([0.31, 0.0, -3e5], [0.31, -1e6, 0.0], [0.35, 3.0, -1e7], [1e3, 0.0, 1e9]):
+        np.testing.assert_array_equal(heading._mask(np.eye(3), np.array(far)), heading._mask(np.eye(3), -DROGUE_C))
+
+
 def test_a_bank_turns_the_level():
     heading = OwnHeading(SHEETS, SETTINGS)
     mask = heading._mask(matrix_from_yaw_pitch_roll(0.0, 0.0, np.radians(-25.0)), DROGUE_C)  # left wing down
@@ -150,10 +157,10 @@ def test_pictures_of_before_stand_as_is_known_of_them_by_now():
 
 
 def test_after_a_gap_the_heading_is_lost_and_says_no_sigma():
-    heading = OwnHeading(SHEETS, SETTINGS)
-    heading.step(imu(0.0, 0.1), None, DROGUE_C)
+    heading = levelled()
     heading.step(imu(2.0, 2.1), None, DROGUE_C)
     assert np.isnan(heading.heading_rad) and np.isnan(heading.sigma_rad)
+    assert np.isnan(heading.ask(2.2))  # a frame would say nothing any more
 
 
 def test_gyros_of_which_nothing_is_known_are_refused():

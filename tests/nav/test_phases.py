@@ -99,7 +99,8 @@ OPENING = {"closing_m_s": -1.0}
         ("disconnect", HELD, None),
         ("disconnect", HELD | {"ring_ahead_m": 3.1, "closing_m_s": -0.9}, "clear"),
         ("disconnect", HELD | {"in_phase_s": 9.9, "unusable_s": 0.1}, None),
-        ("disconnect", HELD | {"in_phase_s": 10.0, "unusable_s": 0.1}, "clear"),
+        ("disconnect", HELD | {"in_phase_s": 10.0, "unusable_s": 0.5}, None),  # it is believed on the probe still
+        ("disconnect", HELD | {"in_phase_s": 10.0, "unusable_s": 0.6}, "clear"),
         ("disconnect", HELD | {"in_phase_s": 10.0, "ring_ahead_m": 0.1}, "clear"),
         ("disconnect", HELD | {"in_phase_s": 10.0}, None),
         ("back_off", OPENING | {"ring_ahead_m": 2.9}, None),
