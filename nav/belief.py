@@ -35,6 +35,7 @@ from dockair.nav.belief_motion import (
     ERRORS,
     GUST,
     HARDWARE,
+    PHI,
     PLACE,
     REST,
     RING,
@@ -54,6 +55,19 @@ _MERGE_CHI2 = 9.0  # squared distance in sigmas below which two are told as one:
 _LOG_NEGLIGIBLE = -14.0  # logarithm of the relative weight, about 1e-6, at which a hypothesis dies
 _MOST = 2  # hypotheses: a flat ring has no more
 _POSE_ERRORS = np.arange(6)
+
+
+def _blow() -> Array:
+    """(50, 9) errors by a turn, a shift and a change of velocity (3,) each of the drogue alone."""
+    G, one = np.zeros((ERRORS, 9)), np.eye(3)
+    swings = np.diag([0.0, 1.0, 1.0])  # along the hose there is no swing
+    G[PHI, :3], G[REST, :3] = one, -one
+    G[PLACE, 3:6], G[SWING, 3:6] = one, swings
+    G[VELOCITY, 6:], G[SWING_RATE, 6:] = one, swings
+    return G
+
+
+_BLOW = _blow()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -215,9 +229,12 @@ def _kept(found: list[Belief]) -> list[Belief]:
 
 
 def widened(belief: Belief, sigmas: tuple[float, float, float], led_place_sigma_m: float) -> Belief:
-    """Return a belief with less certainty of attitude [rad], place [m], velocity [m/s], each axis, and of the LEDs."""
-    P = belief.P.copy()
-    P[np.arange(9), np.arange(9)] += np.repeat(np.square(sigmas), 3)
+    """Return a belief with less certainty of attitude [rad], place [m], velocity [m/s], each axis, and of the LEDs.
+
+    What moves the drogue moves it away from its place of rest, too, and turns it from its attitude of rest, which stay:
+    ds = dn, dv = dm but along the hose, phi = -du.
+    """
+    P = belief.P + (_BLOW * np.repeat(np.square(sigmas), 3)) @ _BLOW.T
     P[range(RING.start, RING.stop), range(RING.start, RING.stop)] += led_place_sigma_m**2
     return replace(belief, P=P)
 
@@ -255,7 +272,7 @@ def begun_again(belief: Belief, start: Belief, p_ID: Array, turn_sigma_rad: floa
     P = belief.P.copy()
     P[moving], P[:, moving] = 0.0, 0.0
     P[np.ix_(moving, moving)] = start.P[np.ix_(moving, moving)]
-    P[range(3), range(3)] += turn_sigma_rad**2
+    P += turn_sigma_rad**2 * _BLOW[:, :3] @ _BLOW[:, :3].T
     x = belief.x.copy()
     x[:4], x[7] = start.x[:4], start.x[7]
     x[0] = p_ID

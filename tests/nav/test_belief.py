@@ -8,7 +8,21 @@ from scipy.stats import chi2 as chi2_law
 
 from dockair.calibration import Camera, LedRing, Mounting
 from dockair.nav.belief import Taking, _gained, begun_again, corrected, felt_first, mixture, rolled, widened
-from dockair.nav.belief_motion import BIAS, CALIBRATION, ERRORS, FORMATION, GUST, HARDWARE, PHI, REST, RING
+from dockair.nav.belief_motion import (
+    BIAS,
+    CALIBRATION,
+    ERRORS,
+    FORMATION,
+    GUST,
+    HARDWARE,
+    PHI,
+    PLACE,
+    REST,
+    RING,
+    SWING,
+    SWING_RATE,
+    VELOCITY,
+)
 from dockair.nav.belief_sight import Belief, Sight, ring_sensitivity
 from dockair.nav.pose.difference import pose_difference
 from dockair.nav.pose.estimate import solve_pose
@@ -358,12 +372,18 @@ def test_a_rolled_belief_forgets_how_its_attitude_and_its_leds_went_with_the_res
     assert np.linalg.eigvalsh(after.P).min() > -1e-9
 
 
-def test_a_widened_belief_is_less_certain_of_nine_errors_and_the_leds_alone():
+def test_what_moves_the_drogue_moves_it_from_its_place_and_attitude_of_rest_too():
+    """Errors drawn from what a widened belief is less certain of: a blow leaves those of rest alone."""
     before = belief(np.eye(ERRORS))
     added = widened(before, (0.1, 0.2, 0.3), 0.4).P - before.P
     np.testing.assert_allclose(np.diag(added)[:9], np.repeat([0.01, 0.04, 0.09], 3))
-    np.testing.assert_allclose(np.diag(added)[RING], 0.16)
-    assert np.count_nonzero(added) == 9 + 16
+    np.testing.assert_allclose(added[RING, RING], 0.16 * np.eye(16), atol=1e-12)
+    drawn = np.random.default_rng(4).multivariate_normal(np.zeros(ERRORS), added, 100).T
+    np.testing.assert_allclose(drawn[PHI], -drawn[REST], atol=1e-6)
+    np.testing.assert_allclose(drawn[SWING][1:], drawn[PLACE][1:], atol=1e-6)
+    np.testing.assert_allclose(drawn[SWING_RATE][1:], drawn[VELOCITY][1:], atol=1e-6)
+    still = np.r_[SWING.start, SWING_RATE.start, BIAS, FORMATION, GUST, CALIBRATION]
+    assert not added[still].any()
 
 
 def test_the_first_force_is_that_of_the_formation():
@@ -395,6 +415,8 @@ def test_a_drogue_that_is_seen_again_moves_as_at_the_start_and_the_rest_is_kept(
     assert np.array_equal(again.x, np.vstack([[20.0, 1.0, -2.0], start.x[1:4], lost.x[4:7], start.x[7:]]))
     assert np.array_equal(again.P[np.ix_(moving, moving)], start.P[np.ix_(moving, moving)])
     assert not again.P[np.ix_(moving, np.r_[PHI, kept])].any() and not again.P[np.ix_(np.r_[PHI, kept], moving)].any()
-    assert np.array_equal(again.P[np.ix_(kept, kept)], lost.P[np.ix_(kept, kept)])
-    assert again.P[PHI, PHI] == pytest.approx(lost.P[PHI, PHI] + 0.01 * np.eye(3))
+    turned = np.zeros((3, ERRORS))  # away from the attitude of rest, which stays
+    turned[:, PHI], turned[:, REST] = np.eye(3), -np.eye(3)
+    expected, others = lost.P + 0.01 * turned.T @ turned, np.r_[PHI, kept]
+    assert again.P[np.ix_(others, others)] == pytest.approx(expected[np.ix_(others, others)])
     assert np.array_equal(again.R_BD, lost.R_BD)
