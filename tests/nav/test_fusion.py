@@ -512,6 +512,23 @@ def test_a_drogue_that_is_struck_is_followed_again_after_a_few_refused_frames():
     assert_mean_nees(values, 9)  # what comes after is honest again
 
 
+def struck_aside(seed: int) -> tuple[Array, Array]:
+    """Struck off its place of rest; seen for 0.1 s more, then coasting for 0.4 s. Error and covariance."""
+    world = World(sheets(2.0), SETTINGS, np.random.default_rng((42, seed)))
+    filter_ = RelativeFilter(world.sheets, SETTINGS)
+    assert all(fly(world, filter_, 0.5))
+    blow = np.array([0.0, 1.2, -0.6])
+    world.v_N, world.m_N = world.v_N + blow, world.m_N + blow
+    list(fly(world, filter_, 1.0, seen=lambda t: t < 0.6))
+    assert filter_.doubted_s > 0.5
+    return world.error(filter_)
+
+
+def test_a_drogue_that_is_struck_aside_swings_back_to_where_it_hung():
+    """Had only velocity and place been doubted, not the swing, the mean would be 14."""
+    assert_mean_nees([nees(*struck_aside(seed)) for seed in range(20)], 9)
+
+
 def test_without_doubt_it_would_not_come_back():
     settings = replace(SETTINGS, refusals_until_doubt=1000)
     assert all(struck(seed, settings)[2].count(False) > SETTINGS.refusals_until_doubt for seed in range(5))
