@@ -37,6 +37,7 @@ from dockair.nav.guidance.phase_clocks import PhaseClocks
 from dockair.nav.guidance.phases import RED_LIGHT, Phase, PhaseLimits, Situation, next_phase
 from dockair.nav.guidance.pid import Pid
 from dockair.nav.guidance.predictive import Predictive
+from dockair.nav.guidance.slack_hose import SlackHose
 from dockair.nav.guidance.stabilised_axes import StabilisedAxes
 from dockair.rotations import Array
 
@@ -82,6 +83,7 @@ class Guidance:
         self._attempts, self._pushed_in_m = 0, 0.0
         self._light_is_red = self._is_evading = self._is_recalled = False
         self._evasion = Evasion(settings, self._dt)
+        self._hose = SlackHose(settings.limits, self._dt)
 
     def announce(self, announcement: TankerAnnouncement) -> None:
         """Take note of what the tanker is about to do."""
@@ -106,6 +108,8 @@ class Guidance:
         self._observe(state, ring, rate)
         self._reckon(state, ring)
         self._count(state, ring, rate, lateral_m)
+        seen, on_probe = state.usable and not self._coasts(state), _length(coupling) <= self._settings.limits.rim_m
+        self._hose.step(self.phase, coupling - ring, seen=seen, on_probe=on_probe)
         situation = self._situation(state, ring, rate, coupling, lateral_m)
         before = self.phase
         self._change_phase(situation)
@@ -132,8 +136,7 @@ class Guidance:
         """Show the drogue to the controller, and its distance from the probe's line to the prediction of the miss."""
         change = np.full(3, np.nan) if self._path.is_announced else self._axes.R_NB @ state.dv_WP_B
         touches = self.phase in _TOUCHING or (self.phase in (Phase.APPROACH, *_RETREATING) and ring[0] <= 0.0)
-        coasts = state.age_s > self._settings.limits.frames_stop_s  # a forecast of the fusion's is nothing measured
-        if not state.usable or touches or coasts:  # a drogue that is pushed about by the probe would lead it astray
+        if not state.usable or touches or self._coasts(state):  # a drogue that the probe pushes would lead it astray
             self._controller.observe(None, change)
             self._miss.skip()
             return
@@ -153,6 +156,10 @@ class Guidance:
             self._miss.step(float(np.hypot(*(ring[1:] + self._aim_now()))))
         if self.phase is Phase.APPROACH:
             self._passed = ring[1:].copy() if ring[0] < self._settings.limits.come_along_m else None
+
+    def _coasts(self, state: RelativeState) -> bool:
+        """Whether the state is a forecast of the fusion's, and nothing measured."""
+        return state.age_s > self._settings.limits.frames_stop_s
 
     def _reckon(self, state: RelativeState, ring: Array) -> None:
         """Keep where the drogue should be: on the probe, a frame that does not show it says nothing."""
@@ -243,6 +250,7 @@ class Guidance:
             pushed_in_m=self._pushed_in_m,
             attempts=self._attempts,
             light_is_red=self._light_is_red,
+            hose_is_slack=self._hose.is_slack,
             hose_has_whipped=self._evasion.hose_has_whipped,
         )
 

@@ -1,11 +1,12 @@
 """When the receiver goes down, out of the way of a hose that may whip.
 
-A drogue that comes off the probe sideways, or out of a view that frames go on to give, is on such a hose: as the phase
-ends in which the probe was held or, where the pod's light is red, on the way back from it, before the drogue is ahead
-of the tip. So is one that has come off by itself and goes out of view before it is seen ahead: it may be thrown aside
-within a frame or two of being believed ahead. On the way back before an amber light it is pulled off, and gusts may
-take it aside as it goes. Where the camera itself stopped it may still be on the probe, and the receiver goes straight
-back. A hose that has whipped once is not tried again (`phases`): nothing says that it will not do so again.
+A hose that nothing takes up at contact (`slack_hose`) will whip: the receiver goes before the drogue is torn off. One
+whose drogue comes off the probe sideways, or out of a view that frames go on to give, whips: as the phase ends in which
+the probe was held or, where the pod's light is red, on the way back from it, before the drogue is ahead of the tip. So
+does one whose drogue has come off by itself and goes out of view before it is seen ahead: it may be thrown aside within
+a frame or two of being believed ahead. On the way back before an amber light it is pulled off, and gusts may take it
+aside as it goes. Where the camera itself stopped it may still be on the probe, and the receiver goes straight back. A
+hose that has whipped once is not tried again (`phases`): nothing says that it will not do so again.
 
 Not modelled: where the hose is; how long it whips.
 """
@@ -47,7 +48,8 @@ class Evasion:
         self._slipped_off = slips_off if ends_hold else self._slipped_off and not _is_seen_ahead(situation)
         self._left_s = max(self._left_s - self._step_s, 0.0)
         slipped_unseen = self._slipped_off and _is_unseen(self._limits, situation)
-        if self._was_held and (slipped_unseen or _comes_off_aside(self._limits, situation, ends_hold=ends_hold)):
+        will_whip = situation.hose_is_slack or slipped_unseen
+        if self._was_held and (will_whip or _comes_off_aside(self._limits, situation, ends_hold=ends_hold)):
             self._was_held, self._left_s, self.hose_has_whipped = False, self._lasts_s, True
         return self._left_s > 0.0
 

@@ -47,6 +47,11 @@ class PhaseLimits:
     coupling_reached_m: float = 0.05  # assumed: the coupling takes the tip within 0.03 m, the range errs by 0.02 m
     come_along_m: float = 0.2  # assumed: a drogue farther ahead of the tip than this, or behind it, is not held by it
     frames_stop_s: float = 0.1  # assumed: camera out; the belief of a drogue that is pushed runs off by 0.2 m in 0.17 s
+    #: A hose is slack on which the drogue has turned by this much (`slack_hose`), ...
+    slack_tilt_rad: float = 0.087  # 5 degrees: on taut hoses up to 3.2 in moderate gusts, on slack ones 6.6 and more
+    slack_from_s: float = 0.15  # ... looked at from so long after contact ...
+    slack_to_s: float = 0.35  # ... until then: half of the time that it takes to be torn off
+    slack_before_s: float = 1.0  # and before contact over so long: a third of a swing
     take_in_m: float = 1.5  # inside the refuelling range 0.5-6 m (KDC-10 procedures)
     taken_in: float = 0.9  # of that way when holding begins: the receiver comes to rest on the remaining tenth
     hold_s: float = 5.0  # assumed: long enough to see that the drogue stays on the probe
@@ -97,6 +102,7 @@ class Situation:
     pushed_in_m: float  #: way flown toward the tanker since the coupling was reached
     attempts: int  #: approaches begun
     light_is_red: bool = False  #: of the pod: the hose is dead
+    hose_is_slack: bool = False  #: nothing takes it up since contact (`slack_hose`)
     hose_has_whipped: bool = False  #: a drogue has come off the probe as from a hose that nothing takes up
 
 
@@ -208,6 +214,7 @@ TRANSITIONS: dict[Phase, tuple[Transition, ...]] = {
     Phase.CONTACT: (
         _TOO_FAST,
         Transition(Phase.BREAKAWAY, "beside the basket", _beside),
+        Transition(Phase.BREAKAWAY, "hose is slack", lambda limits, s: s.hose_is_slack),
         Transition(Phase.BACK_OFF, RED_LIGHT, lambda limits, s: s.light_is_red),
         Transition(Phase.BACK_OFF, "drogue has not come along", _left),
         Transition(

@@ -393,6 +393,30 @@ def on_the_probe(phase):
     return guidance
 
 
+def turned(p_PD_B, degrees):
+    """Drogue seen at a place (3,), its axis turned aside."""
+    seen, angle = state(p_PD_B), np.radians(degrees)
+    return dataclasses.replace(seen, p_PK_B=seen.p_PD_B + DEPTH_M * np.array([np.cos(angle), np.sin(angle), 0.0]))
+
+
+@pytest.mark.parametrize("red", [False, True])
+@pytest.mark.parametrize(("degrees", "evades"), [(3.0, False), (8.0, True)])
+def test_from_a_hose_that_contact_leaves_slack_it_goes_down_before_the_drogue_is_torn_off(degrees, evades, red):
+    """Whether or not a red light has called it back at contact already."""
+    guidance = Guidance(SETTINGS, RATE_HZ)
+    for _ in range(RATE_HZ):
+        guidance.step(state([-DEPTH_M, 0.0, 0.0]))
+        guidance.phase = Phase.APPROACH
+    guidance.phase = Phase.CONTACT
+    if red:
+        guidance.signal(PodSignal(time_stamp_s=0.0, red=True))
+    down = np.array([guidance.step(turned([-DEPTH_M, 0.0, 0.0], degrees)).velocity_m_s[2] for _ in range(RATE_HZ)])
+    assert bool(down.min() < -1.0) == evades
+    if evades:
+        assert down[: round(SETTINGS.limits.slack_to_s * RATE_HZ)].min() > -0.2  # not by the blow of contact itself
+        assert guidance.phase is (Phase.BACK_OFF if red else Phase.BREAKAWAY)
+
+
 def gone_down(where_later, **later):
     """Lowest velocity up, of a receiver that goes back by a red light from a drogue that then comes off."""
     guidance = Guidance(SETTINGS, RATE_HZ)

@@ -80,6 +80,8 @@ OPENING = {"closing_m_s": -1.0}
         ("approach", {"light_is_red": True, "committed": True, "ring_ahead_m": 0.3}, None),
         ("contact", HELD | {"light_is_red": True}, "back_off"),
         ("hold", HELD | {"light_is_red": True}, "disconnect"),
+        ("contact", HELD | {"hose_is_slack": True}, "breakaway"),
+        ("contact", HELD | {"hose_is_slack": True, "light_is_red": True}, "breakaway"),
         ("contact", HELD, None),
         ("contact", HELD | {"ahead_m": -0.3}, "back_off"),
         ("contact", HELD | {"ahead_m": -0.3, "beside_m": 0.3, "frames_stopped": True}, None),

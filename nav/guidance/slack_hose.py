@@ -1,0 +1,66 @@
+"""Whether the reel takes up the hose at contact, told by how the drogue turns on the probe.
+
+A hose that is taken up stays taut, and holds the drogue along itself. One that is not is slack within a tenth of a
+second: the drogue, on the probe, turns with every wave that the blow of contact sends up and down it, long before they
+tear it off. With the drogue's axis a in axes that do not turn with the receiver, looked at for a time after contact,
+from when the blow itself has passed,
+
+    tilt = mean angle between a and its mean before contact                                               (1)
+
+Nothing is said where the drogue has not been seen on the probe for half of that time.
+
+Not modelled: a reel that takes up late or slowly; a coupling that does not let the drogue turn.
+"""
+
+from collections import deque
+
+import numpy as np
+
+from dockair.nav.guidance.phases import Phase, PhaseLimits
+from dockair.rotations import Array
+
+
+class SlackHose:
+    """Told once after each contact, and true until the next approach.
+
+    Args:
+        limits: how far the drogue may turn, and when it is looked at.
+        step_s: control period.
+    """
+
+    def __init__(self, limits: PhaseLimits, step_s: float) -> None:
+        self._limits, self._step_s = limits, step_s
+        self._before: deque[Array] = deque(maxlen=round(limits.slack_before_s / step_s))
+        self._contact_s = -np.inf  # since contact; -inf before it
+        self._tilts_rad: list[float] = []
+        self.is_slack = False  #: nothing takes up the hose
+
+    def step(self, phase: Phase, along: Array, *, seen: bool, on_probe: bool) -> None:
+        """Advance by one control tick.
+
+        Args:
+            phase: that is flown.
+            along: (3,) the drogue's axis, of any length, in axes that do not turn with the receiver.
+            seen: whether that is known of frames that have not stopped.
+            on_probe: whether the coupling is believed at the tip.
+        """
+        self._contact_s += self._step_s
+        if phase in (Phase.PRE_CONTACT, Phase.APPROACH):
+            self._contact_s, self.is_slack = -np.inf, False
+            self._tilts_rad.clear()
+            if seen:
+                self._before.append(along)
+        elif phase is Phase.CONTACT and self._contact_s == -np.inf:
+            self._contact_s = 0.0
+        limits = self._limits
+        if limits.slack_from_s <= self._contact_s <= limits.slack_to_s:
+            if seen and on_probe and self._before:
+                self._tilts_rad.append(_angle_rad(along, np.sum(self._before, axis=0)))
+        elif self._contact_s > limits.slack_to_s:
+            looked_s = self._step_s * len(self._tilts_rad)
+            enough = looked_s >= 0.5 * (limits.slack_to_s - limits.slack_from_s)
+            self.is_slack = enough and float(np.mean(self._tilts_rad)) > limits.slack_tilt_rad
+
+
+def _angle_rad(a: Array, b: Array) -> float:
+    return float(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b))

@@ -1,0 +1,75 @@
+"""Whether the hose is taken up at contact."""
+
+import numpy as np
+import pytest
+
+from dockair.nav.guidance.phases import Phase, PhaseLimits
+from dockair.nav.guidance.slack_hose import SlackHose
+
+LIMITS, STEP_S = PhaseLimits(), 0.01
+BEFORE_S = 2.0
+LIMIT_DEG = np.degrees(LIMITS.slack_tilt_rad)
+REST = np.array([0.29, 0.05, -0.03])
+
+
+def turned(degrees: float) -> np.ndarray:
+    """REST (3,) turned aside."""
+    across = np.cross(REST, [0.0, 0.0, 1.0])
+    length = np.linalg.norm(REST)
+    return np.cos(np.radians(degrees)) * REST + np.sin(np.radians(degrees)) * length * across / np.linalg.norm(across)
+
+
+def told(degrees, *, seen=lambda t: True, on_probe=lambda t: True, after=Phase.CONTACT, before=lambda t: 0.0):
+    """(60,) whether it was told slack, tick by tick from contact on; the angles are of the time since contact."""
+    hose = SlackHose(LIMITS, STEP_S)
+    for t in np.arange(-BEFORE_S, 0.0, STEP_S):
+        hose.step(Phase.APPROACH, turned(before(t)), seen=True, on_probe=False)
+    slack = []
+    for k in range(60):
+        t = k * STEP_S
+        hose.step(Phase.CONTACT if k == 0 else after, turned(degrees(t)), seen=seen(t), on_probe=on_probe(t))
+        slack.append(hose.is_slack)
+    return np.array(slack)
+
+
+@pytest.mark.parametrize("after", [Phase.CONTACT, Phase.BACK_OFF, Phase.HOLD])
+def test_a_drogue_that_turns_on_the_probe_is_on_a_slack_hose_whatever_phase_follows(after):
+    slack = told(lambda t: LIMIT_DEG + 0.5, after=after)
+    first = int(np.argmax(slack))
+    assert abs(first * STEP_S - LIMITS.slack_to_s) < 1.5 * STEP_S and slack[first:].all()
+    assert not told(lambda t: LIMIT_DEG - 0.5, after=after).any()
+
+
+def test_the_mean_counts_and_neither_the_blow_nor_what_comes_later():
+    assert told(lambda t: LIMIT_DEG + 4.0 * np.sin(60.0 * t) + 1.0).any()
+    assert not told(lambda t: 30.0 if t < LIMITS.slack_from_s - 0.5 * STEP_S else 0.0).any()
+    assert not told(lambda t: 30.0 if t > LIMITS.slack_to_s + 0.5 * STEP_S else 0.0).any()
+
+
+def test_the_drogue_s_own_attitude_of_the_last_second_is_what_it_turns_from():
+    """Half a swing before, the drogue hung elsewhere: only the last second counts."""
+    assert not told(lambda t: 8.0, before=lambda t: 8.0 if t >= -LIMITS.slack_before_s else -40.0).any()
+    assert told(lambda t: 0.0, before=lambda t: 8.0).any()
+
+
+def test_nothing_is_said_of_a_drogue_that_was_hardly_seen_or_was_not_on_the_probe():
+    half_s = 0.5 * (LIMITS.slack_from_s + LIMITS.slack_to_s)
+    assert told(lambda t: 10.0, seen=lambda t: t < half_s + STEP_S).any()
+    assert not told(lambda t: 10.0, seen=lambda t: t < half_s - 2 * STEP_S).any()
+    assert not told(lambda t: 10.0, on_probe=lambda t: t < half_s - 2 * STEP_S).any()
+
+
+def test_nothing_is_said_where_nothing_was_seen_before_contact_and_the_next_approach_begins_anew():
+    hose = SlackHose(LIMITS, STEP_S)
+    for _ in range(60):
+        hose.step(Phase.CONTACT, turned(10.0), seen=True, on_probe=True)
+        assert not hose.is_slack
+    for phase, degrees, expected in (
+        (Phase.APPROACH, 0.0, False),
+        (Phase.CONTACT, 10.0, True),
+        (Phase.APPROACH, 0.0, False),
+        (Phase.CONTACT, 0.0, False),
+    ):
+        for _ in range(110):
+            hose.step(phase, turned(degrees), seen=True, on_probe=True)
+        assert hose.is_slack is expected
