@@ -108,8 +108,7 @@ class Guidance:
         self._observe(state, ring, rate)
         self._reckon(state, ring)
         self._count(state, ring, rate, lateral_m)
-        seen, on_probe = state.usable and not self._coasts(state), _length(coupling) <= self._settings.limits.rim_m
-        self._hose.step(self.phase, coupling - ring, seen=seen, on_probe=on_probe)
+        self._hose.step(self.phase, coupling, coupling - ring, seen=state.usable and not self._coasts(state))
         situation = self._situation(state, ring, rate, coupling, lateral_m)
         before = self.phase
         self._change_phase(situation)

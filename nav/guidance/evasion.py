@@ -19,7 +19,7 @@ _GOING_BACK = (Phase.DISCONNECT, Phase.BACK_OFF, Phase.BREAKAWAY)
 
 
 class Evasion:
-    """Begins once after each contact at most, and lasts for a time.
+    """Begins once at most, and lasts for a time: a hose that has whipped is not tried again.
 
     Args:
         settings: of the guidance.
@@ -43,15 +43,21 @@ class Evasion:
             self._was_held, self._left_s = False, 0.0
             return False
         ends_hold = before in _ON_PROBE
-        self._was_held = self._was_held or ends_hold
+        self._was_held = self._was_held or ends_hold or _is_reached(self._limits, situation)
         slips_off = is_off_the_probe(self._limits, situation)
         self._slipped_off = slips_off if ends_hold else self._slipped_off and not _is_seen_ahead(situation)
         self._left_s = max(self._left_s - self._step_s, 0.0)
         slipped_unseen = self._slipped_off and _is_unseen(self._limits, situation)
-        will_whip = situation.hose_is_slack or slipped_unseen
-        if self._was_held and (will_whip or _comes_off_aside(self._limits, situation, ends_hold=ends_hold)):
-            self._was_held, self._left_s, self.hose_has_whipped = False, self._lasts_s, True
+        comes_off = slipped_unseen or _comes_off_aside(self._limits, situation, ends_hold=ends_hold)
+        whips = self._was_held and (situation.hose_is_slack or comes_off)
+        if whips and not self.hose_has_whipped:
+            self._left_s, self.hose_has_whipped = self._lasts_s, True
         return self._left_s > 0.0
+
+
+def _is_reached(limits: PhaseLimits, s: Situation) -> bool:
+    """By a receiver that had been called back already."""
+    return s.ahead_m <= limits.coupling_reached_m and not is_off_the_probe(limits, s)
 
 
 def _is_seen_ahead(s: Situation) -> bool:

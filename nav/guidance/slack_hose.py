@@ -19,6 +19,8 @@ import numpy as np
 from dockair.nav.guidance.phases import Phase, PhaseLimits
 from dockair.rotations import Array
 
+_BEFORE = (Phase.JOIN_UP, Phase.PRE_CONTACT, Phase.APPROACH)
+
 
 class SlackHose:
     """Told once after each contact, and true until the next approach.
@@ -35,25 +37,28 @@ class SlackHose:
         self._tilts_rad: list[float] = []
         self.is_slack = False  #: nothing takes up the hose
 
-    def step(self, phase: Phase, along: Array, *, seen: bool, on_probe: bool) -> None:
+    def step(self, phase: Phase, coupling: Array, along: Array, *, seen: bool) -> None:
         """Advance by one control tick.
 
         Args:
-            phase: that is flown.
-            along: (3,) the drogue's axis, of any length, in axes that do not turn with the receiver.
+            phase: that is flown; a receiver that is called back may still come to the coupling.
+            coupling: (3,) from the probe's tip [m].
+            along: (3,) the drogue's axis, of any length. Both in axes that do not turn with the receiver.
             seen: whether that is known of frames that have not stopped.
-            on_probe: whether the coupling is believed at the tip.
         """
         self._contact_s += self._step_s
-        if phase in (Phase.PRE_CONTACT, Phase.APPROACH):
+        if phase in _BEFORE:
             self._contact_s, self.is_slack = -np.inf, False
             self._tilts_rad.clear()
             if seen:
                 self._before.append(along)
-        elif phase is Phase.CONTACT and self._contact_s == -np.inf:
+            return
+        limits, beside_m = self._limits, float(np.hypot(coupling[1], coupling[2]))
+        reached = coupling[0] <= limits.coupling_reached_m and beside_m <= limits.rim_m
+        if self._contact_s == -np.inf and (phase is Phase.CONTACT or reached):
             self._contact_s = 0.0
-        limits = self._limits
         if limits.slack_from_s <= self._contact_s <= limits.slack_to_s:
+            on_probe = abs(coupling[0]) <= limits.come_along_m and beside_m <= limits.rim_m
             if seen and on_probe and self._before:
                 self._tilts_rad.append(_angle_rad(along, np.sum(self._before, axis=0)))
         elif self._contact_s > limits.slack_to_s:

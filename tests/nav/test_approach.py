@@ -417,6 +417,17 @@ def test_from_a_hose_that_contact_leaves_slack_it_goes_down_before_the_drogue_is
         assert guidance.phase is (Phase.BACK_OFF if red else Phase.BREAKAWAY)
 
 
+def test_a_receiver_that_a_red_light_called_back_goes_down_from_a_slack_hose_that_it_comes_to_all_the_same():
+    guidance = Guidance(SETTINGS, RATE_HZ)
+    for ahead_m in np.linspace(0.5, DEPTH_M, RATE_HZ):
+        guidance.step(state([ahead_m, 0.0, 0.0]))
+        guidance.phase = Phase.APPROACH
+    guidance.phase = Phase.BACK_OFF
+    guidance.signal(PodSignal(time_stamp_s=0.0, red=True))
+    down = np.array([guidance.step(turned([-DEPTH_M, 0.0, 0.0], 8.0)).velocity_m_s[2] for _ in range(RATE_HZ)])
+    assert guidance.phase is Phase.BACK_OFF and down.min() < -1.0
+
+
 def gone_down(where_later, **later):
     """Lowest velocity up, of a receiver that goes back by a red light from a drogue that then comes off."""
     guidance = Guidance(SETTINGS, RATE_HZ)

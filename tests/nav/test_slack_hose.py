@@ -19,15 +19,15 @@ def turned(degrees: float) -> np.ndarray:
     return np.cos(np.radians(degrees)) * REST + np.sin(np.radians(degrees)) * length * across / np.linalg.norm(across)
 
 
-def told(degrees, *, seen=lambda t: True, on_probe=lambda t: True, after=Phase.CONTACT, before=lambda t: 0.0):
+def told(degrees, *, seen=lambda t: True, ahead_m=lambda t: 0.0, after=Phase.CONTACT, before=lambda t: 0.0):
     """(60,) whether it was told slack, tick by tick from contact on; the angles are of the time since contact."""
     hose = SlackHose(LIMITS, STEP_S)
     for t in np.arange(-BEFORE_S, 0.0, STEP_S):
-        hose.step(Phase.APPROACH, turned(before(t)), seen=True, on_probe=False)
+        hose.step(Phase.APPROACH, np.array([-t, 0.0, 0.0]), turned(before(t)), seen=True)
     slack = []
     for k in range(60):
         t = k * STEP_S
-        hose.step(Phase.CONTACT if k == 0 else after, turned(degrees(t)), seen=seen(t), on_probe=on_probe(t))
+        hose.step(after if k else Phase.CONTACT, np.array([ahead_m(t), 0.0, 0.0]), turned(degrees(t)), seen=seen(t))
         slack.append(hose.is_slack)
     return np.array(slack)
 
@@ -56,13 +56,13 @@ def test_nothing_is_said_of_a_drogue_that_was_hardly_seen_or_was_not_on_the_prob
     half_s = 0.5 * (LIMITS.slack_from_s + LIMITS.slack_to_s)
     assert told(lambda t: 10.0, seen=lambda t: t < half_s + STEP_S).any()
     assert not told(lambda t: 10.0, seen=lambda t: t < half_s - 2 * STEP_S).any()
-    assert not told(lambda t: 10.0, on_probe=lambda t: t < half_s - 2 * STEP_S).any()
+    assert not told(lambda t: 10.0, ahead_m=lambda t: 0.0 if t < half_s - 2 * STEP_S else 0.3).any()
 
 
 def test_nothing_is_said_where_nothing_was_seen_before_contact_and_the_next_approach_begins_anew():
     hose = SlackHose(LIMITS, STEP_S)
     for _ in range(60):
-        hose.step(Phase.CONTACT, turned(10.0), seen=True, on_probe=True)
+        hose.step(Phase.CONTACT, np.zeros(3), turned(10.0), seen=True)
         assert not hose.is_slack
     for phase, degrees, expected in (
         (Phase.APPROACH, 0.0, False),
@@ -71,5 +71,25 @@ def test_nothing_is_said_where_nothing_was_seen_before_contact_and_the_next_appr
         (Phase.CONTACT, 0.0, False),
     ):
         for _ in range(110):
-            hose.step(phase, turned(degrees), seen=True, on_probe=True)
+            hose.step(phase, np.zeros(3), turned(degrees), seen=True)
         assert hose.is_slack is expected
+
+
+def test_a_receiver_that_was_called_back_is_in_contact_from_when_it_comes_to_the_coupling_all_the_same():
+    hose, slack = SlackHose(LIMITS, STEP_S), []
+    for t in np.arange(0.0, BEFORE_S, STEP_S):
+        hose.step(Phase.APPROACH, np.array([1.0 - 0.3 * t, 0.0, 0.0]), REST, seen=True)
+    for t in np.arange(-0.4, 0.6, STEP_S):  # the coupling is reached at 0
+        coupling, degrees = np.array([max(-t, 0.0), 0.0, 0.0]), 0.0 if t < 0.0 else 8.0
+        hose.step(Phase.BACK_OFF, coupling, turned(degrees), seen=True)
+        slack.append((t, hose.is_slack))
+    first_s = next(t for t, is_slack in slack if is_slack)
+    assert first_s == pytest.approx(LIMITS.slack_to_s - LIMITS.coupling_reached_m, abs=2 * STEP_S)
+
+
+def test_a_drogue_beside_the_probe_is_not_in_contact():
+    hose = SlackHose(LIMITS, STEP_S)
+    for phase, degrees in ((Phase.APPROACH, 0.0), (Phase.BACK_OFF, 10.0)):
+        for _ in range(100):
+            hose.step(phase, np.array([0.0, 0.3, 0.0]), turned(degrees), seen=True)
+    assert not hose.is_slack
