@@ -14,6 +14,8 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 from rich.table import Table
 from rich.text import Text
 
+from dockair.scenarios.no_attempt import cause_and_ending, ending
+
 if TYPE_CHECKING:  # the progress of a flight is told in these; importing them here would slow `--help` down
     from dockair.messages import NavSolution
     from dockair.scenarios.bench import BenchReport
@@ -102,6 +104,8 @@ def show_result(result: Mapping[str, Any], shortfalls: Sequence[str] | None, fol
     for attempt in result.get("attempt_log", ()):
         if attempt["cause"]:
             console.print(_failed_attempt(attempt), style="yellow", soft_wrap=True)
+    if result.get("attempts") == 0:
+        console.print(_no_attempt(result), style="yellow", soft_wrap=True)
     table = Table(show_header=False, box=None, padding=(0, 1))
     table.add_column()
     table.add_column(justify="right")
@@ -114,7 +118,7 @@ def show_result(result: Mapping[str, Any], shortfalls: Sequence[str] | None, fol
     if shortfalls is not None:
         console.print("; ".join(shortfalls) or "as the scenario claims", style="yellow" if shortfalls else "green")
     for path in sorted(folder.iterdir()):
-        console.print(Text.assemble(f"  {path}  ", (f"{path.stat().st_size / 1e6:.2f} MB", "dim")), soft_wrap=True)
+        console.print(Text.assemble(f"  {path}  ", (_size(path.stat().st_size), "dim")), soft_wrap=True)
     if (folder / "episode.rrd").exists():
         viewer = os.path.relpath(Path(sys.executable).parent / "rerun")
         console.print(f"look at it: {viewer} --bind 127.0.0.1 {folder / 'episode.rrd'}", soft_wrap=True)
@@ -125,6 +129,16 @@ def _failed_attempt(attempt: Mapping[str, Any]) -> str:
     off = "" if offset_m is None else f", {offset_m:.2f} m off"
     why = f" ({reason})" if reason else ""
     return f"attempt {attempt['number']}: {attempt['outcome'].replace('_', ' ')}{off}{why}; cause: {attempt['cause']}"
+
+
+def _no_attempt(result: Mapping[str, Any]) -> str:
+    why = cause_and_ending(result["cause"], ending(result["timeline"], result["outcome"]))
+    return f"no attempt after {result['duration_s']:.1f} s; {why}"
+
+
+def _size(count: int) -> str:
+    """Return a number of bytes in kB, from 0.1 MB on in MB."""
+    return f"{count / 1e6:.1f} MB" if count >= 100_000 else f"{count / 1e3:.1f} kB"
 
 
 def show_checks(checks: Sequence["Check"], versions: Mapping[str, str]) -> None:

@@ -67,6 +67,26 @@ def test_every_failed_attempt_is_told_with_its_cause(capsys, tmp_path):
     assert not any("attempt 3" in line for line in lines)
 
 
+def test_without_an_attempt_the_cause_is_told_with_what_the_navigation_said_last(capsys, tmp_path):
+    phases = [("join_up", 0.01, ""), ("pre_contact", 12.0, "at the stand-off point"), ("clear", 45.0, "time slot over")]
+    timeline = [{"phase": phase, "begun_s": begun_s, "reason": reason} for phase, begun_s, reason in phases]
+    result = {"outcome": "abort", "scenario": "mine", "seed": 1, "attempts": 0, "attempt_log": [], "duration_s": 45.01}
+    show_result(result | {"cause": "never_steady", "timeline": timeline}, None, tmp_path)
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[1] == "no attempt after 45.0 s; never steady: time slot over in pre contact"
+
+
+def test_a_files_size_is_told_in_a_unit_that_shows_it(capsys, tmp_path):
+    for count in (7, 2_345, 99_999, 100_000, 2_345_678):
+        (tmp_path / f"{count}").write_bytes(bytes(count))
+    show_result({"outcome": "miss", "scenario": "mine", "seed": 1}, None, tmp_path)
+    sizes = {line.split()[0].rpartition("/")[2]: line.split()[1:] for line in capsys.readouterr().out.splitlines()[1:]}
+    assert sizes == {
+        "7": ["0.0", "kB"], "2345": ["2.3", "kB"], "99999": ["100.0", "kB"], "100000": ["0.1", "MB"],
+        "2345678": ["2.3", "MB"],
+    }  # fmt: skip
+
+
 def test_what_others_say_is_printed_as_it_is(capsys, tmp_path):
     """Markup would be swallowed, or raise: a folder's name, a reason of one's own navigator, what the machine lacks."""
     folder = tmp_path / "[hose]" / "[/]"
@@ -77,7 +97,7 @@ def test_what_others_say_is_printed_as_it_is(capsys, tmp_path):
     show_checks([Check("OpenGL", False, "[egl] none", "see [/]"), Check("disk", True, "[dev]")], {"numpy": "[2]"})
     show_reproduction({"id": "a/b", "source": "[paper]", "rows": []}, folder / "picture.png")
     out = capsys.readouterr().out
-    for said in ("attempt 1: miss ([/] lost)", "[/] short", f"  {folder}/flight.png  0.00 MB", "[egl] none; see [/]"):
+    for said in ("attempt 1: miss ([/] lost)", "[/] short", f"  {folder}/flight.png  0.0 kB", "[egl] none; see [/]"):
         assert said in out
     for said in ("ok", "[dev]", "numpy [2]", "a/b  [paper]"):
         assert said in out
