@@ -137,7 +137,7 @@ def show_campaign(table: Mapping[str, Any]) -> None:
             *(_share(group[name], group["flights"]) for name in shares.values()),
             f"{offset['median']:.3f} m" if offset else "",
             f"{speed['min']:.2f}-{speed['max']:.2f} m/s" if speed else "",
-            *(str(group[name]) if group[name] else "" for name in ("unsafe", "errors")),
+            *(str(group[name]) for name in ("unsafe", "errors")),
             *(group[name] for name in crew),
             *((Text(cell),) if any(cells) else ()),  # a list's brackets are no markup
         )

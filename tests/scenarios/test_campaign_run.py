@@ -875,6 +875,15 @@ def test_a_reason_of_the_gate_is_printed_as_it_is(capsys):
     assert "gate failed: [/] of [hose]" in capsys.readouterr().out
 
 
+def test_none_unsafe_is_told_as_a_number(here, tmp_path, capsys):
+    """Two of six flights miss; none is unsafe, none an error."""
+    over = fly(plan(tmp_path, 6), tmp_path / "out")
+    capsys.readouterr()
+    show_campaign(over.to_dict())
+    heading, row, *_ = capsys.readouterr().out.splitlines()
+    assert heading.split()[-2:] == ["unsafe", "errors"] and row.split()[-2:] == ["0", "0"]
+
+
 def test_flights_that_are_flown_again_count_once(here, tmp_path):
     fly(plan(tmp_path, 4), tmp_path / "out", "never")
     text = io.StringIO()
