@@ -1,5 +1,6 @@
 """What a report reads: the rows and the manifest of each campaign."""
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -7,7 +8,8 @@ from typing import Any
 
 from dockair.errors import DockairError
 from dockair.scenarios.campaign.folder import rows_of
-from dockair.scenarios.campaign.manifest import read_manifest
+from dockair.scenarios.campaign.manifest import FILE_NAME, read_manifest
+from dockair.scenarios.output_folder import FLIGHT_FILES
 from dockair.scenarios.report.groups import Row, drawn_of, groups_of
 
 
@@ -24,11 +26,12 @@ def read_campaigns(folders: Sequence[Path]) -> list[Campaign]:
     """Return the campaigns in the folders' order.
 
     Raises:
-        DockairError: no campaign there, no flight done yet, two that were not flown by the same code, another scenario
-            under the same name, or the same flight in two of them.
+        DockairError: no campaign there (but a flight, a file), no flight done yet, two that were not flown by the same
+            code, another scenario under the same name, or the same flight in two of them.
     """
     campaigns = []
     for folder in folders:
+        _refuse_what_is_no_campaign(folder)
         manifest = read_manifest(folder)
         rows = rows_of(folder)
         if not rows:
@@ -38,6 +41,17 @@ def read_campaigns(folders: Sequence[Path]) -> list[Campaign]:
     _refuse_namesakes(folders, campaigns)
     _refuse_twins(folders, campaigns)
     return campaigns
+
+
+def _refuse_what_is_no_campaign(folder: Path) -> None:
+    """Say of a flight's folder, or of a file, what it is: neither has a manifest, which says little to who gave it."""
+    expected = "the folder of a campaign, which `dockair campaign PLAN` makes"
+    if os.path.isfile(folder):  # Path.is_file raises where a name is too long
+        raise DockairError(str(folder), expected=expected, got="a file")
+    present = any(os.path.isfile(folder / name) for name in FLIGHT_FILES)
+    if present and not os.path.isfile(folder / FILE_NAME):
+        got = "the folder of one flight; what came of it is in its result.json and flight.png"
+        raise DockairError(str(folder), expected=expected, got=got)
 
 
 def _require_one_code(folders: Sequence[Path], campaigns: Sequence[Campaign]) -> None:

@@ -80,6 +80,27 @@ def test_campaigns_of_one_code_are_pooled_whoever_navigates(campaign):
     assert len(read_campaigns(folders)) == 3
 
 
+@pytest.mark.parametrize(
+    ("given", "is_"),
+    [("", "the folder of one flight; what came of it is in its result.json"), ("result.json", "a file")],
+)
+def test_of_a_flight_a_report_is_refused_with_what_it_is_and_what_is_wanted(tmp_path, monkeypatch, capsys, given, is_):
+    (tmp_path / "result.json").write_text("{}")
+    monkeypatch.setattr(sys, "argv", ["dockair", "report", str(tmp_path / given)])
+    with pytest.raises(SystemExit) as ended:
+        cli.main()
+    said = capsys.readouterr().err
+    assert ended.value.code == 2
+    wanted = f"{tmp_path / given}: expected the folder of a campaign, which `dockair campaign PLAN` makes, got '{is_}"
+    assert said.startswith(f"dockair: {wanted}") and said.count("\n") == 1
+
+
+def test_a_campaigns_folder_in_which_somebody_flew_is_still_a_campaigns(campaign):
+    folder = campaign("a")
+    (folder / "result.json").write_text("{}")
+    assert len(read_campaigns([folder])) == 1
+
+
 @pytest.mark.parametrize("option", ["--out", "--evidence"])
 @pytest.mark.parametrize("place", ["/proc/x.html", "{}", "{}/a/manifest.json/x.html", "/proc/none/x.html"])
 def test_a_page_that_cannot_be_written_is_one_line_and_status_two(
