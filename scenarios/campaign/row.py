@@ -10,7 +10,7 @@ from typing import Any, TypeGuard
 
 from dockair.scenarios.campaign.jobs import Job
 from dockair.scenarios.campaign.worker import Answer
-from dockair.scenarios.metrics import NavigationFigures
+from dockair.scenarios.metrics import HeadingFigures, NavigationFigures
 from dockair.scenarios.result import Result
 
 Row = dict[str, Any]
@@ -24,6 +24,8 @@ _SAME = tuple("outcome attempts first_attempt success cause fuel_kg collided_wit
 #: Fields of the result that are lists of objects: JSON in the table.
 _LISTS = tuple(f.name for f in fields(Result) if f.name in ("attempt_log", "nav_by_range", "timeline"))
 
+_HEADING = tuple(f"heading_{f.name}" for f in fields(HeadingFigures))
+
 #: Column -> "text", "bool", "int" or "float", in the table's order; the drawn keys' columns come after the first five.
 COLUMNS: dict[str, str] = (
     {name: "int" if name == "seed" else "text" for name in _ASKED}
@@ -32,13 +34,14 @@ COLUMNS: dict[str, str] = (
     | dict.fromkeys(_CONTACT, "float")
     | {"fuel_kg": "float", "collided_with": "text"}
     | {f"nav_{f.name}": "int" if f.name == "frames_used" else "float" for f in fields(NavigationFigures)}
+    | dict.fromkeys(_HEADING, "float")
     | {"frames": "int", "duration_s": "float", "background": "text", "error": "text"}
     | dict.fromkeys(_LISTS, "text")
     | {"scenario_hash": "text", "command": "text"}
 )
 
 _NEVER_EMPTY = {"scenario", "seed", "sensing", "scenario_hash", "command", "attempt_log"}
-_ALWAYS = COLUMNS.keys() - {"nav_by_range", "timeline", "background"}  # these came later
+_ALWAYS = COLUMNS.keys() - {"nav_by_range", "timeline", "background", *_HEADING}  # these came later
 _TYPES = {"text": (str,), "bool": (bool,), "int": (int,), "float": (float, int)}
 
 
@@ -48,6 +51,7 @@ def columns_of(result: Result) -> Row:
     row: Row = {name: table[name] for name in _SAME} | {"unsafe": "; ".join(result.unsafe)}
     row |= {name: (table["contact"] or {}).get(key) for name, key in _CONTACT.items()}
     row |= {f"nav_{key}": value for key, value in table["nav"].items()}
+    row |= {f"heading_{key}": value for key, value in (table["heading"] or {}).items()}
     row |= {name: json.dumps(table[name], allow_nan=False) for name in _LISTS}
     return row
 

@@ -3,16 +3,17 @@
 import json
 from dataclasses import fields
 
+import numpy as np
 import pytest
 
 from dockair.scenarios.attempts import Attempt
 from dockair.scenarios.campaign.jobs import jobs_of
 from dockair.scenarios.campaign.plan_file import PlanFile
-from dockair.scenarios.campaign.row import COLUMNS, column_names, columns_of, row_of, unflown
+from dockair.scenarios.campaign.row import COLUMNS, column_names, columns_of, is_row, row_of, unflown
 from dockair.scenarios.campaign.summary import summary_of
 from dockair.scenarios.campaign.table import read_table, write_table
 from dockair.scenarios.campaign.worker import Answer
-from dockair.scenarios.metrics import NavigationFigures
+from dockair.scenarios.metrics import HeadingFigures, NavigationFigures
 from dockair.scenarios.referee import Contact
 from dockair.scenarios.result import Result
 
@@ -63,6 +64,17 @@ def test_a_flight_fills_the_columns_with_what_its_result_says(job):
     assert {name: row[name] for name in expected} == expected
     assert [entry["outcome"] for entry in json.loads(row["attempt_log"])] == ["miss", "contact"]
     assert set(row) == {*COLUMNS, "set.start.aft_m"}
+
+
+def test_an_own_heading_fills_its_columns_and_without_one_they_are_empty(job):
+    names = [f.name for f in fields(HeadingFigures)]
+    figures = dict(zip(names, np.arange(1.0, 1.0 + len(names)).tolist(), strict=True)) | {"error_deg": float("nan")}
+    kept = row_of(job, Answer(columns=columns_of(result(heading=HeadingFigures(**figures)))))
+    assert {name: kept[f"heading_{name}"] for name in names} == figures | {"error_deg": None}
+    without = row_of(job, Answer(columns=columns_of(result())))
+    assert [without[f"heading_{name}"] for name in names] == [None] * len(names)
+    before_there_was_one = {name: value for name, value in without.items() if not name.startswith("heading_")}
+    assert is_row(kept) and is_row(before_there_was_one)
 
 
 def test_without_contact_its_columns_are_empty_and_what_was_unsafe_is_one_text(job):
