@@ -175,7 +175,7 @@ def _causes(ax: Axes, group: Group) -> None:
         return
     counted = (
         (group.causes, "tab:red", "attempts"),
-        (group.causes_without_attempt, "tab:purple", "flights without one"),
+        (group.endings_without_attempt, "tab:purple", "flights without one"),
     )
     names: list[str] = []
     for causes, colour, label in counted:
@@ -183,9 +183,9 @@ def _causes(ax: Axes, group: Group) -> None:
             places = range(len(names), len(names) + len(causes))
             bars = ax.barh(places, [count for _, count in causes], color=colour, alpha=0.7, label=label)
             ax.bar_label(bars, padding=2)
-            names += [name.replace("_", " ") for name, _ in causes]
+            names += [name.replace("_", " ").replace(": ", ":\n") for name, _ in causes]
     ax.set_yticks(range(len(names)), names)
-    ax.invert_yaxis()
+    ax.set_ylim(max(len(names), 4) - 0.5, -0.5)  # one bar alone is no wall
     ax.set_xlabel("number")
     ax.xaxis.set_major_locator(_whole_numbers())
     ax.legend(ncols=2, frameon=False, fontsize=7, loc="upper center", bbox_to_anchor=(0.5, -0.16))

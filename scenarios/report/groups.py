@@ -23,6 +23,7 @@ from dockair.rotations import Array
 from dockair.scenarios.accept import has_refuelled
 from dockair.scenarios.campaign.row import SET
 from dockair.scenarios.crew_tables import OUR_NAVIGATOR
+from dockair.scenarios.no_attempt import cause_and_ending, ending
 from dockair.scenarios.statistics import wilson_interval
 
 Row = Mapping[str, Any]
@@ -219,6 +220,11 @@ class Group:
         return _most_frequent(cause for row in self.rows if (cause := cause_without_attempt(row)))
 
     @cached_property
+    def endings_without_attempt(self) -> list[tuple[str, int]]:
+        """The same flights by what their navigation said last, too: "never steady: time slot over in join up"."""
+        return _most_frequent(name for row in self.rows if (name := ending_without_attempt(row)))
+
+    @cached_property
     def by_range(self) -> list[dict[str, float]]:
         """Errors of the navigation in bins of range, pooled over the flights by their counts."""
         return _pooled([entry for row in self.flown for entry in json.loads(row.get("nav_by_range") or "[]")])
@@ -278,6 +284,14 @@ def cause_without_attempt(row: Row) -> str:
     if row["error"]:
         return "error"
     return "" if row["attempts"] else row["cause"] or NOT_SAID
+
+
+def ending_without_attempt(row: Row) -> str:
+    """Return that cause with how the flight ended for its navigation, "error" without; "" of one with attempts."""
+    cause = cause_without_attempt(row)
+    if row["error"] or not cause:
+        return cause
+    return cause_and_ending(cause, ending(json.loads(row.get("timeline") or "[]"), row["outcome"]))
 
 
 def _most_frequent(causes: Iterable[str]) -> list[tuple[str, int]]:

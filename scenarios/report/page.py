@@ -20,8 +20,16 @@ from dockair.rotations import Array
 from dockair.scenarios.campaign.whole_file import NO_ROOM, write_whole
 from dockair.scenarios.report import figures
 from dockair.scenarios.report.acceptance import claim_of, shortfalls_of
+from dockair.scenarios.report.cause_words import meaning_of
 from dockair.scenarios.report.folders import Campaign
-from dockair.scenarios.report.groups import Group, Row, cause_without_attempt, causes_of, groups_of
+from dockair.scenarios.report.groups import (
+    Group,
+    Row,
+    cause_without_attempt,
+    causes_of,
+    ending_without_attempt,
+    groups_of,
+)
 from dockair.scenarios.report.pairs import beside_perfect_navigation, side_by_side
 
 LIMITS = "0.15 m, 10 degrees, 2.6 m/s"
@@ -80,7 +88,7 @@ def _failures(group: Group) -> list[dict[str, Any]]:
             "outcome": row["outcome"] or "error",
             "attempts": row["attempts"],
             "cause": (row["cause"] or "").replace("_", " "),
-            "story": row["error"] or "; ".join(filter(None, [_story(row), row["unsafe"]])),
+            "story": row["error"] or "; ".join(filter(None, [_story(row), _unsafe(row)])),
             "command": row["command"],
         }
         for number, row in enumerate(group.rows)
@@ -94,17 +102,23 @@ def _causes(group: Group) -> list[dict[str, Any]]:
     for number, row in enumerate(group.rows):
         for cause in _causes_of_flight(row):
             flights.setdefault(cause, []).append({"id": _id(group, number), "seed": row["seed"]})
-    attempts, idle = dict(group.causes), dict(group.causes_without_attempt)
+    meanings = {ending_without_attempt(row): meaning_of(cause_without_attempt(row)) for row in group.rows}
+    attempts, idle = dict(group.causes), dict(group.endings_without_attempt)
     return [
-        {"name": name.replace("_", " "), "attempts": attempts.get(name, 0), "idle": idle.get(name, 0)}
-        | {"flights": flights[name]}
+        {
+            "name": name.replace("_", " "),
+            "meaning": meanings.get(name) or meaning_of(name),
+            "attempts": attempts.get(name, 0),
+            "idle": idle.get(name, 0),
+            "flights": flights[name],
+        }
         for name in [*attempts, *(name for name in idle if name not in attempts)]
     ]
 
 
 def _causes_of_flight(row: Row) -> list[str]:
     """Return each of its causes once."""
-    return list(dict.fromkeys(filter(None, [*causes_of(row), cause_without_attempt(row)])))
+    return list(dict.fromkeys(filter(None, [*causes_of(row), ending_without_attempt(row)])))
 
 
 def _id(group: Group, number: int) -> str:
@@ -112,7 +126,15 @@ def _id(group: Group, number: int) -> str:
     return f"{group.anchor}-flight-{number}"
 
 
+def _unsafe(row: Row) -> str:
+    return f"unsafe: {row['unsafe']}" if row["unsafe"] else ""
+
+
 def _story(row: Row) -> str:
+    """Return what happened attempt by attempt, or why there was none."""
+    without = ending_without_attempt(row)
+    if without:
+        return f"no attempt after {row['duration_s']:.1f} s; {without}"
     parts = []
     for attempt in json.loads(row["attempt_log"] or "[]"):
         offset = attempt["radial_offset_m"]
@@ -125,7 +147,7 @@ def _story(row: Row) -> str:
 
 
 def _quantile(values: Array, share: float) -> str:
-    return f"{float(np.quantile(values, share)):.3f} m" if len(values) else "–"
+    return f"{float(np.quantile(values, share)):.3f}" if len(values) else "–"
 
 
 def _figure(value: float, form: str) -> str:

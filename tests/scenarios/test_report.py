@@ -12,12 +12,14 @@ from dockair.scenarios.campaign import manifest as manifests
 from dockair.scenarios.campaign import table
 from dockair.scenarios.campaign.jobs import scenario_hash
 from dockair.scenarios.campaign.row import COLUMNS
+from dockair.scenarios.causes import CAUSES
 from dockair.scenarios.report import figures
 from dockair.scenarios.report.acceptance import claim_of, shortfalls_of
+from dockair.scenarios.report.cause_words import MEANINGS
 from dockair.scenarios.report.evidence import as_text, evidence_of
 from dockair.scenarios.report.figures import overview, panels
 from dockair.scenarios.report.folders import Campaign, read_campaigns
-from dockair.scenarios.report.groups import Share, groups_of
+from dockair.scenarios.report.groups import NOT_SAID, Share, groups_of
 from dockair.scenarios.report.page import page
 from dockair.scenarios.report.pairs import beside_perfect_navigation, side_by_side
 from dockair.scenarios.schema import load_scenario
@@ -254,6 +256,34 @@ def test_flights_that_began_no_attempt_are_counted_by_their_causes_and_errors_wi
     (idle_only,) = groups_of(idle)
     assert "none failed" not in panels(idle_only) and "never steady" in panels(idle_only)
     assert "none failed" in panels(groups_of([_row(0)])[0])
+
+
+def test_a_flight_without_attempt_says_why_and_is_told_apart_by_what_its_navigation_said():
+    def waited(phase, reason):
+        entries = ((phase, 0.0, ""), ("clear", 45.0, reason))
+        return json.dumps([dict(zip(("phase", "begun_s", "reason"), entry, strict=True)) for entry in entries])
+
+    slot = {"timeline": waited("pre_contact", "time slot over"), "duration_s": 45.0}
+    lost = {"timeline": waited("join_up", "drogue lost"), "duration_s": 45.0}
+    rows = [*(_without_attempt(k, "never_steady", **slot) for k in (0, 1)), _without_attempt(2, "never_steady", **lost)]
+    (group,) = groups_of(rows)
+    names = [("never steady: time slot over in pre contact", 2), ("never steady: drogue lost in join up", 1)]
+    assert group.endings_without_attempt == names
+    text = page("made", [_campaign(rows)])
+    for seed, (name, _) in ((0, names[0]), (2, names[1])):
+        (line,) = (line for line in text.splitlines() if f"--seed {seed}</code>" in line)
+        assert f"no attempt after 45.0 s; {name}" in line
+        assert f">{name}</a>" in text
+
+
+def test_every_cause_has_a_meaning():
+    assert {*CAUSES, "error", NOT_SAID} == set(MEANINGS)
+
+
+def test_an_unsafe_flight_says_so_in_its_story():
+    touched = _row(4, unsafe="touch at 3.10 m/s")
+    (line,) = (line for line in page("made", [_campaign([touched])]).splitlines() if "--seed 4</code>" in line)
+    assert "<td>1: contact 0.05 m off; unsafe: touch at 3.10 m/s</td>" in line
 
 
 def test_a_flight_that_lost_the_drogue_after_a_good_contact_had_docked_by_then():
@@ -503,9 +533,14 @@ def test_each_cause_leads_to_the_flights_that_it_is_of():
     ]
     text = page("made", [_campaign(rows)])
     table_ = text[text.index("<th>why</th>") : text.index("Flights that failed")]
-    lines = [re.sub(r"<[^>]*>", " ", line).split() for line in table_.splitlines() if line.startswith("<tr>")]
-    assert lines == [
-        ["gust", "3", "3", ",", "4"], ["lost", "drogue", "1", "5"], ["never", "steady", "1", "6"], ["error", "1", "8"],
+    lines = [re.findall(r"<td[^>]*>(.*?)</td>", line) for line in table_.splitlines() if line.startswith("<tr>")]
+    shown = [[re.sub(r"<[^>]*>", "", cell) for cell in cells] for cells in lines if cells]
+    assert [[name, *numbers] for name, _, *numbers in shown] == [
+        ["gust", "3", "0", "3, 4"], ["lost drogue", "1", "0", "5"], ["never steady: abort", "0", "1", "6"],
+        ["error", "0", "1", "8"],
+    ]  # fmt: skip
+    assert [meaning for _, meaning, *_ in shown] == [
+        MEANINGS["gust"], "", MEANINGS["never_steady"], MEANINGS["error"],
     ]  # fmt: skip
     for seed in (3, 4, 5, 6, 8):
         (link,) = {name for name, shown in re.findall(r'href="#([^"]+)">(\d+)</a>', table_) if shown == str(seed)}
