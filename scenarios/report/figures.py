@@ -1,9 +1,6 @@
-"""The pictures of a report, as SVG text that stands inside the page; the same rows make the same bytes."""
+"""The overview of all groups; the panels on one: where tips went, how fast, how often, what was known, why not."""
 
-import io
-import json
 import math
-import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -17,6 +14,8 @@ from matplotlib.ticker import MaxNLocator
 
 from dockair.rotations import Array
 from dockair.scenarios.report.groups import CAPTURE_M, CLOSING_BAND_M_S, Group, Share
+from dockair.scenarios.report.headings import Headings, headings_of
+from dockair.scenarios.report.svg import STYLE, as_svg, say
 
 RIM_M = 0.25  # the LED ring's radius
 CLOSING_LIMIT_M_S = 2.6
@@ -25,35 +24,11 @@ _CLOSING_AXIS_M_S = 2.8
 _ROWS_APART_IN = 0.12  # half of the gap between a label and the title below it
 #: Outcomes of attempts whose tip never crossed the ring's plane; of a collision or a strike it may have, or not.
 _NOT_CROSSED = ("breakaway", "given_up", "timeout", "diverged")
-_TIMELINES = 40  # flights whose phases are drawn
-_PHASE_COLOURS = {
-    "join_up": "#d9d9d9",
-    "pre_contact": "#9ecae1",
-    "approach": "#3182bd",
-    "contact": "#a1d99b",
-    "hold": "#31a354",
-    "disconnect": "#c7c0e4",
-    "back_off": "#fdae6b",
-    "breakaway": "#de2d26",
-    "clear": "#636363",
-}
-_TAG = re.compile(r"<[^<>]+>")  # in texts and values both are escaped
-_ID = re.compile(r' id="|href="#|url\(#')
-_STYLE: dict[Any, Any] = {
-    "svg.hashsalt": "dockair",
-    "svg.fonttype": "none",
-    "text.parse_math": False,  # a label may hold anything, dollars too
-    "font.size": 8.5,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.titlesize": 9.5,
-    "axes.titlelocation": "left",
-}
 
 
 def overview(groups: Sequence[Group]) -> str:
     """Success of every group at the first attempt and within all, with Wilson's intervals."""
-    with mpl.rc_context(_STYLE):
+    with mpl.rc_context(STYLE):
         figure = Figure(figsize=(12.0, 1.0 + 0.36 * len(groups)), layout="constrained")
         ax = figure.subplots()
         for k, group in enumerate(groups):
@@ -65,21 +40,24 @@ def overview(groups: Sequence[Group]) -> str:
         ax.set_xlabel("contact inside the limits [%], 95 % interval")
         ax.grid(axis="x", alpha=0.3)
         ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, frameon=False)  # rates may be anywhere inside
-        return _svg(figure, "overview")
+        return as_svg(figure, "overview")
 
 
 def panels(group: Group) -> str:
-    """Six panels on one group."""
-    with mpl.rc_context(_STYLE):
+    """Five panels on one group, and a sixth where its flights kept the receiver's own heading."""
+    headings = headings_of(group.flown)
+    rows: list[Any] = [["where", "speed", "tries"], ["known", "why", "why" if headings is None else "heading"]]
+    with mpl.rc_context(STYLE):
         figure = Figure(figsize=(12.0, 7.4), layout=ConstrainedLayoutEngine(h_pad=_ROWS_APART_IN))
-        axes = figure.subplots(2, 3)
-        _scatter(axes[0, 0], group)
-        _closing(axes[0, 1], group)
-        _by_attempt(axes[0, 2], group)
-        _navigation(axes[1, 0], group)
-        _causes(axes[1, 1], group)
-        _timelines(axes[1, 2], group)
-        return _svg(figure, "p" + group.anchor.rpartition("-")[2])  # its digest: short, for ids are many
+        axes = figure.subplot_mosaic(rows)
+        _scatter(axes["where"], group)
+        _closing(axes["speed"], group)
+        _by_attempt(axes["tries"], group)
+        _navigation(axes["known"], group)
+        _causes(axes["why"], group)
+        if headings is not None:
+            _headings(axes["heading"], headings)
+        return as_svg(figure, "p" + group.anchor.rpartition("-")[2])  # its digest: short, for ids are many
 
 
 def _share(ax: Axes, y: float, share: Share, colour: str, marker: str, label: str | None) -> None:
@@ -154,7 +132,7 @@ def _navigation(ax: Axes, group: Group) -> None:
     ax.set_title("navigation error (lines), expected (dashed)")
     bins = group.by_range
     if not bins:
-        _say(ax, "no frames were used")
+        say(ax, "no frames were used")
         return
     middle = [0.5 * (entry["low_m"] + entry["high_m"]) for entry in bins]
     for name, colour in (("range", "tab:blue"), ("lateral", "tab:orange")):
@@ -171,7 +149,7 @@ def _navigation(ax: Axes, group: Group) -> None:
 def _causes(ax: Axes, group: Group) -> None:
     ax.set_title("why attempts failed, and why flights began none")
     if not group.causes and not group.causes_without_attempt:
-        _say(ax, "none failed")
+        say(ax, "none failed")
         return
     counted = (
         (group.causes, "tab:red", "attempts"),
@@ -191,44 +169,27 @@ def _causes(ax: Axes, group: Group) -> None:
     ax.legend(ncols=2, frameon=False, fontsize=7, loc="upper center", bbox_to_anchor=(0.5, -0.16))
 
 
-def _timelines(ax: Axes, group: Group) -> None:
-    shown = group.flown[:_TIMELINES]
-    ax.set_title("phases" if len(shown) == len(group.flown) else f"phases of the first {len(shown)} flights")
-    seen: set[str] = set()
-    for k, row in enumerate(shown):
-        entries = json.loads(row.get("timeline") or "[]")
-        ends = [entry["begun_s"] for entry in entries[1:]] + [row["duration_s"]]
-        for entry, end_s in zip(entries, ends, strict=False):
-            phase = entry["phase"]
-            label = phase.replace("_", " ") if phase not in seen else None
-            seen.add(phase)
-            colour = _PHASE_COLOURS.get(phase, "black")
-            ax.barh(k, end_s - entry["begun_s"], left=entry["begun_s"], height=0.85, color=colour, label=label)
-    if not seen:
-        _say(ax, "not recorded")
-        return
-    ax.set(xlabel="[s]", ylabel="flight")
-    ax.yaxis.set_major_locator(_whole_numbers())
-    ax.invert_yaxis()
-    ax.legend(ncols=3, frameon=False, fontsize=7, loc="upper center", bbox_to_anchor=(0.5, -0.16))
+def _headings(ax: Axes, headings: Headings) -> None:
+    ax.set_title(f"own heading against the truth, {headings.flights} flights")
+    for values, colour, label in (
+        (headings.at_end_deg, "tab:blue", "at the end"),
+        (headings.largest_deg, "tab:orange", "largest of the flight"),
+    ):
+        sizes = np.abs(values[np.isfinite(values)])
+        if len(sizes):
+            ax.ecdf(sizes, color=colour, label=label)
+    expected = headings.sigma_deg[np.isfinite(headings.sigma_deg)]
+    if len(expected):
+        ax.axvline(float(np.median(expected)), color="tab:blue", linestyle="--", label="expected at the end (median)")
+    lost = f"; {headings.lost} lost at the end" if headings.lost else ""
+    ax.set(xlabel=f"size of the error [deg]{lost}", ylabel="share of the flights", ylim=(-0.02, 1.02))
+    ax.set_xlim(left=0.0)
+    ax.legend(frameon=False, fontsize=7, loc="lower right")
 
 
 def _whole_numbers() -> MaxNLocator:
     return MaxNLocator(integer=True, min_n_ticks=1)  # with more of them asked for, few counts would get fractions
 
 
-def _say(ax: Axes, text: str) -> None:
-    ax.text(0.5, 0.5, text, transform=ax.transAxes, ha="center", color="grey")
-    ax.set_axis_off()
-
-
 def _number(value: Any) -> float:
     return math.nan if value is None else float(value)
-
-
-def _svg(figure: Figure, name: str) -> str:
-    """Return the picture with its name before every id: one page has many, and ids are the page's."""
-    buffer = io.StringIO()
-    figure.savefig(buffer, format="svg", metadata=dict.fromkeys(("Date", "Creator", "Format", "Type")))
-    text = buffer.getvalue()
-    return _TAG.sub(lambda tag: _ID.sub(rf"\g<0>{name}-", tag[0]), text[text.index("<svg") :])

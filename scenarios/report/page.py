@@ -30,7 +30,9 @@ from dockair.scenarios.report.groups import (
     ending_without_attempt,
     groups_of,
 )
+from dockair.scenarios.report.headings import headings_of, rms
 from dockair.scenarios.report.pairs import beside_perfect_navigation, side_by_side
+from dockair.scenarios.report.timelines import timelines
 
 LIMITS = "0.15 m, 10 degrees, 2.6 m/s"
 #: What no page may hold: control characters, half of a pair of UTF-16.
@@ -50,7 +52,7 @@ def page(title: str, campaigns: Sequence[Campaign]) -> str:
         loader=PackageLoader("dockair.scenarios.report", ""), autoescape=True, undefined=StrictUndefined,
         trim_blocks=True, lstrip_blocks=True,
     )  # fmt: skip
-    environment.filters |= {"quantile": _quantile, "figure": _figure}
+    environment.filters |= {"quantile": _quantile, "figure": _figure, "rms": rms}
     beside_perfect = [(group, pair) for group in groups if (pair := beside_perfect_navigation(group, groups))]
     text = environment.get_template("page.html.jinja").render(
         title=title,
@@ -62,6 +64,8 @@ def page(title: str, campaigns: Sequence[Campaign]) -> str:
         side_by_side=side_by_side(groups),
         overview=Markup(figures.overview(groups)),
         panels={group.anchor: Markup(figures.panels(group)) for group in groups},
+        timelines={group.anchor: Markup(timelines(group)) for group in groups},
+        headings={group.anchor: headings_of(group.flown) for group in groups},
         shortfalls={group.anchor: shortfalls_of(group) for group in groups},
         claims={group.anchor: claim_of(group) for group in groups},
         failures={group.anchor: _failures(group) for group in groups},

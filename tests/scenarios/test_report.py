@@ -22,6 +22,7 @@ from dockair.scenarios.report.folders import Campaign, read_campaigns
 from dockair.scenarios.report.groups import NOT_SAID, Share, groups_of
 from dockair.scenarios.report.page import page
 from dockair.scenarios.report.pairs import beside_perfect_navigation, side_by_side
+from dockair.scenarios.report.timelines import timelines
 from dockair.scenarios.schema import load_scenario
 from dockair.scenarios.statistics import wilson_interval
 
@@ -499,7 +500,7 @@ def test_no_text_from_outside_is_read_as_mathematics():
     )
     (group,) = groups_of([row, failed])
     assert sheet in overview([group])
-    assert "$^$ cause" in panels(group) and f">{phase}</text>" in panels(group)
+    assert "$^$ cause" in panels(group) and f">{phase}</text>" in timelines(group)
 
 
 @pytest.mark.parametrize("text", ["bell \a, nothing \0, red \x1b[31m", "half \udce9", "C1 \x9b, \x7f"])
