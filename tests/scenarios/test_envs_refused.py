@@ -153,6 +153,21 @@ def test_a_duration_of_a_control_tick_is_refused_and_a_little_more_is_flown(unti
     assert (truncated, info["outcome"]) == (True, "timeout")
 
 
+def test_what_gymnasium_makes_flies_on_after_a_first_reset_that_was_refused():
+    made = gymnasium.make("dockair/Dock-v0", scenario=QUICK)
+    with pytest.raises(DockairError, match="^options: expected a known key"):
+        made.reset(seed=0, options={"sett": 1})
+    with pytest.raises(gymnasium.error.ResetNeeded):
+        made.step(STILL)
+    _, before = made.reset(seed=0)
+    with pytest.raises(DockairError, match="^action: expected 6 finite numbers"):
+        made.step(STILL[:5])
+    for _ in range(2):
+        info = made.step(STILL)[4]
+    made.close()
+    assert info["truth"]["time_s"] == pytest.approx(before["truth"]["time_s"] + 0.02)
+
+
 def test_a_flight_that_is_over_with_its_first_tick_is_refused(env, flights, monkeypatch):
     env.reset(seed=0)
     flown = env._flown
