@@ -102,7 +102,7 @@ def report(
         noise = identify_gyro_noise(rates, rate_hz, bias_correlation_s=bias_correlation_s, terms=terms)
     except DockairError as error:
         where = str(path) if error.where == "rates" else _OPTIONS.get(error.where, error.where)
-        raise DockairError(where, expected=error.expected, got=error.got, exists=error.exists) from None
+        raise error.at(where) from None
     range_s, T = read_sheet(_SHEET)["gyro_bias_correlation_s"], noise.bias_correlation_s
     dropped_s = T if T < range_s.low or T > range_s.high else float("nan")  # no in-run bias that a sheet could hold
     if np.isfinite(dropped_s) and terms != "B":

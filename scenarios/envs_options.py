@@ -57,7 +57,7 @@ def _as_an_option() -> Iterator[None]:
         if not error.where.startswith(_OPTION):
             raise
         where = "options.set: " + error.where.removeprefix(_OPTION)
-        raise DockairError(where, expected=error.expected, got=error.got, exists=error.exists) from None
+        raise error.at(where) from None
 
 
 def command_from(action: Any, space: spaces.Box) -> ReceiverCommand:

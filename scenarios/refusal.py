@@ -11,6 +11,7 @@ from pydantic.fields import FieldInfo
 from dockair.errors import DockairError
 
 _WORDS = {float: "a number", int: "an integer", bool: "true or false", str: "a string", dict: "a table"}
+_UNKNOWN = "extra_forbidden"  # pydantic's word for a key that does not exist
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,27 +22,25 @@ class Expected:
 
 
 def refusal(error: ValidationError, model: type[BaseModel], place: Callable[[str], str]) -> DockairError:
-    """Return the first of the errors in one line, with the number of the others.
+    """Return one of the errors in one line, with the places of the others.
+
+    A key that does not exist comes first: where it is misspelt, another one is missing, too.
 
     Args:
         error: what pydantic raised on validating `model`.
         model: the outermost model.
         place: from a dotted key to what its writer would call the place (file and key).
     """
-    errors = error.errors(include_url=False)
-    first = errors[0]
+    first, *others = sorted(error.errors(include_url=False), key=lambda found: found["type"] != _UNKNOWN)
     where = place(_dotted(first["loc"]))
-    if first["type"] == "extra_forbidden":
-        owner = _model_at(model, first["loc"][:-1])
-        refused = DockairError(where, expected="a known key", got=first["loc"][-1], exists=sorted(owner.model_fields))
-    elif first["type"] == "missing":
-        refused = DockairError(where, expected=_expected(_field_at(model, first["loc"])), got=None)
-    else:
-        field = _field_at(model, first["loc"])
-        refused = DockairError(where, expected=_expected(field), got=first["input"], exists=_choices(field))
-    if len(errors) > 1:
-        refused.args = (f"{refused}; and {len(errors) - 1} more",)
-    return refused
+    also = [_dotted(other["loc"]) for other in others]
+    if first["type"] == _UNKNOWN:
+        exists = sorted(_model_at(model, first["loc"][:-1]).model_fields)
+        return DockairError(where, expected="a known key", got=first["loc"][-1], exists=exists, also=also)
+    field = _field_at(model, first["loc"])
+    if first["type"] == "missing":
+        return DockairError(where, expected=_expected(field), also=also)
+    return DockairError(where, expected=_expected(field), got=first["input"], exists=_choices(field), also=also)
 
 
 def _dotted(location: Sequence[int | str]) -> str:

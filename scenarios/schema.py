@@ -141,5 +141,4 @@ def load_scenario(name_or_path: str | Path, overrides: Mapping[str, object] | No
     except ValidationError as error:
         raise refusal(error, Scenario, source.place) from None
     except DockairError as error:
-        where = source.place(error.where)
-        raise DockairError(where, expected=error.expected, got=error.got, exists=error.exists) from None
+        raise error.at(source.place(error.where)) from None

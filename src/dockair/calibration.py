@@ -49,7 +49,7 @@ def _from_toml(cls: type[Any], path: str | Path) -> Any:
         return cls(**{k: tuple(v) if isinstance(v, list) else v for k, v in table.items()})
     except DockairError as error:
         where = f"{path}: {error.where.partition('.')[2]}"
-        raise DockairError(where, expected=error.expected, got=error.got, exists=error.exists) from None
+        raise error.at(where) from None
 
 
 def _limits_in_words(cls: type[Any], name: str) -> str:

@@ -1,6 +1,7 @@
 """What a person can do wrong, said in one line: where, what was expected, what was got, what exists."""
 
 from collections.abc import Iterable
+from difflib import get_close_matches
 from numbers import Integral
 from typing import Any
 
@@ -12,7 +13,8 @@ class DockairError(Exception):
         where: the file, key, option or argument at fault, as its user would write it.
         expected: what would have been right.
         got: what was there instead.
-        exists: the allowed names, if there is a list of them.
+        exists: the allowed names, if there is a list of them; the one that is most like `got` is asked for.
+        also: other places at fault, which would be refused next.
 
     With `where` alone, that is the whole line: this is how pickle and gymnasium's vector environments make again what
     another process has raised.
@@ -21,19 +23,40 @@ class DockairError(Exception):
     exit_code = 2
 
     def __init__(
-        self, where: object, *, expected: str | None = None, got: object = None, exists: Iterable[str] = ()
+        self,
+        where: object,
+        *,
+        expected: str | None = None,
+        got: object = None,
+        exists: Iterable[str] = (),
+        also: Iterable[str] = (),
     ) -> None:
-        self.where, self.expected, self.got, self.exists = str(where), expected or "", got, tuple(exists)
+        self.where, self.expected, self.got = str(where), expected or "", got
+        self.exists, self.also = tuple(exists), tuple(also)
         text = self.where
         if expected is not None:
             text += f": expected {expected}, got {got!r}" if got is not None else f": expected {expected}"
         if self.exists:
-            text += f"; exists: {', '.join(self.exists)}"
+            text += f"; exists: {', '.join(self.exists)}{_meant(got, self.exists)}"
+        if self.also:
+            text += f"; also wrong: {', '.join(self.also)}"
         super().__init__(text)
+
+    def at(self, where: object) -> "DockairError":
+        """Return the same, said of another place: one that the person at fault has written."""
+        return DockairError(where, expected=self.expected or None, got=self.got, exists=self.exists, also=self.also)
 
     def __reduce__(self) -> tuple[type["DockairError"], tuple[str, ...]]:
         """Pickle the line alone: `got` may be anything, and what cannot be pickled would be lost without a word."""
         return type(self), (str(self),)
+
+
+def _meant(got: object, exists: tuple[str, ...]) -> str:
+    """Return the question for the name that exists and is nearest to a misspelt one, "" where none is near."""
+    if not isinstance(got, str) or got in exists:
+        return ""
+    near = get_close_matches(got, exists, n=1)
+    return f"; did you mean {near[0]}?" if near else ""
 
 
 class MachineError(DockairError):

@@ -11,6 +11,29 @@ def test_one_line_says_where_expected_got_and_what_exists():
     assert error.exit_code == 2
 
 
+@pytest.mark.parametrize(
+    ("got", "ends"),
+    [
+        ("karman", "exists: none, dryden, von_karman; did you mean von_karman?"),
+        ("dryedn", "; did you mean dryden?"),
+        ("dryden", "exists: none, dryden, von_karman"),  # which exists, and cannot be had here
+        ("calm", "exists: none, dryden, von_karman"),  # like none of them
+        (["dryedn"], "exists: none, dryden, von_karman"),
+    ],
+)
+def test_the_name_that_is_nearest_to_a_misspelt_one_is_asked_for(got, ends):
+    said = str(DockairError("gust.model", expected="a model", got=got, exists=["none", "dryden", "von_karman"]))
+    assert said.endswith(ends)
+
+
+def test_the_same_error_said_of_another_place_keeps_the_rest():
+    error = DockairError("model", expected="a model", got="dryedn", exists=["none", "dryden"], also=["seed", "sun.up"])
+    assert str(error.at("p.toml: gust.model")) == (
+        "p.toml: gust.model: expected a model, got 'dryedn'; exists: none, dryden; did you mean dryden?; "
+        "also wrong: seed, sun.up"
+    )
+
+
 def test_zero_is_said_and_nothing_is_not():
     assert str(DockairError("n", expected="n > 0", got=0)) == "n: expected n > 0, got 0"
     assert str(DockairError("file", expected="a file", got=None)) == "file: expected a file"
