@@ -7,9 +7,8 @@ from typing import Any
 import numpy as np
 
 from dockair.errors import DockairError
-from dockair.scenarios.toml_files import TomlFiles, read_toml, toml_value
+from dockair.scenarios.toml_files import PLANS, SCENARIOS, read_toml, toml_value
 
-_SCENARIOS = TomlFiles("scenario", "a scenario of the library", "library")
 #: Setting the one replaces the other, which the file may have given.
 _ALTERNATIVES = {"turbulence.sigma_m_s": "intensity", "turbulence.intensity": "sigma_m_s"}
 _MODEL = "turbulence.model"  # the file's goes with its strength: it would overrule one that is set in its place
@@ -18,7 +17,7 @@ _PATHS = ("camera", "ring")  # keys of [hardware] that name a file
 
 def scenario_names() -> list[str]:
     """Names in the library, the default first."""
-    return _SCENARIOS.names()
+    return SCENARIOS.names()
 
 
 def scenario_text(name_or_path: str | Path) -> str:
@@ -30,7 +29,7 @@ def scenario_text(name_or_path: str | Path) -> str:
     Raises:
         DockairError: no such scenario.
     """
-    return _SCENARIOS.find(name_or_path).read_text(encoding="utf-8")
+    return SCENARIOS.find(name_or_path).read_text(encoding="utf-8")
 
 
 class ScenarioFile:
@@ -44,14 +43,16 @@ class ScenarioFile:
         table: keys and values, not checked.
 
     Raises:
-        DockairError: no such scenario, or not TOML.
+        DockairError: no such scenario, not TOML, or a plan.
     """
 
     def __init__(self, name_or_path: str | Path, settings: Mapping[str, object]) -> None:
-        path = _SCENARIOS.find(name_or_path)
-        self._shown = _SCENARIOS.shown(path)
+        path = SCENARIOS.find(name_or_path)
+        self._shown = SCENARIOS.shown(path)
         self._settings = tuple(settings)
         self.table = read_toml(path)
+        if "scenarios" in self.table:
+            raise PLANS.misplaced(self._shown, SCENARIOS.kind, name_or_path)
         _resolve_hardware(self.table, path.parent)
         if _MODEL not in settings and any(key in _ALTERNATIVES for key in settings):
             _drop(self.table, _MODEL)

@@ -17,6 +17,7 @@ class TomlFiles:
     kind: str  #: what one of them is called in an error
     packaged: str  #: what a packaged one is called in an error
     subfolder: str  #: of the package, that holds those with a name
+    command: str  #: of the command line, that one is for
 
     @property
     def folder(self) -> Path:
@@ -38,6 +39,9 @@ class TomlFiles:
         """
         path = Path(name_or_path)
         if isinstance(name_or_path, str) and path.suffix.lower() != ".toml" and os.sep not in name_or_path:
+            other = PLANS if self is SCENARIOS else SCENARIOS
+            if name_or_path in other.names():
+                raise other.misplaced(self.kind, self.kind, name_or_path)
             if name_or_path not in self.names():
                 expected = f"{self.packaged}, or the path of a TOML file"
                 raise DockairError(self.kind, expected=expected, got=name_or_path, exists=self.names())
@@ -49,6 +53,20 @@ class TomlFiles:
     def shown(self, path: Path) -> str:
         """Return what an error calls a file that was found: the packaged ones by their name."""
         return path.name if path.parent == self.folder else str(path)
+
+    def misplaced(self, where: str, wanted: str, given: str | Path) -> DockairError:
+        """Return the refusal of one of these where another kind is wanted.
+
+        Args:
+            where: it was given.
+            wanted: kind.
+            given: its name or path.
+        """
+        return DockairError(where, expected=f"a {wanted}", got=f"a {self.kind}, for dockair {self.command} {given}")
+
+
+SCENARIOS = TomlFiles("scenario", "a scenario of the library", "library", "fly")
+PLANS = TomlFiles("plan", "a packaged plan", "plans", "campaign")
 
 
 def read_toml(path: Path) -> dict[str, Any]:

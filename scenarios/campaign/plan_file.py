@@ -11,16 +11,17 @@ from dockair.scenarios.campaign.draws import Draw
 from dockair.scenarios.campaign.plan import Plan, RatesAsked
 from dockair.scenarios.refusal import refusal
 from dockair.scenarios.scenario_file import scenario_names
+from dockair.scenarios.schema import Scenario
 from dockair.scenarios.table import Table
-from dockair.scenarios.toml_files import TomlFiles, read_toml, toml_value
+from dockair.scenarios.toml_files import PLANS, SCENARIOS, read_toml, toml_value
 
 _T = TypeVar("_T", bound=Table)
-_PLANS = TomlFiles("plan", "a packaged plan", "plans")
+_OF_SCENARIOS = Scenario.model_fields.keys() - Plan.model_fields.keys()  # keys that only a scenario has
 
 
 def plan_names() -> list[str]:
     """Names of the packaged plans."""
-    return _PLANS.names()
+    return PLANS.names()
 
 
 class PlanFile:
@@ -37,7 +38,7 @@ class PlanFile:
         settings: what `--set` says, as values.
 
     Raises:
-        DockairError: no such plan; not TOML; unknown key, wrong type or value out of range.
+        DockairError: no such plan; not TOML; a scenario; unknown key, wrong type or value out of range.
     """
 
     def __init__(
@@ -46,11 +47,13 @@ class PlanFile:
         changes: Mapping[str, object] | None = None,
         settings: Mapping[str, str] | None = None,
     ) -> None:
-        path = _PLANS.find(name_or_path)
+        path = PLANS.find(name_or_path)
         self.folder = path.parent
-        self._shown = _PLANS.shown(path)
+        self._shown = PLANS.shown(path)
         self.settings = {key: toml_value(text) for key, text in (settings or {}).items()}
         table = read_toml(path)
+        if "scenarios" not in table and not _OF_SCENARIOS.isdisjoint(table):
+            raise SCENARIOS.misplaced(self._shown, PLANS.kind, name_or_path)
         if isinstance(table.get("scenarios"), list):
             table["scenarios"] = _expanded(table["scenarios"], own_seeds="seeds" not in (changes or {}))
         self.plan = self._checked(Plan, table | dict(changes or {}), "")

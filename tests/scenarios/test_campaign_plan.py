@@ -385,11 +385,21 @@ def test_a_navigator_whose_module_fails_is_refused_with_what_it_said(plan, tmp_p
     assert said in refused
 
 
+def test_a_scenario_is_no_plan_by_name_or_by_path(tmp_path):
+    with pytest.raises(DockairError, match="^plan: expected a plan, got 'a scenario, for dockair fly night'$"):
+        PlanFile("night")
+    path = tmp_path / "mine.toml"
+    path.write_text('name = "mine"\n[turbulence]\nsigma_m_s = 1.0\n', encoding="utf-8")
+    with pytest.raises(DockairError, match=f"^{path}: expected a plan, got 'a scenario, for dockair fly {path}'$"):
+        PlanFile(path)
+
+
 def test_a_plan_that_does_not_exist_lists_those_that_do():
     with pytest.raises(DockairError) as refused:
         PlanFile("level")
     assert "plan: expected a packaged plan, or the path of a TOML file, got 'level'; exists: " in str(refused.value)
     assert "levels" in refused.value.exists
+    assert str(refused.value).endswith("; did you mean levels?")
     with pytest.raises(DockairError, match="expected a plan file, got 'no such file'"):
         PlanFile(Path("no") / "such.toml")
 

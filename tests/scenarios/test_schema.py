@@ -78,9 +78,20 @@ def test_a_wrong_value_is_refused_in_one_line_with_file_and_key(scenario_file, t
     assert caught.value.exit_code == 2
 
 
-def test_of_several_mistakes_the_first_is_told_and_the_others_counted(scenario_file):
+def test_of_several_mistakes_an_unknown_key_is_told_and_the_places_of_the_others(scenario_file):
     path = scenario_file('name = "mine"\n[flight]\nairspeed_m_s = 1\naltitude_m = -1\nmach = 2')
-    with pytest.raises(DockairError, match=r"flight\.airspeed_m_s: expected .*, got 1; and 2 more$"):
+    with pytest.raises(DockairError, match=r"flight\.mach: expected a known key, got 'mach'") as caught:
+        load_scenario(path)
+    assert str(caught.value).endswith("; also wrong: flight.airspeed_m_s, flight.altitude_m")
+
+
+def test_a_plan_is_no_scenario_by_name_or_by_path(scenario_file):
+    with pytest.raises(
+        DockairError, match="^scenario: expected a scenario, got 'a plan, for dockair campaign levels'$"
+    ):
+        load_scenario("levels")
+    path = scenario_file('name = "mine"\nscenarios = ["default"]\nseeds = 3')
+    with pytest.raises(DockairError, match=f"^{path}: expected a scenario, got 'a plan, for dockair campaign {path}'$"):
         load_scenario(path)
 
 
