@@ -12,6 +12,7 @@ from dockair.errors import DockairError
 from dockair.parameters import load_parameters
 from dockair.scenarios.build_measured import require_measurable
 from dockair.scenarios.nominal_sheets import nominal_camera, nominal_ring
+from dockair.scenarios.plug_in import navigator_class_of
 from dockair.scenarios.schema import Scenario
 from dockair.sim.camera.camera_noise import CameraNoise
 from dockair.sim.camera.defects import Defects
@@ -22,22 +23,30 @@ from dockair.sim.hose.chain import DrogueParameters
 
 
 def require_buildable(scenario: Scenario) -> None:
-    """Refuse a rate of the camera, calibration sheets and faults that do not fit one another.
+    """Refuse a rate of the camera, calibration sheets and faults that do not fit one another, and no navigator.
 
     Raises:
-        DockairError: one of them does not.
+        DockairError: one of them does not, or the navigator's class is none.
     """
     ring = nominal_ring(scenario)
     _check_ring(ring, load_parameters("drogue", DrogueParameters, scenario.parameters.get("drogue")))
     faults = Faults([table.fault for table in scenario.faults], ring.count)
     if scenario.navigation.is_truth:
         return
+    _check_navigator(scenario.navigation.navigator)
     camera, sheets = nominal_camera(scenario), CameraSheets.load(scenario.camera.filter, scenario.parameters)
     _check_camera_rate(scenario.rates.camera_hz, camera, sheets)
     noise = CameraNoise.of(0)  # nothing is drawn
     Defects(camera, sheets.glare, sheets.exposure, faults, noise.dirt, noise.hot_pixels)
     if scenario.camera.sensing == "measurements":
         require_measurable(scenario)
+
+
+def _check_navigator(name: str) -> None:
+    try:
+        navigator_class_of(name)
+    except DockairError as error:
+        raise error.at("navigation.navigator") from error
 
 
 def _check_ring(ring: LedRing, drogue: DrogueParameters) -> None:

@@ -106,8 +106,6 @@ def jobs_of(source: PlanFile) -> list[Job]:
             raise DockairError(
                 source.place("gate.scenarios"), expected="a scenario of the plan", got=name, exists=names
             )
-    for name in sorted({job.scenario.navigation.navigator for job in jobs} - {"truth"}):
-        _require_navigator(source, name)
     return jobs
 
 
@@ -124,8 +122,7 @@ def _require_buildable(source: PlanFile, job: Job) -> None:
     try:
         require_buildable(job.scenario)
     except DockairError as error:
-        where = f"{source.place('scenarios')}: {job.scenario.name}: {error.where}"
-        raise DockairError(where, expected=error.expected, got=error.got, exists=error.exists) from None
+        raise error.at(f"{source.place('scenarios')}: {job.scenario.name}: {error.where}") from None
 
 
 def with_background(job: Job, background: str) -> Job:
@@ -202,7 +199,7 @@ def _scenario(
         return name, load_scenario(name, {key: as_toml(value, f"--set {key}") for key, value in settings.items()})
     except DockairError as error:
         where = _blamed(error.where, layers, source.place(f"scenarios[{index}]"))
-        raise DockairError(where, expected=error.expected, got=error.got, exists=error.exists) from None
+        raise error.at(where) from None
 
 
 def _require_decisive(layers: Layers) -> None:
@@ -290,12 +287,3 @@ def _refuse_namesakes(source: PlanFile, jobs: Sequence[Job]) -> None:
             expected = "a name for each scenario, for flights are pooled by it"
             got = f"{job.scenario.name} in {earlier.file}, another in {job.file}"
             raise DockairError(source.place("scenarios"), expected=expected, got=got)
-
-
-def _require_navigator(source: PlanFile, name: str) -> None:
-    from dockair.scenarios.plug_in import navigator_class_of
-
-    try:
-        navigator_class_of(name)
-    except DockairError as error:
-        raise DockairError(source.place("navigation.navigator"), expected=error.expected, got=error.got) from None

@@ -73,7 +73,7 @@ WRONG_OPTIONS = [
     ({"seed": 2.9}, "options.seed: expected an integer from 0 to 9223372036854775807, got 2.9"),
     ({"seed": "x"}, "options.seed: expected an integer from 0 to 9223372036854775807, got 'x'"),
     ({"set": {"seed": 5}}, 'options.set: seed: expected the option "seed" in its place, or reset(seed=...), got 5'),
-    ({"set": {"navigation.navigator": "nosuch:Class"} | MEASURED}, "nosuch:Class: expected"),
+    ({"set": {"navigation.navigator": "nosuch:Class"} | MEASURED}, "navigation.navigator: expected an importable"),
     ({"set": {"flight.duration_s": 0.01}}, "flight.duration_s: expected more than the one control tick that reset"),
 ]
 
