@@ -25,6 +25,9 @@ import numpy as np
 from dockair.errors import DockairError
 from dockair.rotations import Array
 from dockair.scenarios.message_log import (
+    ESTIMATES,
+    MESSAGES,
+    NAVIGATOR,
     NavigatorRecipe,
     code_fingerprint,
     estimate_row,
@@ -130,6 +133,7 @@ def replay(out_dir: str | Path) -> ReplayReport:
     Raises:
         DockairError: nothing recorded there, or the navigator needs what a replay forbids.
     """
+    _require_recorded(Path(out_dir))
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
     command = [sys.executable, "-m", "dockair.scenarios.replay", str(Path(out_dir).resolve())]
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
@@ -145,6 +149,15 @@ def replay(out_dir: str | Path) -> ReplayReport:
         first_difference=Difference(**first) if first else None,
         same_code=table["same_code"],
     )
+
+
+def _require_recorded(folder: Path) -> None:
+    """Refuse a folder without what a replay reads, before a process is made for it."""
+    missing = [name for name in (NAVIGATOR, MESSAGES, ESTIMATES) if not (folder / name).is_file()]
+    if missing:
+        expected = "a flight by camera, recorded with --record window or full"
+        what = "a flight that kept no frames" if (folder / "result.json").is_file() else "no flight"
+        raise DockairError(str(folder), expected=expected, got=f"{what}: {missing[0]} is not there")
 
 
 def main(arguments: Sequence[str]) -> int:

@@ -41,6 +41,23 @@ class Sums:
 '''
 
 
+@pytest.mark.parametrize(
+    ("files", "got"),
+    [
+        (["result.json"], "a flight that kept no frames: navigator.json is not there"),
+        (["result.json", NAVIGATOR, ESTIMATES], "a flight that kept no frames: messages.parquet is not there"),
+        ([], "no flight: navigator.json is not there"),
+    ],
+)
+def test_a_folder_without_frames_is_refused_in_plain_words(tmp_path, files, got):
+    for name in files:
+        (tmp_path / name).touch()
+    expected = "a flight by camera, recorded with --record window or full"
+    with pytest.raises(DockairError) as refused:
+        replay(tmp_path)
+    assert str(refused.value) == f"{tmp_path}: expected {expected}, got '{got}'"
+
+
 @pytest.fixture
 def record(hand_made, tmp_path, monkeypatch):
     """Record a flight of a navigator that is a module of the user's own."""
