@@ -20,7 +20,7 @@ class Sampler(Enum):
 
 def campaign(
     plan: Annotated[
-        str | None, typer.Argument(metavar="[PLAN]", help="A packaged plan or a TOML path; without, the list.")
+        str | None, typer.Argument(metavar="PLAN", help="A packaged plan or a TOML path; without, the list.")
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Folder to write to; out/campaigns/<plan> by default.")] = None,
     workers: Annotated[int | None, typer.Option(min=1, max=1024, help="Processes; one a core by default.")] = None,

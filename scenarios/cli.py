@@ -1,8 +1,8 @@
 """The command line, `dockair`: flights, campaigns of flights, what they are judged by and compared with.
 
 Exit status: 0 done as asked, whatever the flight's outcome; 1 a replay that was not identical, or a campaign whose gate
-has failed; 2 bad input; 3 the machine lacks something. With `--json` one object goes to stdout and nothing else;
-progress and errors go to stderr. Modules that are slow to import are imported by the command that needs them.
+has failed; 2 bad input; 3 the machine lacks something; 130 stopped. With `--json` one object goes to stdout and nothing
+else; progress and errors go to stderr. Modules that are slow to import are imported by the command that needs them.
 """
 
 import errno
@@ -30,6 +30,10 @@ if TYPE_CHECKING:
 app = typer.Typer(
     name="dockair",
     help="Autonomous aerial refuelling by vision: simulated, closed-loop.",
+    epilog=(
+        "Exit status: 0 done as asked, whatever a flight's outcome; 1 a replay that differs, or a campaign whose gate "
+        "has failed; 2 wrong input; 3 the machine lacks something; 130 stopped."
+    ),
     add_completion=False,
     pretty_exceptions_enable=False,
 )
@@ -98,7 +102,7 @@ def scenarios(
     name: Annotated[
         str | None,
         typer.Argument(
-            metavar="[NAME]", help="What to show whole; without, the list. With --keys a part of their names."
+            metavar="NAME", help="What to show whole; without, the list. With --keys a part of their names."
         ),
     ] = None,
     keys: Annotated[bool, typer.Option("--keys", help="Show the keys that a scenario may set, and --set.")] = False,
@@ -152,7 +156,7 @@ def replay(
 
 @app.command()
 def reproduce(
-    wanted: Annotated[str | None, typer.Argument(metavar="[ID]", help="What to reproduce; without, the list.")] = None,
+    wanted: Annotated[str | None, typer.Argument(metavar="ID", help="What to reproduce; without, the list.")] = None,
     out: Annotated[Path | None, typer.Option(help="Folder for the picture; out/reproduce by default.")] = None,
     as_json: Json = False,
 ) -> None:
@@ -199,9 +203,12 @@ def bench(
 ) -> None:
     """Say how fast the closed loop runs here and where its time goes; or how fast the stages of one part are.
 
-    The loop's ways: windowed, recorded, with full frames, at 180 Hz, two flights at once and others, the fastest of
-    five flights each: minutes. The parts are the sensors, the image stages and the pose solvers, these two beside
-    OpenCV's, and the world beside a bare step of MuJoCo; only flight and sensors depend on the scenario.
+    The loop's ways: windowed, recorded, with full frames, at 180 Hz, two at once
+    and others, the fastest of five flights each: minutes.
+
+    The parts: the sensors; image stages and pose solvers, beside OpenCV's; the
+    world, beside a bare step of MuJoCo. Only flight and sensors depend on the
+    scenario.
     """
     from dockair.scenarios.bench import bench as bench_scenario
     from dockair.scenarios.bench import bench_stages

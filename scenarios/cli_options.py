@@ -11,9 +11,14 @@ from dockair.errors import DockairError
 from dockair.streams import LARGEST_SEED
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout and nothing else.")]
-ScenarioName = Annotated[str, typer.Argument(metavar="SCENARIO", help="A name in the library or a TOML path.")]
+ScenarioName = Annotated[
+    str, typer.Argument(metavar="SCENARIO", help="A name in the library (scenarios lists them) or a TOML path.")
+]
 Settings = Annotated[
-    list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Dotted key and TOML value; may be repeated.")
+    list[str] | None,
+    typer.Option(
+        "--set", metavar="KEY=VALUE", help="Dotted key and TOML value (scenarios --keys lists them); may be repeated."
+    ),
 ]
 Seed = Annotated[
     int | None, typer.Option(min=0, max=LARGEST_SEED, help="Seed of every random stream; the scenario's by default.")
