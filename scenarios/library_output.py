@@ -2,10 +2,10 @@
 
 from collections.abc import Sequence
 
-from rich.console import Console
 from rich.table import Table
 
 from dockair.scenarios.cli_keys import Key
+from dockair.scenarios.output import plain_console
 from dockair.scenarios.scenario_file import scenario_text
 from dockair.scenarios.schema import Scenario
 
@@ -18,7 +18,7 @@ def show_scenarios(scenarios: Sequence[Scenario]) -> None:
         table.add_column(heading)
     for scenario in scenarios:
         table.add_row(scenario.name, scenario.claim, scenario.accept.in_words)
-    Console(highlight=False, markup=False).print(table)
+    plain_console().print(table)
 
 
 def show_keys(keys: Sequence[Key]) -> None:
@@ -29,7 +29,7 @@ def show_keys(keys: Sequence[Key]) -> None:
         table.add_column(heading)
     for key in keys:
         table.add_row(key.name, key.default, f"{key.range} {key.unit}".strip(), key.meaning)
-    Console(highlight=False, markup=False).print(table)
+    plain_console().print(table)
 
 
 def show_scenario(name: str, scenario: Scenario) -> None:
@@ -39,7 +39,7 @@ def show_scenario(name: str, scenario: Scenario) -> None:
         name: in the library, or the path of its file.
         scenario: the same, read.
     """
-    console = Console(highlight=False)
-    console.print(scenario_text(name).rstrip(), markup=False, soft_wrap=True)
+    console = plain_console()
+    console.print(scenario_text(name).rstrip(), soft_wrap=True)
     if scenario.accept.claims_figures:
-        console.print(f"\nheld to: {scenario.accept.in_words}", markup=False, soft_wrap=True)
+        console.print(f"\nheld to: {scenario.accept.in_words}", soft_wrap=True)
