@@ -82,19 +82,14 @@ def fly(
     _require_background(chosen)
     folder = out or default_output_folder(chosen.name, seed)
     check_output_folder(folder)
-    from dockair.scenarios.accept import was_refuelled
     from dockair.scenarios.loop import fly as fly_scenario
 
     with stdout_kept(as_json), FlightProgress(chosen.flight.duration_s) as progress:
         result = fly_scenario(chosen, seed, folder, record=record.value, progress=progress, overlap=True)
-    contact = result.contact
-    offset, speed = (contact.radial_offset_m, contact.closure_speed_m_s) if contact else (None, None)
-    refuelled = was_refuelled(result.fuel_kg, [entry.reason for entry in result.timeline])
-    shortfalls = chosen.accept.shortfalls(result.outcome, offset, speed, result.unsafe, refuelled=refuelled)
     if as_json:
         print_json(result.to_dict())
     else:
-        show_result(result.to_dict(), shortfalls if shortfalls or chosen.accept.claims_figures else None, folder)
+        show_result(result.to_dict(), folder)
 
 
 @app.command()

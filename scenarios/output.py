@@ -45,7 +45,7 @@ _FIGURES = {
 
 
 class FlightProgress:
-    """Shows simulated time, phase and range: a bar on a terminal, else a line every few simulated seconds.
+    """Shows simulated time, phase and how far the ring is from the tip: a bar on a terminal, else a line now and then.
 
     Args:
         duration_s: the longest the flight may take.
@@ -59,12 +59,12 @@ class FlightProgress:
             TextColumn("{task.description:<12}", markup=False),
             BarColumn(),
             TaskProgressColumn("{task.completed:5.1f} of {task.total:.0f} s"),
-            TextColumn("range {task.fields[range_m]:6.2f} m"),
+            TextColumn("distance to drogue {task.fields[distance_m]:6.2f} m"),
             TimeElapsedColumn(),
             console=self._console,
             transient=True,
         )
-        self._task = self._bar.add_task("building", total=duration_s, range_m=float("nan"))
+        self._task = self._bar.add_task("building", total=duration_s, distance_m=float("nan"))
 
     def __enter__(self) -> Self:
         if self._console.is_terminal:
@@ -79,21 +79,21 @@ class FlightProgress:
         """Take note of one control tick."""
         if truth.time_s < self._next_s:
             return
-        range_m = float(np.linalg.norm(truth.p_PD_B))
+        distance_m = float(np.linalg.norm(truth.p_PD_B))
         if self._console.is_terminal:
             self._next_s = truth.time_s + _BAR_INTERVAL_S
-            self._bar.update(self._task, completed=truth.time_s, description=solution.phase, range_m=range_m)
+            self._bar.update(self._task, completed=truth.time_s, description=solution.phase, distance_m=distance_m)
         else:
             self._next_s = truth.time_s + _PLAIN_INTERVAL_S
-            self._console.print(f"{truth.time_s:6.1f} s  {solution.phase:<12} range {range_m:6.2f} m", markup=False)
+            line = f"{truth.time_s:6.1f} s  {solution.phase:<12} distance to drogue {distance_m:6.2f} m"
+            self._console.print(line, markup=False)
 
 
-def show_result(result: Mapping[str, Any], shortfalls: Sequence[str] | None, folder: Path) -> None:
+def show_result(result: Mapping[str, Any], folder: Path) -> None:
     """Print a flight's outcome, figures and files.
 
     Args:
         result: as in `result.json`.
-        shortfalls: what the scenario's `accept` asks for and the flight did not show; None when it asks for nothing.
         folder: where the flight was written.
     """
     console = plain_console()
@@ -115,6 +115,7 @@ def show_result(result: Mapping[str, Any], shortfalls: Sequence[str] | None, fol
         if value is not None:
             table.add_row(label, f"{value:.{decimals}f}", unit)
     console.print(table)
+    shortfalls = result.get("shortfalls")
     if shortfalls is not None:
         console.print("; ".join(shortfalls) or "as the scenario claims", style="yellow" if shortfalls else "green")
     for path in sorted(folder.iterdir()):

@@ -12,7 +12,7 @@ from dockair.scenarios.flight_log import FlightLog
 from dockair.scenarios.message_log import MessageLog, read_messages
 from dockair.scenarios.output_folder import FlightFolder, utf8_path_of
 from dockair.scenarios.referee import Outcome
-from dockair.scenarios.result import Result, summarise
+from dockair.scenarios.result import Result, held_to, summarise
 
 if TYPE_CHECKING:  # the loop imports this module
     from dockair.scenarios.loop import Flight, Tick
@@ -96,6 +96,7 @@ class Recorder:
             wall_time_s=wall_time_s,
             out_dir=self._path,
         )
+        result = held_to(flight.scenario.accept, result)
         if self._folder is not None:
             self._write(flight, result, self._folder.under_way)
             self._folder.keep()

@@ -4,12 +4,13 @@ import json
 import math
 import platform
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 from dockair.calibration import Mounting
+from dockair.scenarios.accept import Accept, was_refuelled
 from dockair.scenarios.attempts import Attempt, first_attempt_succeeded, succeeded
 from dockair.scenarios.causes import Flown, cause_of_flight, with_cause
 from dockair.scenarios.flight_profile import PhaseEntry, RangeBin, navigation_by_range, timeline
@@ -52,6 +53,7 @@ class Result:
     versions: Mapping[str, str]
     timeline: tuple[PhaseEntry, ...]
     nav_by_range: tuple[RangeBin, ...]
+    shortfalls: tuple[str, ...] | None = None  #: what the scenario asks for and the flight did not show; None: nothing
     out_dir: str | None
 
     def to_dict(self) -> dict[str, Any]:
@@ -67,6 +69,24 @@ class Result:
         path = Path(out_dir) / "result.json"
         path.write_text(self.to_json() + "\n", encoding="utf-8")
         return path
+
+
+def held_to(accept: Accept, result: Result) -> Result:
+    """Return a flight's result with what it did not show of what its scenario asks for.
+
+    Args:
+        accept: the scenario's.
+        result: of the flight.
+    """
+    contact = result.contact
+    lines = accept.shortfalls(
+        result.outcome,
+        contact.radial_offset_m if contact else None,
+        contact.closure_speed_m_s if contact else None,
+        result.unsafe,
+        refuelled=was_refuelled(result.fuel_kg, [entry.reason for entry in result.timeline]),
+    )
+    return replace(result, shortfalls=tuple(lines) if lines or accept.claims_figures else None)
 
 
 def _plain(value: Any) -> Any:

@@ -22,7 +22,7 @@ from dockair.scenarios.flight_profile import PhaseEntry
 from dockair.scenarios.metrics import NavigationFigures
 from dockair.scenarios.output_folder import FlightFolder
 from dockair.scenarios.referee import Contact
-from dockair.scenarios.result import Result
+from dockair.scenarios.result import Result, held_to
 from dockair.scenarios.schema import load_scenario
 from dockair.sim import opengl
 
@@ -68,7 +68,7 @@ def a_result(scenario, seed, out, **changes) -> Result:
         "nav_by_range": (),
         "out_dir": str(out),
     }
-    return Result(**(values | changes))
+    return held_to(scenario.accept, Result(**(values | changes)))
 
 
 @pytest.fixture
@@ -132,6 +132,12 @@ def flights(monkeypatch, tmp_path):
         (("replay", "nowhere"), "nowhere: expected the folder of a recorded flight, got 'no such folder'"),
         (("replay",), "Missing argument 'OUT'"),
         (("bench", "defualt"), "scenario: expected a scenario of the library"),
+        (("fly", "levels"), "scenario: expected a scenario, got 'a plan, for dockair campaign levels'"),
+        (("campaign", "night"), "plan: expected a plan, got 'a scenario, for dockair fly night'"),
+        (
+            ("fly", "--set", "navigation.navigator=nosuch:Class"),
+            'navigation.navigator: expected an importable "module:Class", got "No module named \'nosuch\'"',
+        ),
     ],
 )
 def test_a_mistake_is_told_in_one_line_and_ends_with_status_two(command, tmp_path, monkeypatch, arguments, said):
@@ -152,7 +158,7 @@ def test_flying_writes_to_a_folder_named_after_scenario_and_seed(command, flight
     assert (tmp_path / flight.out).samefile(tmp_path / "out" / "still_air-3")
     for figure in ("contact", "0.042", "1.23", "9.87", "out/still_air-3/result.json", "as the scenario claims"):
         assert figure in out
-    assert "range   5.00 m" in err
+    assert "distance to drogue   5.00 m" in err
 
 
 def test_a_flight_that_docks_and_is_called_back_is_not_as_claimed(command, flights, monkeypatch):
@@ -162,6 +168,8 @@ def test_a_flight_that_docks_and_is_called_back_is_not_as_claimed(command, fligh
     monkeypatch.setitem(globals(), "a_result", called_back)
     _, out, _ = command("fly", "still_air", "--seed", "3")
     assert "docked, and has not refuelled" in out and "as the scenario claims" not in out
+    _, out, _ = command("fly", "still_air", "--seed", "3", "--json")
+    assert json.loads(out)["shortfalls"] == ["docked, and has not refuelled"]
 
 
 def test_flying_without_a_name_flies_the_default_scenario_with_its_own_seed(command, flights):
@@ -180,6 +188,7 @@ def test_json_is_one_object_on_stdout_and_nothing_else(command, flights):
     table = json.loads(out)
     assert table["outcome"] == "contact"
     assert table["contact"]["radial_offset_m"] == 0.042
+    assert table["shortfalls"] == []
     assert "approach" in err
 
 

@@ -2,6 +2,7 @@
 
 import re
 import shlex
+from itertools import takewhile
 from pathlib import Path
 
 import pytest
@@ -16,7 +17,7 @@ from dockair.scenarios.schema import load_scenario
 
 ROOT = Path(__file__).parents[2]
 PROGRAM = typer.main.get_command(app)
-SHOWN = re.compile(r"^(?: {4})?(?:\$ )?dockair ([a-z][^`\n]*)$|`dockair ([a-z][^`]*)`", re.MULTILINE)
+SHOWN = re.compile(r"^(?: {4}| +- run: )?(?:\$ )?dockair ([a-z][^`\n]*)$|`dockair ([a-z][^`]*)`", re.MULTILINE)
 REFUSED = "fly evening.toml --set turbulence.sigma=0.8"  # shown with the error it makes
 SPOKEN_OF = {"replay", "report", "report --evidence"}  # without what they are given
 OF_THE_READER = """hardware.ring="coded.toml\""""
@@ -27,7 +28,8 @@ def shown_commands():
     """The commands of all pages, each once."""
     pages = [*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md")]
     found = [pair for page in pages for pair in SHOWN.findall(page.read_text(encoding="utf-8"))]
-    return sorted({shlex.join(shlex.split(block or text, comments=True)) for block, text in found} - SPOKEN_OF)
+    words = [shlex.split(block or text, comments=True) for block, text in found]
+    return sorted({shlex.join(takewhile(lambda word: word != "|", command)) for command in words} - SPOKEN_OF)
 
 
 def parsed(words):
@@ -59,6 +61,10 @@ def check(command):
 @pytest.mark.parametrize("command", [command for command in shown_commands() if command != REFUSED])
 def test_what_a_page_shows_is_a_command(command):
     check(command)
+
+
+def test_the_steps_of_a_workflow_are_among_the_commands():
+    assert {"campaign ci", "report out/campaigns/ci", "fly still_air --json"} <= set(shown_commands())
 
 
 def test_the_command_that_a_page_shows_with_its_error_is_refused():

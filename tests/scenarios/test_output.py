@@ -21,7 +21,7 @@ def test_without_a_terminal_progress_is_a_line_every_five_simulated_seconds():
             progress(*tick(time_s))
     lines = text.getvalue().splitlines()
     assert [float(line.split()[0]) for line in lines] == [0.0, 5.0, 10.0]
-    assert lines[1] == "   5.0 s  approach     range   5.00 m"
+    assert lines[1] == "   5.0 s  approach     distance to drogue   5.00 m"
 
 
 def test_on_a_terminal_progress_is_a_bar_that_is_gone_afterwards():
@@ -44,8 +44,9 @@ def test_a_flight_without_contact_shows_no_contact_figures_and_no_recording(caps
         "contact": None,
         "nav": {"range_rmse_m": None},
         "frames": 7,
+        "shortfalls": None,
     }
-    show_result(result, None, tmp_path)
+    show_result(result, tmp_path)
     out = capsys.readouterr().out
     assert out.splitlines()[0] == "miss  mine, seed 1"
     assert "camera frames" in out
@@ -59,8 +60,14 @@ def test_every_failed_attempt_is_told_with_its_cause(capsys, tmp_path):
     strike = {"number": 1, "outcome": "rim_strike", "radial_offset_m": 0.21, "cause": "gust", "reason": ""}
     broke = {"number": 2, "outcome": "breakaway", "radial_offset_m": None, "cause": "detection", "reason": "track lost"}
     held = {"number": 3, "outcome": "contact", "radial_offset_m": 0.02, "cause": "", "reason": ""}
-    result = {"outcome": "contact", "scenario": "mine", "seed": 1, "attempt_log": [strike, broke, held]}
-    show_result(result, [], tmp_path)
+    result = {
+        "outcome": "contact",
+        "scenario": "mine",
+        "seed": 1,
+        "attempt_log": [strike, broke, held],
+        "shortfalls": [],
+    }
+    show_result(result, tmp_path)
     lines = capsys.readouterr().out.splitlines()
     assert lines[1] == "attempt 1: rim strike, 0.21 m off; cause: gust"
     assert lines[2] == "attempt 2: breakaway (track lost); cause: detection"
@@ -93,7 +100,8 @@ def test_what_others_say_is_printed_as_it_is(capsys, tmp_path):
     folder.mkdir(parents=True)
     (folder / "flight.png").touch()
     failed = {"number": 1, "outcome": "miss", "radial_offset_m": None, "cause": "gust", "reason": "[/] lost"}
-    show_result({"outcome": "miss", "scenario": "mine", "seed": 1, "attempt_log": [failed]}, ["[/] short"], folder)
+    result = {"outcome": "miss", "scenario": "mine", "seed": 1, "attempt_log": [failed], "shortfalls": ["[/] short"]}
+    show_result(result, folder)
     show_checks([Check("OpenGL", False, "[egl] none", "see [/]"), Check("disk", True, "[dev]")], {"numpy": "[2]"})
     show_reproduction({"id": "a/b", "source": "[paper]", "rows": []}, folder / "picture.png")
     out = capsys.readouterr().out

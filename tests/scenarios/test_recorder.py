@@ -34,6 +34,7 @@ def test_a_flight_on_the_truth_leaves_no_messages_and_says_so(tmp_path):
     written = json.loads((tmp_path / "result.json").read_text())
     assert written == result.to_dict()
     assert written["truth_navigation"] is True
+    assert written["shortfalls"] == ["outcome timeout, wanted contact"]
     assert "perfect" in summary_of(result)
 
 
