@@ -2,92 +2,77 @@
 
     python examples/own_navigator.py [SCENARIO] [SEED]
 
-This one solves the pose of every frame by itself, keeps position and velocity with two fixed gains, and steers with the
-controller of `own_controller.py`. It has no covariance to speak of, no gates and no breakaway: it shows where the
-navigator plugs in, not how to fly. It asks for measured LEDs in place of frames, so that it need not find them.
+Step by step: docs/tutorials/own_navigator.md, which has the same lines. The navigator has no covariance to speak of and
+no gates: it shows where one plugs in, not how to fly well. It asks for measured LEDs in place of frames, so that it
+need not find them.
 """
 
 import sys
 
 import numpy as np
-from own_controller import Controller
 
-from dockair.calibration import NavigationSheets
-from dockair.messages import ImuSample, LedObservation, NavSolution, ReceiverCommand
+from dockair.messages import NavSolution
+from dockair.nav.guidance.approach import Guidance, GuidanceSettings, RelativeState
 from dockair.nav.pose.estimate import PoseStatus, solve_pose
-from dockair.scenarios.loop import fly
-from dockair.scenarios.schema import load_scenario
+from dockair.rotations import exp
 
-POSITION_GAIN, VELOCITY_GAIN_1_S = 0.5, 5.0  # of what a frame says that was not expected
-SIGMA_M, SIGMA_M_S, SIGMA_RAD = 0.02, 0.1, 0.02  # claimed, whatever the range
-CONTACT_M, HELD_S = 0.1, 3.0  # tip in the basket; until the flight is called over
+PLACE_GAIN, VELOCITY_GAIN_1_S = 0.5, 6.0  # of what a frame says that was not expected
+TRUSTED_S = 0.5  # since the last frame that was used: after that nothing is flown on
+SIGMA = np.repeat([0.02, 0.01, 0.1], 3)  # rad, m, m/s: claimed, whatever the range
 
 
-class PlainNavigator:
-    """Pose by pose. Body axes turn little in a frame: the gyro is left unused."""
+class MyNavigator:
+    """A pose from each frame, smoothed by two fixed gains, and Dockair's own guidance."""
 
-    def __init__(self, sheets: NavigationSheets) -> None:
-        """Start where the sheets say the drogue is.
+    def __init__(self, sheets):
+        self.sheets, self.dt = sheets, 1.0 / sheets.control_rate_hz
+        self.guidance = Guidance(GuidanceSettings(), sheets.control_rate_hz)
+        self.p, self.v, self.R_BD = sheets.start.p_PD_B.copy(), np.zeros(3), sheets.start.R_BD
+        self.time_s, self.used_s, self.status = 0.0, float("nan"), "no frame yet"
 
-        Args:
-            sheets: camera, ring, mounting, start: all that a navigator is given.
-        """
-        self._sheets, self._dt = sheets, 1.0 / sheets.control_rate_hz
-        self._p, self._rate, self._R_BD = sheets.start.p_PD_B.copy(), np.zeros(3), sheets.start.R_BD
-        self._controller = Controller(self._dt)
-        self._time_s, self._frame_time_s, self._held_s = 0.0, float("nan"), 0.0
-        self._status, self._leds_px = "no frame yet", np.full((sheets.ring.count, 2), np.nan)
-
-    def step(self, imu: tuple[ImuSample, ...], frame: LedObservation | None) -> NavSolution:
+    def step(self, imu, frame):
         """Take what arrived since the last control tick."""
-        self._time_s += self._dt
-        self._p = self._p + self._dt * self._rate
+        self.time_s += self.dt
+        w = self.sheets.mounting.R_BI @ imu[-1].angular_rate_rad_s if imu else np.zeros(3)
+        turn = exp(-self.dt * w)  # the body turns, the drogue does not
+        self.p, self.v, self.R_BD = turn @ (self.p + self.dt * self.v), turn @ self.v, turn @ self.R_BD
         if frame is not None:
-            self._take(frame)
-        velocity, acceleration = self._controller.step(self._p, self._rate)
-        touching = self._controller.closing and self._p[0] < CONTACT_M
-        self._held_s = self._held_s + self._dt if touching else 0.0
-        phase = "approach" if self._controller.closing else "pre_contact"
-        if touching:
-            phase = "contact" if self._held_s < HELD_S else "clear"
+            self.status = self._take(frame)
+        valid = self.time_s - self.used_s < TRUSTED_S  # false before the first frame
+        coupling = self.p + self.sheets.coupling_depth_m * self.R_BD[:, 0]
+        command = self.guidance.step(RelativeState(
+            usable=valid, contact_usable=valid, p_PD_B=self.p, rate_PD_B=self.v - np.cross(w, self.p), p_PK_B=coupling,
+            w_WB_B=w, sigma_lateral_m=SIGMA[3],
+        ))  # fmt: skip
         return NavSolution(
-            time_stamp_s=self._time_s,
-            valid=bool(np.isfinite(self._frame_time_s)),
-            phase=phase,
-            status=self._status,
-            p_PD_B=self._p,
-            v_PD_B=self._rate,
-            R_BD=self._R_BD,
-            covariance=np.diag(np.repeat([SIGMA_RAD, SIGMA_M, SIGMA_M_S], 3) ** 2),
-            command=ReceiverCommand(velocity_m_s=velocity.copy(), acceleration_m_s2=acceleration),
-            window=None,
-            frame_time_stamp_s=self._frame_time_s,
-            candidates_px=np.empty((0, 2)) if frame is None else frame.centroids_px,
-            led_pixels_px=self._leds_px,
-        )
-
-    def _take(self, seen: LedObservation) -> None:
-        mounting = self._sheets.mounting
-        self._leds_px = np.full((self._sheets.ring.count, 2), np.nan)
-        self._leds_px[seen.led_numbers] = seen.centroids_px
-        pose = solve_pose(
-            seen.centroids_px, self._sheets.ring.positions_D[seen.led_numbers], self._sheets.camera,
-            sigma_px=seen.sigma_px,
-            initial=(mounting.R_BC.T @ self._R_BD, mounting.R_BC.T @ (self._p + mounting.p_BP - mounting.p_BC)),
+            time_stamp_s=self.time_s, valid=valid, status=self.status, frame_time_stamp_s=self.used_s,
+            phase=self.guidance.phase.value, phase_reason=self.guidance.phase_reason, command=command,
+            p_PD_B=self.p, v_PD_B=self.v, R_BD=self.R_BD,
+            covariance=np.diag(SIGMA**2) if valid else np.full((9, 9), np.nan),
+            window=None, candidates_px=np.empty((0, 2)), led_pixels_px=np.full((8, 2), np.nan),
         )  # fmt: skip
-        self._status = f"pose {pose.status.value}"
+
+    def _take(self, seen):
+        m, ring_D = self.sheets.mounting, self.sheets.ring.positions_D[seen.led_numbers]
+        expected = m.R_BC.T @ self.R_BD, m.R_BC.T @ (self.p + m.p_BP - m.p_BC)
+        pose = solve_pose(seen.centroids_px, ring_D, self.sheets.camera, sigma_px=seen.sigma_px, initial=expected)
         if pose.status is not PoseStatus.CONVERGED:
-            return
-        measured = mounting.R_BC @ pose.p_CD + mounting.p_BC - mounting.p_BP
-        unexpected = measured - (self._p - (self._time_s - seen.time_stamp_s) * self._rate)
-        self._p = self._p + POSITION_GAIN * unexpected
-        self._rate = self._rate + VELOCITY_GAIN_1_S * unexpected
-        self._R_BD, self._frame_time_s, self._status = mounting.R_BC @ pose.R_CD, seen.time_stamp_s, "pose used"
+            return f"pose {pose.status.value}"
+        before = self.p - (self.time_s - seen.time_stamp_s) * self.v  # a frame is some milliseconds old when it arrives
+        unexpected = m.R_BC @ pose.p_CD + m.p_BC - m.p_BP - before
+        first = np.isnan(self.used_s)  # whose place is taken whole
+        place, velocity_1_s = (1.0, 0.0) if first else (PLACE_GAIN, VELOCITY_GAIN_1_S)
+        self.p, self.v = self.p + place * unexpected, self.v + velocity_1_s * unexpected
+        self.R_BD, self.used_s = m.R_BC @ pose.R_CD, seen.time_stamp_s
+        return "pose used"
 
 
 def main(scenario_name: str = "default", seed: str = "0") -> None:
     """Fly a scenario with this navigator and say how it ended."""
-    keys = {"navigation.navigator": "own_navigator:PlainNavigator", "camera.sensing": "measurements"}
+    from dockair.scenarios.loop import fly  # what flies it; the navigator itself has no use for a simulator
+    from dockair.scenarios.schema import load_scenario
+
+    keys = {"navigation.navigator": "own_navigator:MyNavigator", "camera.sensing": "measurements"}
     result = fly(load_scenario(scenario_name, keys), int(seed))
     print(f"{result.outcome} after {result.duration_s:.1f} s")
     if result.contact is not None:

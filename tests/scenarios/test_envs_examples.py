@@ -7,6 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from dockair.messages import LedObservation
+
 EXAMPLES = Path(__file__).parents[2] / "examples"
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
 
@@ -75,16 +77,37 @@ def test_the_navigator_of_ones_own_docks_and_is_judged_by_the_truth(example, cap
     assert float(re.search(r"([\d.]+) m off", figures)[1]) < 0.15
 
 
-def test_the_tutorial_s_navigator_docks(tmp_path, monkeypatch):
-    """As its page has it; its first frame, believed by half, had kept guidance waiting for a minute."""
+def test_the_navigator_of_ones_own_is_the_tutorial_s():
+    page = (EXAMPLES.parent / "docs" / "tutorials" / "own_navigator.md").read_text(encoding="utf-8")
+    (code,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    text = (EXAMPLES / "own_navigator.py").read_text(encoding="utf-8")
+    assert code in text
+    assert text.count("\nclass ") == code.count("\nclass ") == 1
+
+
+def test_the_navigator_of_ones_own_is_not_valid_half_a_second_after_its_last_sight(example, hand_made):
+    module = example("own_navigator")
+    navigator = module.MyNavigator(hand_made.sheets)
+    valid = []
+    for k in range(1, 101):
+        truth, imu, *_ = hand_made.tick(k)
+        seen = LedObservation(
+            time_stamp_s=truth.time_s,
+            led_numbers=np.arange(8),
+            centroids_px=hand_made.leds_px(truth),
+            sigma_px=np.full(8, 0.05),
+        )
+        valid.append(navigator.step(imu, seen if 10 <= k <= 30 else None).valid)
+    assert [k for k, is_valid in enumerate(valid, 1) if is_valid] == list(range(10, 80))
+
+
+def test_the_navigator_of_ones_own_docks_soon(example):
+    """Its first frame, believed by half, had kept guidance waiting for a minute."""
     from dockair.scenarios.loop import fly
     from dockair.scenarios.schema import load_scenario
 
-    page = (EXAMPLES.parent / "docs" / "tutorials" / "own_navigator.md").read_text(encoding="utf-8")
-    code = "\n".join(re.findall(r"```python\n(.*?)```", page, re.DOTALL))
-    (tmp_path / "tutorial_navigator.py").write_text(code, encoding="utf-8")
-    monkeypatch.syspath_prepend(str(tmp_path))
-    own = {"camera.sensing": "measurements", "navigation.navigator": "tutorial_navigator:MyNavigator"}
+    example("own_navigator")
+    own = {"camera.sensing": "measurements", "navigation.navigator": "own_navigator:MyNavigator"}
     result = fly(load_scenario("still_air", own), 0)
     assert result.first_attempt
     assert result.contact.time_s < 15.0
