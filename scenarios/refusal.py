@@ -82,6 +82,9 @@ def _alternatives(annotation: Any) -> list[Any]:
 
 
 def _choices(field: FieldInfo) -> tuple[str, ...]:
+    inner = inner_model(field)
+    if inner is not None:  # a value where a table belongs: one of its keys was meant
+        return tuple(sorted(inner.model_fields))
     kind = _alternatives(field.annotation)[0]
     return tuple(str(value) for value in get_args(kind)) if get_origin(kind) is Literal else ()
 

@@ -227,6 +227,8 @@ def test_model_none_switches_gusts_off_and_a_strength_alone_switches_them_on(sce
         ("flight.speed", "1", "flight.speed", "a known key, got 'speed'; exists: airspeed_m_s,"),
         ("flight.airspeed_m_s", "fast", "flight.airspeed_m_s", f"{SPEED}, got 'fast'"),
         ("flight", "1", "flight", "a table, got 1"),
+        ("navigation", "truth", "navigation", "a table, got 'truth'; exists: heading, heading_every_s, navigator"),
+        ("navigator", "truth", "navigator", "a known key, got 'navigator'; exists: accept, bow_wave, camera,"),
         ("rates.camera_hz", "33", "rates.camera_hz", "a rate that divides the physics rate 1000 Hz, got 33"),
         ("parameters.reel.nothing", "1", "parameters.reel.nothing", "a parameter, got 'nothing'; exists:"),
         ("start.sigma_m", "[1, 2, -3]", "start.sigma_m[2]", f"{SIGMAS}, got -3"),
