@@ -69,8 +69,9 @@ def test_the_steps_of_a_workflow_are_among_the_commands():
 
 def test_the_command_that_a_page_shows_with_its_error_is_refused():
     assert REFUSED in shown_commands()
-    with pytest.raises(DockairError):
+    with pytest.raises(DockairError) as refused:
         check(REFUSED)
+    assert f"\n    dockair: {refused.value}\n" in (ROOT / "docs/tutorials/own_scenario.md").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(
