@@ -86,7 +86,7 @@ class CampaignProgress:
         if not self._console.is_terminal and time.monotonic() >= self._next_s:
             self._next_s = time.monotonic() + _LINE_INTERVAL_S
             done = self._earlier + self._now
-            self._say(f"{done} of {self._total} flights, {said}; {self._rates()}")
+            self._say("; ".join(filter(None, (f"{done} of {self._total} flights, {said}", self._rates()))))
 
     def _say(self, text: str) -> None:
         self._console.print(text, markup=False, soft_wrap=True)  # an error may say anything, brackets too

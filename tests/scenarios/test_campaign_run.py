@@ -896,6 +896,15 @@ def test_flights_that_are_flown_again_count_once(here, tmp_path):
     assert "were done before" not in text.getvalue()
 
 
+def test_before_the_first_flight_is_done_a_log_says_just_that(tmp_path, monkeypatch):
+    monkeypatch.setattr("dockair.scenarios.campaign.progress._LINE_INTERVAL_S", 0.0)
+    text = io.StringIO()
+    with CampaignProgress(Console(file=text, width=200)) as progress:
+        progress.begin(jobs_of(plan(tmp_path, 4)), {})
+        progress(None, 0.0)
+    assert text.getvalue() == "0 of 4 flights, none done yet\n"
+
+
 def test_the_samplers_of_the_command_line_are_those_of_the_plan():
     from typing import get_args
 
