@@ -2,6 +2,9 @@
 
 import importlib
 import re
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -111,3 +114,33 @@ def test_the_navigator_of_ones_own_docks_soon(example):
     result = fly(load_scenario("still_air", own), 0)
     assert result.first_attempt
     assert result.contact.time_s < 15.0
+
+
+def test_the_search_for_gains_finds_those_that_score_best(example, monkeypatch):
+    module, best = example("learn_gains"), np.array([1.0, -0.5, 0.2])
+    monkeypatch.setattr(module, "episode", lambda gains, seed: (-float(np.sum((gains - best) ** 2)), False))
+    with ThreadPoolExecutor(1) as pool:
+        np.testing.assert_allclose(module.learned(pool, 12, 20), best, atol=0.1)
+
+
+def test_the_policy_whose_gains_are_searched_is_linear_in_the_belief_and_sums_to_its_velocity(example):
+    module = example("learn_gains")
+    policy, seen = module.LinearPolicy(np.array([0.5, 2.0, 0.25])), np.zeros(len(module.INDEX))
+    for name, value in {"valid": 1.0, "p_PD_B_y": 1.0, "v_PD_B_z": -0.1, "gyro_x": 0.1}.items():
+        seen[module.INDEX[name]] = value
+    acceleration = [0.25 * 1.2, 0.5, 2.0 * (-0.1 - 0.1)]  # the turn lifts a ring to the left by 0.1 m/s
+    for steps in (1, 2):
+        velocity = np.array(acceleration) * 0.05 * steps
+        np.testing.assert_allclose(policy(seen), [*velocity, *acceleration], rtol=1e-6)
+    seen[module.INDEX["valid"]] = 0.0
+    np.testing.assert_allclose(policy(seen), [*velocity, 0.0, 0.0, 0.0], rtol=1e-6)
+
+
+def test_learning_runs_and_says_what_it_was_worth():
+    done = subprocess.run(
+        [sys.executable, str(EXAMPLES / "learn_gains.py"), "1", "2", "1"], capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+    said = r"generation 0: mean score +\S+, \d of 2 docked\ngains: \S+, \S+, \S+\n"
+    said += "".join(rf"{when}: good contact in \d of 1 on new seeds\n" for when in ("before", "after"))
+    assert re.fullmatch(said, done.stdout)

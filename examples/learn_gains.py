@@ -1,0 +1,116 @@
+"""Learn the gains of a linear policy by the cross-entropy method, with numpy alone, a flight on each core.
+
+    python examples/learn_gains.py [GENERATIONS] [CANDIDATES] [EVALUATED]
+
+A generation draws candidates from a normal distribution, flies each on one new seed, and fits the distribution to the
+best. The gains before and after are then flown on seeds that no candidate has met (docs/environments.md#learning).
+"""
+
+import multiprocessing
+import os
+import sys
+from concurrent.futures import Executor, ProcessPoolExecutor
+from functools import cache, partial
+
+import gymnasium
+import numpy as np
+
+import dockair  # noqa: F401 - makes the environments known
+from dockair.scenarios.envs_tables import OBSERVATION
+from dockair.scenarios.schema import load_scenario
+
+INDEX = {entry.name: k for k, entry in enumerate(OBSERVATION)}
+TICKS, STEP_S = 5, 0.05  # of the control for which a command is held
+CONDITIONS = {"flight.duration_s": 8.0}  # a good approach is over after 6
+CLOSING_M_S = 1.2
+START, START_SIGMA = np.array([0.2, 0.2, 0.5]), np.array([0.5, 1.0, 0.5])
+SIGMA_MIN = 0.05  # of a gain: few elites look more alike than they are
+ELITES = 0.35  # part of the candidates
+GOOD_CONTACT = 10.0  # added to the sum of rewards, which tells contacts on the axis from others by nothing
+TRAINED_FROM, EVALUATED_FROM = 1000, 2000  # first seeds; the second are never trained on
+
+
+class LinearPolicy:
+    """Acceleration linear in the belief, and the velocity that it sums to: to the side, and forward."""
+
+    def __init__(self, gains: np.ndarray) -> None:
+        """Start with no command.
+
+        Args:
+            gains: (3,) on offset [1/s^2] and its rate [1/s] across; on the rate less that of closing [1/s], forward.
+        """
+        self._gains, self._velocity = gains, np.zeros(3)
+
+    def __call__(self, observation: np.ndarray) -> np.ndarray:
+        """Return the action for an observation."""
+        p, v, gyro = (observation[INDEX[name] : INDEX[name] + 3] for name in ("p_PD_B_x", "v_PD_B_x", "gyro_x"))
+        rate = v - np.cross(gyro, p)  # in turning axes
+        wanted = self._gains[0] * p + self._gains[1] * rate
+        wanted[0] = self._gains[2] * (rate[0] + CLOSING_M_S)
+        acceleration = np.clip(wanted, -1.0, 1.0) * observation[INDEX["valid"]]
+        self._velocity = np.clip(self._velocity + STEP_S * acceleration, -2.5, 2.5)
+        return np.concatenate([self._velocity, acceleration]).astype(np.float32)
+
+
+@cache
+def environment() -> gymnasium.Env:
+    """Return this process's environment."""
+    scenario = load_scenario("default", CONDITIONS)
+    return gymnasium.make("dockair/DockFast-v0", scenario=scenario, ticks_per_step=TICKS)
+
+
+def episode(gains: np.ndarray, seed: int) -> tuple[float, bool]:
+    """Fly a flight; return its score, and whether it ended in a good contact."""
+    env, policy = environment(), LinearPolicy(gains)
+    observation, info = env.reset(seed=seed)
+    total, over = 0.0, False
+    while not over:
+        observation, reward, terminated, truncated, info = env.step(policy(observation))
+        total, over = total + float(reward), terminated or truncated
+    return total + GOOD_CONTACT * info["is_success"], info["is_success"]
+
+
+def fitted(gains: np.ndarray, scores: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return mean and standard deviation of the best.
+
+    Args:
+        gains: (n, 3) of the candidates.
+        scores: (n,) of each.
+    """
+    count = max(2, round(ELITES * len(gains)))
+    best = gains[np.argsort(scores)[-count:]]
+    return best.mean(axis=0), np.maximum(best.std(axis=0), SIGMA_MIN)
+
+
+def learned(pool: Executor, generations: int, candidates: int) -> np.ndarray:
+    """(3,) gains after so many generations, a line printed of each."""
+    rng = np.random.default_rng(0)
+    mean, sigma = START, START_SIGMA
+    for generation in range(generations):
+        gains = rng.normal(mean, sigma, (candidates, len(mean)))
+        flown = list(pool.map(partial(episode, seed=TRAINED_FROM + generation), gains))
+        scores = np.array([score for score, _ in flown])
+        mean, sigma = fitted(gains, scores)
+        docked = sum(good for _, good in flown)
+        print(f"generation {generation}: mean score {scores.mean():6.2f}, {docked} of {candidates} docked", flush=True)
+    return mean
+
+
+def docked_of(pool: Executor, gains: np.ndarray, count: int) -> int:
+    """Return how many of `count` flights on new seeds end in a good contact."""
+    seeds = range(EVALUATED_FROM, EVALUATED_FROM + count)
+    return sum(good for _, good in pool.map(partial(episode, gains), seeds))
+
+
+def main(generations: str = "4", candidates: str = "8", evaluated: str = "10") -> None:
+    """Learn, and say what it was worth."""
+    cores = len(os.sched_getaffinity(0))
+    with ProcessPoolExecutor(cores, mp_context=multiprocessing.get_context("spawn")) as pool:
+        gains = learned(pool, int(generations), int(candidates))
+        print("gains:", ", ".join(f"{gain:.2f}" for gain in gains))
+        for name, flown in (("before", START), ("after", gains)):
+            print(f"{name}: good contact in {docked_of(pool, flown, int(evaluated))} of {evaluated} on new seeds")
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
