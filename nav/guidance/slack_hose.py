@@ -3,9 +3,10 @@
 A hose that is taken up stays taut, and holds the drogue along itself. One that is not is slack within a tenth of a
 second: the drogue, on the probe, turns with every wave that the blow of contact sends up and down it, long before they
 tear it off. With the drogue's axis a in axes that do not turn with the receiver, looked at for a time after contact,
-from when the blow itself has passed,
 
-    tilt = mean angle between a and its mean before contact                                               (1)
+    tilt = median angle between a and its mean before contact                                             (1)
+
+of which the blow itself, which turns it on a taut hose, too, is the lesser part.
 
 Nothing is said where the drogue has not been seen on the probe for half of that time.
 
@@ -64,7 +65,7 @@ class SlackHose:
         elif self._contact_s > limits.slack_to_s:
             looked_s = self._step_s * len(self._tilts_rad)
             enough = looked_s >= 0.5 * (limits.slack_to_s - limits.slack_from_s)
-            self.is_slack = enough and float(np.mean(self._tilts_rad)) > limits.slack_tilt_rad
+            self.is_slack = enough and float(np.median(self._tilts_rad)) > limits.slack_tilt_rad
 
 
 def _angle_rad(a: Array, b: Array) -> float:

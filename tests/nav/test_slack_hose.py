@@ -40,8 +40,10 @@ def test_a_drogue_that_turns_on_the_probe_is_on_a_slack_hose_whatever_phase_foll
     assert not told(lambda t: LIMIT_DEG - 0.5, after=after).any()
 
 
-def test_the_mean_counts_and_neither_the_blow_nor_what_comes_later():
+def test_the_median_counts_and_neither_the_blow_nor_what_comes_later():
     assert told(lambda t: LIMIT_DEG + 4.0 * np.sin(60.0 * t) + 1.0).any()
+    blow_s = LIMITS.slack_from_s + 0.3 * (LIMITS.slack_to_s - LIMITS.slack_from_s)
+    assert not told(lambda t: 30.0 if t < blow_s else 2.0).any()  # its mean is 10 degrees
     assert not told(lambda t: 30.0 if t < LIMITS.slack_from_s - 0.5 * STEP_S else 0.0).any()
     assert not told(lambda t: 30.0 if t > LIMITS.slack_to_s + 0.5 * STEP_S else 0.0).any()
 
