@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
+from numpy.typing import NDArray
 
 from dockair.messages import CameraFrame, ImuSample, LedObservation, NavSolution
 from dockair.rotations import Array, quaternion_from_matrix
@@ -51,7 +52,7 @@ class FlightLog:
         self.solutions: list[NavSolution] = []
         self.imu: list[tuple[ImuSample, ...]] = []
         self.exposures_s: list[float] = []  #: of the frame that arrived, NaN where none did
-        self.frames = 0
+        self.arrived: list[bool] = []  #: whether a frame or a measurement of its LEDs arrived, used or not
 
     def append(
         self,
@@ -65,7 +66,16 @@ class FlightLog:
         self.imu.append(tuple(imu))
         self.solutions.append(solution)
         self.exposures_s.append(frame.exposure_s if isinstance(frame, CameraFrame) else float("nan"))
-        self.frames += frame is not None
+        self.arrived.append(frame is not None)
+
+    @property
+    def frames(self) -> int:
+        """How many frames have arrived."""
+        return sum(self.arrived)
+
+    def frame_numbers(self) -> NDArray[np.int64]:
+        """(ticks,) number of the newest frame that has arrived, counted from 0; -1 before the first."""
+        return np.cumsum(self.arrived, dtype=np.int64) - 1
 
     def columns(self) -> dict[str, Any]:
         """Return the columns of `flight.parquet`, (ticks,) each; the hose's joints are lists."""

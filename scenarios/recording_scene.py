@@ -26,15 +26,13 @@ _FRUSTUM_M = 1.2
 
 
 def time_columns(log: FlightLog, ticks: Sequence[int]) -> list[Any]:
-    """Return the two timelines at some control ticks; `frame` counts the frames used up to each."""
+    """Return the timelines at some control ticks: `sim_time`, and `frame` if a frame arrived at each of them."""
     import rerun as rr
 
-    stamps = [s.frame_time_stamp_s for s in log.solutions]
-    numbers = {stamp: k for k, stamp in enumerate(sorted({s for s in stamps if np.isfinite(s)}))}
-    frames = [numbers.get(stamps[k], -1) for k in ticks]
-    times = [log.truths[k].time_s for k in ticks]
-    columns = [rr.TimeColumn("sim_time", duration=times)]
-    return [*columns, rr.TimeColumn("frame", sequence=np.maximum(frames, 0))] if numbers else columns
+    columns = [rr.TimeColumn("sim_time", duration=[log.truths[k].time_s for k in ticks])]
+    if not all(log.arrived[k] for k in ticks):
+        return columns
+    return [*columns, rr.TimeColumn("frame", sequence=log.frame_numbers()[list(ticks)])]
 
 
 def hose_exit(first: Truth) -> Array:

@@ -16,14 +16,9 @@ from dockair.scenarios import picture
 from dockair.scenarios.flight_log import FlightLog
 from dockair.scenarios.message_log import MessageLog, NavigatorRecipe, read_messages
 from dockair.scenarios.picture import picture_of_flight
-from dockair.scenarios.recording import (
-    FRAME_BYTES,
-    believed_ring_px,
-    drawn_ticks,
-    padded_shape,
-    shown_frames,
-    write_episode,
-)
+from dockair.scenarios.recording import drawn_ticks, write_episode
+from dockair.scenarios.recording_frames import FRAME_BYTES, padded_shape, shown_frames
+from dockair.scenarios.recording_overlays import believed_ring_px, frame_missing
 from dockair.scenarios.recording_plots import plot_series
 from dockair.sim.shapes import Shape
 
@@ -67,6 +62,14 @@ def _columns(path) -> dict[str, list]:
         for name in batch.schema.names:
             columns.setdefault(f"{chunk.entity_path}:{name}", []).extend(batch[name].to_pylist())
     return columns
+
+
+def _rows(path, entity) -> list[dict]:
+    """What was logged of an entity at some time, a row a dictionary."""
+    from rerun.chunk import RrdReader
+
+    chunks = [chunk.to_record_batch() for chunk in RrdReader(path).stream() if chunk.entity_path == entity]
+    return [row for batch in chunks if "sim_time" in batch.schema.names for row in batch.to_pylist()]
 
 
 def test_the_viewer_accepts_the_file(flown, hand_made):
@@ -113,6 +116,62 @@ def test_overlays_are_drawn_at_the_ticks_with_a_new_frame(flown, hand_made):
     """Frames arrive at every second control tick, counted from the second (index 1)."""
     _, log, _ = flown
     assert drawn_ticks(log, 100)[1:] == list(range(1, TICKS, 2))
+
+
+def test_a_frame_that_was_not_used_is_drawn_too(hand_made):
+    """Of the frames of 0.6 s the navigation uses the first alone."""
+    log = FlightLog()
+    for truth, imu, frame, solution in hand_made.ticks(TICKS):
+        log.append(truth, imu, frame, replace(solution, frame_time_stamp_s=0.019))
+    assert drawn_ticks(log, 100)[1:] == list(range(1, TICKS, 2))
+
+
+@pytest.fixture
+def dropped_out(hand_made, tmp_path):
+    """A recorded flight of 0.6 s whose camera sends nothing from 0.2 to 0.4 s; the solution keeps what it saw last."""
+    log, kept = FlightLog(), None
+    with MessageLog(tmp_path, NavigatorRecipe(class_name="a:B", sheets=hand_made.sheets)) as messages:
+        for truth, imu, frame, solution in hand_made.ticks(TICKS):
+            if 0.2 < truth.time_s < 0.4:
+                frame, solution = None, replace(solution, led_pixels_px=kept)
+            kept = solution.led_pixels_px
+            log.append(truth, imu, frame, solution)
+            messages.append(imu, frame, solution)
+    return tmp_path, log
+
+
+def test_while_no_frame_arrives_the_scene_moves_on_at_its_own_rate(dropped_out):
+    _, log = dropped_out
+    drawn = [log.truths[k].time_s for k in drawn_ticks(log, 100)]
+    np.testing.assert_allclose([t for t in drawn if 0.2 < t < 0.4], [0.24, 0.28, 0.32, 0.36])
+
+
+def test_leds_are_drawn_no_longer_when_frames_fail_to_appear(dropped_out, hand_made):
+    folder, log = dropped_out
+    rows = _rows(_write(folder, log, hand_made.sheets), "/camera/leds")
+    counts = {row["sim_time"].total_seconds(): len(row["Points2D:positions"]) for row in rows}
+    assert {t for t, count in counts.items() if count == 0} == {0.01, 0.24, 0.28, 0.32, 0.36}
+    assert set(counts.values()) == {0, 8}
+
+
+def test_of_a_slow_camera_leds_are_drawn_from_frame_to_frame(hand_made):
+    """A frame of a camera of 10 Hz comes every ten control ticks, and fails to appear after twenty."""
+    sheets, log = replace(hand_made.sheets, camera_rate_hz=10), FlightLog()
+    for k, (truth, imu, _, solution) in enumerate(hand_made.ticks(60)):
+        log.append(truth, imu, hand_made.frame(truth) if k in (10, 20, 50) else None, solution)
+    expected = [k < 10 or 40 <= k < 50 for k in range(60)]
+    assert frame_missing(log, sheets).tolist() == expected
+
+
+def test_pixels_and_scene_have_the_same_number_of_one_frame(dropped_out, hand_made):
+    folder, log = dropped_out
+    path = _write(folder, log, hand_made.sheets)
+    pixels, scene, overlay = (
+        {row["frame"]: row["sim_time"] for row in _rows(path, entity) if "frame" in row}
+        for entity in ("/camera/window", "/world/drogue", "/camera/leds")
+    )
+    assert sorted(pixels) == list(range(log.frames))
+    assert pixels == scene == overlay
 
 
 def test_the_believed_ring_passes_through_the_leds_when_the_belief_is_true(make_hand_made):

@@ -1,0 +1,78 @@
+"""The frames of an episode as they are shown: padded, and of long flights every n-th.
+
+The viewer takes a change of an image's size for a fault of a video, so that windows are padded with black to multiples
+of `PADDING_PX` and each size has an entity of its own.
+"""
+
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+
+from dockair.messages import Window
+from dockair.scenarios.flight_log import FlightLog
+from dockair.scenarios.message_log import TickMessages, pixels_from_png, png_from_pixels
+from dockair.scenarios.recording_layout import TRUTH
+
+PADDING_PX = 128
+FRAME_BYTES = 30_000_000  # of frames in an episode; the message log holds every one of them
+_BATCH = 64
+
+
+def padded_shape(window: Window) -> tuple[int, int]:
+    """(rows, columns) of the window, rounded up to multiples of PADDING_PX."""
+    rows, columns = window.shape
+    return -(-rows // PADDING_PX) * PADDING_PX, -(-columns // PADDING_PX) * PADDING_PX
+
+
+def log_frames(recording: Any, log: FlightLog, messages: Sequence[TickMessages]) -> None:
+    """Log the frames that are shown, each at its place on the sensor, with its window's outline.
+
+    Args:
+        recording: of rerun.
+        log: of the flight.
+        messages: of the same control ticks; empty for a recording without frames.
+    """
+    import rerun as rr
+
+    before = ""
+    for number, time_s, window, png in _padded_frames(log, messages):
+        recording.set_time("sim_time", duration=time_s)
+        recording.set_time("frame", sequence=number)
+        entity = f"camera/window/pixels_{'x'.join(str(size) for size in padded_shape(window))}"
+        if entity != before:
+            if before:
+                recording.log(before, rr.EncodedImage.from_fields(opacity=0.0))  # the viewer does not heed a Clear here
+            recording.log(entity, rr.EncodedImage.from_fields(opacity=1.0))
+            before = entity
+        recording.log("camera/window", rr.Transform3D(translation=[window.column_start, window.row_start, 0]))
+        recording.log(entity, rr.EncodedImage(contents=png, media_type="image/png", draw_order=-10.0))
+        rows, columns = window.shape
+        box = rr.Boxes2D(array=[0, 0, columns, rows], array_format=rr.Box2DFormat.XYWH, colors=TRUTH)
+        recording.log("camera/window/outline", box)
+
+
+def shown_frames(sizes_bytes: Sequence[int]) -> range:
+    """Return which frames are shown: every n-th, n as small as FRAME_BYTES allow."""
+    return range(0, len(sizes_bytes), max(1, -(-sum(sizes_bytes) // FRAME_BYTES)))
+
+
+def _padded_frames(log: FlightLog, messages: Sequence[TickMessages]) -> Iterator[tuple[int, float, Window, bytes]]:
+    """Yield number, time of delivery, window and padded PNG of each frame shown; threads encode a few dozen at once."""
+
+    def pad(entry: tuple[int, float, Window, bytes]) -> tuple[int, float, Window, bytes]:
+        number, time_s, window, png = entry
+        canvas = np.zeros(padded_shape(window), np.uint8)
+        canvas[: window.shape[0], : window.shape[1]] = pixels_from_png(png)
+        return number, time_s, window, png_from_pixels(canvas)
+
+    frames = [
+        (int(number), truth.time_s, tick.frame.window, tick.png)
+        for number, truth, tick in zip(log.frame_numbers(), log.truths, messages, strict=False)
+        if tick.frame is not None and tick.png is not None
+    ]
+    chosen = [frames[k] for k in shown_frames([len(png) for *_, png in frames])]
+    with ThreadPoolExecutor(max_workers=2) as pool:
+        for first in range(0, len(chosen), _BATCH):
+            yield from pool.map(pad, chosen[first : first + _BATCH])
