@@ -16,6 +16,7 @@ from dockair.messages import CameraFrame
 from dockair.rotations import Array
 from dockair.scenarios.flight_log import FlightLog
 from dockair.scenarios.loop import Flight, Tick
+from dockair.scenarios.recording_frames import shown_pixels
 from dockair.scenarios.recording_layout import blueprint
 from dockair.scenarios.recording_plots import log_plots
 from dockair.scenarios.recording_scene import hose_exit, log_moving, log_still, log_tip_path, tip_place
@@ -90,7 +91,7 @@ class LiveViewer:
 
         shift = rr.Transform3D(translation=[frame.window.column_start, frame.window.row_start, 0])
         self._recording.log("camera/window", shift)
-        self._recording.log("camera/window/pixels", rr.Image(np.asarray(frame.pixels), "L"))
+        self._recording.log("camera/window/pixels", rr.Image(shown_pixels(np.asarray(frame.pixels)), "L"))
 
 
 def require_viewer() -> None:

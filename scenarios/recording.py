@@ -2,7 +2,7 @@
 
 | entity                              | from               | drawn                                               |
 |-------------------------------------|--------------------|-----------------------------------------------------|
-| camera/window/pixels_*              | message log        | the window's pixels, lossless, at their place; of   |
+| camera/window/pixels_*              | message log        | the window's pixels, brightened, at their place; of |
 |                                     |                    | long flights every n-th frame, to keep files small  |
 | camera/{candidates,leds,ring,...}   | NavSolution        | candidates, named LEDs, the believed ring projected |
 | world/{tanker,hose,drogue,receiver} | Truth              | the model's own primitives                          |

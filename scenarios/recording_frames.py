@@ -1,4 +1,11 @@
-"""The frames of an episode as they are shown: padded, and of long flights every n-th.
+"""The frames of an episode as they are shown: brightened, padded, and of long flights every n-th.
+
+What is on the screen is the square root of a pixel,
+
+    shown = 255 min(1, sqrt(pixel / WHITE)),                                                              (1)
+
+because nearly all pixels of a near-infrared frame are below ten of 255 and would be black beside its LEDs; shot noise
+is then as strong everywhere. `messages.parquet` keeps the pixels as they were delivered.
 
 The viewer takes a change of an image's size for a fault of a video, so that windows are padded with black to multiples
 of `PADDING_PX` and each size has an entity of its own.
@@ -9,6 +16,7 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dockair.messages import Window
 from dockair.scenarios.flight_log import FlightLog
@@ -16,8 +24,15 @@ from dockair.scenarios.message_log import TickMessages, pixels_from_png, png_fro
 from dockair.scenarios.recording_layout import TRUTH
 
 PADDING_PX = 128
-FRAME_BYTES = 30_000_000  # of frames in an episode; the message log holds every one of them
+WHITE = 64
+FRAME_BYTES = 24_000_000  # of an episode's frames as delivered: about 30 MB as shown; the message log holds every one
 _BATCH = 64
+_SHOWN = np.rint(255.0 * np.minimum(1.0, np.sqrt(np.arange(256) / WHITE))).astype(np.uint8)  # Eq. (1)
+
+
+def shown_pixels(pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Return pixels (rows, columns) as they are shown, Eq. (1)."""
+    return np.asarray(_SHOWN[pixels])
 
 
 def padded_shape(window: Window) -> tuple[int, int]:
@@ -64,7 +79,7 @@ def _padded_frames(log: FlightLog, messages: Sequence[TickMessages]) -> Iterator
     def pad(entry: tuple[int, float, Window, bytes]) -> tuple[int, float, Window, bytes]:
         number, time_s, window, png = entry
         canvas = np.zeros(padded_shape(window), np.uint8)
-        canvas[: window.shape[0], : window.shape[1]] = pixels_from_png(png)
+        canvas[: window.shape[0], : window.shape[1]] = shown_pixels(pixels_from_png(png))
         return number, time_s, window, png_from_pixels(canvas)
 
     frames = [

@@ -1,4 +1,4 @@
-"""`episode.rrd` is a file that the viewer accepts, with the very pixels that were delivered and all it promises."""
+"""`episode.rrd` is a file that the viewer accepts, with every frame that was delivered and all it promises."""
 
 import subprocess
 import sys
@@ -17,7 +17,7 @@ from dockair.scenarios.flight_log import FlightLog
 from dockair.scenarios.message_log import MessageLog, NavigatorRecipe, read_messages
 from dockair.scenarios.picture import picture_of_flight
 from dockair.scenarios.recording import drawn_ticks, write_episode
-from dockair.scenarios.recording_frames import FRAME_BYTES, padded_shape, shown_frames
+from dockair.scenarios.recording_frames import FRAME_BYTES, padded_shape, shown_frames, shown_pixels
 from dockair.scenarios.recording_overlays import believed_ring_px, frame_missing
 from dockair.scenarios.recording_plots import plot_series
 from dockair.sim.shapes import Shape
@@ -80,7 +80,7 @@ def test_the_viewer_accepts_the_file(flown, hand_made):
     assert "verified without error" in done.stdout + done.stderr
 
 
-def test_frames_in_the_recording_are_the_delivered_pixels(flown, hand_made):
+def test_frames_in_the_recording_are_the_square_roots_of_the_delivered_pixels(flown, hand_made):
     folder, log, entries = flown
     columns = _columns(_write(folder, log, hand_made.sheets))
     pngs = [png for name, values in columns.items() if "pixels_" in name and "blob" in name for png in values if png]
@@ -89,8 +89,14 @@ def test_frames_in_the_recording_are_the_delivered_pixels(flown, hand_made):
     decoded = [cv2.imdecode(np.array(png[0], np.uint8), cv2.IMREAD_UNCHANGED) for png in pngs]
     for frame, canvas in zip(delivered, decoded, strict=True):
         rows, columns_count = frame.window.shape
-        np.testing.assert_array_equal(canvas[:rows, :columns_count], frame.pixels)
+        expected = 255.0 * np.minimum(np.sqrt(frame.pixels / 64.0), 1.0)
+        np.testing.assert_allclose(canvas[:rows, :columns_count], expected, rtol=0.0, atol=0.5)
         assert not canvas[rows:].any() and not canvas[:, columns_count:].any()
+
+
+def test_dark_pixels_are_shown_apart_and_bright_ones_no_darker():
+    shown = shown_pixels(np.array([[0, 1, 4, 16, 64, 255]], np.uint8))
+    np.testing.assert_array_equal(shown, [[0, 32, 64, 128, 255, 255]])
 
 
 def test_the_recording_holds_every_view_that_is_promised(flown, hand_made):
