@@ -1,4 +1,4 @@
-"""How the viewer lays an episode out: frames left, scene and drogue right, plots below, phases at the bottom."""
+"""How the viewer lays an episode out: phases above, frames left, scene and drogue right, plots below."""
 
 from typing import Any
 
@@ -29,6 +29,9 @@ STATUSES = {
 OTHER = [200, 80, 60]  #: of a state that is none of these: something was not as it should be
 AXES = [[255, 69, 58], [48, 209, 88], [10, 132, 255]]
 
+ERROR_SHOWN_MM = 50.0  #: beyond it a drogue that was lost would make a flat line of all that came before
+OFFSET_SHOWN_M = 0.5  #: three times what a docking may be off the centre
+
 CLOSE_UP = "camera/close_up"  #: an entity at the believed ring's centre; the close-up view looks from there
 _CLOSE_UP_HALF_PX = 330  # the ring fills it at about 2.4 m, where the camera stands at contact
 
@@ -55,7 +58,7 @@ def blueprint(camera: Camera) -> Any:
     drogue = _scene("world/drogue", "At the drogue: belief in orange", eye=(-2.2, 1.5, 0.7), target=(-0.3, 0.0, 0.0))
     views = rrb.Horizontal(cameras, scene, drogue, column_shares=[5, 6, 5])
     return rrb.Blueprint(
-        rrb.Vertical(views, _plots(), _states(), row_shares=[10, 5, 3]),
+        rrb.Vertical(_states(), views, _plots(), row_shares=[3, 11, 6]),
         rrb.TimePanel(timeline="sim_time", state="collapsed"),
         collapse_panels=True,
     )
@@ -74,27 +77,40 @@ def _scene(origin: str, name: str, *, eye: tuple[float, ...], target: tuple[floa
 def _plots() -> Any:
     import rerun.blueprint as rrb
 
-    def plot(entity: str, name: str) -> Any:
-        return rrb.TimeSeriesView(origin=f"plots/{entity}", name=name, plot_legend=rrb.PlotLegend(visible=True))
+    top_left, top_right = rrb.Corner2D.LeftTop, rrb.Corner2D.RightTop
+    bottom_left, bottom_right = rrb.Corner2D.LeftBottom, rrb.Corner2D.RightBottom
+    errors = (-ERROR_SHOWN_MM, ERROR_SHOWN_MM)
 
     return rrb.Horizontal(
-        plot("range", "Ring ahead of the tip [m]"),
+        _plot("range", "Ring ahead of the tip [m]", top_right),
+        _plot("lateral", "Ring beside the tip's line [m]", top_right, (-OFFSET_SHOWN_M, OFFSET_SHOWN_M)),
+        _plot("closing", "Closing speed [m/s]", bottom_left),
         rrb.Tabs(
-            plot("lateral_error", "Belief off the truth, across [mm]"), plot("range_error", "Range error [mm]"),
+            _plot("lateral_error", "Belief's error across [mm]", top_left, errors),
+            _plot("range_error", "Belief's error along [mm]", top_left, errors),
             active_tab=0,
         ),
-        plot("lateral", "Ring off the probe's line [m]"),
-        plot("closing", "Closing speed [m/s]"),
         rrb.Tabs(
-            plot("gyro", "Gyro [deg/s]"), plot("accelerometer", "Specific force [m/s^2]"),
-            plot("exposure", "Exposure [us]"), plot("reel", "Hose taken in [m]"), plot("tension", "Hose tension [N]"),
-            plot("heading_error", "Heading error [deg]"),
+            _plot("gyro", "Gyro [deg/s]", bottom_right), _plot("accelerometer", "Specific force [m/s^2]"),
+            _plot("exposure", "Exposure [us]"), _plot("reel", "Hose taken in [m]"),
+            _plot("tension", "Hose tension [N]"),
+            _plot("heading_error", "Heading error [deg]"),
             rrb.TextDocumentView(origin="summary", name="Result"), active_tab=0,
         ),
     )  # fmt: skip
 
 
+def _plot(entity: str, name: str, legend: Any = None, shown: tuple[float, float] | None = None) -> Any:
+    """A plot with its legend in a corner that is empty in most flights, and a vertical axis that ends where told."""
+    import rerun.blueprint as rrb
+
+    axis = None if shown is None else rrb.ScalarAxis(range=shown)
+    return rrb.TimeSeriesView(
+        origin=f"plots/{entity}", name=name, plot_legend=rrb.PlotLegend(legend, visible=True), axis_y=axis
+    )
+
+
 def _states() -> Any:
     import rerun.blueprint as rrb
 
-    return rrb.StateTimelineView(origin="states", name="Phase and last frame")
+    return rrb.StateTimelineView(origin="states", name="Phase, and what became of the newest frame")

@@ -44,8 +44,8 @@ def plot_series(log: FlightLog) -> Mapping[str, tuple[str, Sequence[int], Array]
         "range/truth": ("truth", TRUTH, p_true[:, 0]),
         "range/belief": ("belief", BELIEF, p_nav[:, 0]),
         "range_error/error": ("belief - truth", BELIEF, error_mm[:, 0]),
-        "range_error/upper": ("+3 sigma", _SIGMA, bound_mm[:, 0]),
-        "range_error/lower": ("-3 sigma", _SIGMA, -bound_mm[:, 0]),
+        "range_error/upper": ("3 sigma", _SIGMA, bound_mm[:, 0]),
+        "range_error/lower": ("3 sigma", _SIGMA, -bound_mm[:, 0]),
         "closing/truth": ("truth", TRUTH, -v_true[:, 0]),
         "closing/belief": ("belief", BELIEF, -v_nav[:, 0]),
         "reel/position": ("taken in", TRUTH, np.array([truth.reel_position_m for truth in log.truths])),
@@ -56,8 +56,8 @@ def plot_series(log: FlightLog) -> Mapping[str, tuple[str, Sequence[int], Array]
         series[f"lateral/truth_{letter}"] = (f"{word}, truth", _shade(TRUTH, axis), p_true[:, axis])
         series[f"lateral/belief_{letter}"] = (f"{word}, belief", _shade(BELIEF, axis), p_nav[:, axis])
         series[f"lateral_error/{letter}"] = (word, _shade(BELIEF, axis), error_mm[:, axis])
-    series["lateral_error/upper"] = ("+3 sigma", _SIGMA, bound_mm[:, 1:].max(axis=1))
-    series["lateral_error/lower"] = ("-3 sigma", _SIGMA, -bound_mm[:, 1:].max(axis=1))
+    series["lateral_error/upper"] = ("3 sigma", _SIGMA, bound_mm[:, 1:].max(axis=1))
+    series["lateral_error/lower"] = ("3 sigma", _SIGMA, -bound_mm[:, 1:].max(axis=1))
     for axis, label in enumerate(("roll", "pitch, nose down", "yaw, left")):
         series[f"gyro/{'xyz'[axis]}"] = (label, AXES[axis], gyro[:, axis])
     for axis, label in enumerate(("forward", "left", "up")):
@@ -76,8 +76,8 @@ def _heading_series(log: FlightLog) -> Mapping[str, tuple[str, Sequence[int], Ar
     bound_deg = np.degrees(3.0 * np.array([s.heading_sigma_rad for s in log.solutions]))
     return {
         "heading_error/error": ("belief - truth", BELIEF, error_deg),
-        "heading_error/upper": ("+3 sigma", _SIGMA, bound_deg),
-        "heading_error/lower": ("-3 sigma", _SIGMA, -bound_deg),
+        "heading_error/upper": ("3 sigma", _SIGMA, bound_deg),
+        "heading_error/lower": ("3 sigma", _SIGMA, -bound_deg),
     }
 
 

@@ -226,6 +226,47 @@ def test_plots_show_truth_and_belief_as_they_are(flown):
     np.testing.assert_allclose(series["range/truth"][2], 4.0, atol=1e-9)
 
 
+def _stored_plots(path) -> dict[str, list | None]:
+    """Origin of each plot of the stored blueprint -> the ends of its vertical axis, None where the data decide."""
+    from rerun.chunk import RrdReader
+
+    reader = RrdReader(path)
+    batches = {c.entity_path: c.to_record_batch() for c in reader.stream(store=reader.blueprints()[0])}
+    origins = {
+        path: batch["ViewBlueprint:space_origin"].to_pylist()[0][0]
+        for path, batch in batches.items()
+        if "ViewBlueprint:space_origin" in batch.schema.names
+    }
+    axes = {path: batches.get(f"{path}/ScalarAxis") for path in origins}
+    return {
+        origin: None if axes[path] is None else axes[path]["ScalarAxis:range"].to_pylist()[0][0]
+        for path, origin in origins.items()
+        if origin.startswith("plots/")
+    }
+
+
+def test_every_series_has_a_plot_and_every_plot_a_series(flown, hand_made):
+    folder, log, _ = flown
+    plots = _stored_plots(_write(folder, log, hand_made.sheets))
+    series = {f"plots/{entity.split('/')[0]}" for entity in plot_series(log)}
+    assert set(plots) == series | {"plots/heading_error"}  # of navigators that keep a heading
+
+
+def test_errors_of_a_drogue_that_was_lost_do_not_flatten_those_of_the_docking(flown, hand_made):
+    """After a disconnect the belief is half a metre off, at contact a few millimetres."""
+    folder, log, _ = flown
+    plots = _stored_plots(_write(folder, log, hand_made.sheets))
+    assert plots["plots/lateral_error"] == plots["plots/range_error"] == [-50.0, 50.0]
+    assert plots["plots/lateral"] == [-0.5, 0.5]
+
+
+def test_a_legend_names_both_bounds_of_an_error_once(flown):
+    _, log, _ = flown
+    series = plot_series(log)
+    for error in ("range_error", "lateral_error"):
+        assert len({series[f"{error}/{bound}"][0] for bound in ("upper", "lower")}) == 1
+
+
 def test_the_picture_of_a_flight_is_small_and_not_blank(flown):
     folder, _, _ = flown
     path = picture_of_flight(folder)
