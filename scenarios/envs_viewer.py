@@ -1,6 +1,5 @@
 """An episode in the rerun viewer while it is flown: scene, belief, plots, as in a recorded one."""
 
-import os
 import shutil
 import socket
 import sys
@@ -14,6 +13,7 @@ import numpy as np
 from dockair.errors import MachineError
 from dockair.messages import CameraFrame
 from dockair.rotations import Array
+from dockair.scenarios.display import has_display
 from dockair.scenarios.flight_log import FlightLog
 from dockair.scenarios.loop import Flight, Tick
 from dockair.scenarios.recording_frames import shown_pixels
@@ -22,7 +22,6 @@ from dockair.scenarios.recording_plots import log_plots
 from dockair.scenarios.recording_scene import hose_exit, log_moving, log_still, log_tip_path, tip_place
 from dockair.sim.shapes import shapes_of
 
-_DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY")  # by which a program under Linux finds one
 _PORT = 9876  # of rerun's viewer
 _SHOWN_HZ = 20.0  # a viewer needs no more, and each costs a few milliseconds
 
@@ -100,8 +99,7 @@ def require_viewer() -> None:
     Raises:
         MachineError: with what to do.
     """
-    shows = not sys.platform.startswith("linux") or any(os.environ.get(name) for name in _DISPLAYS)
-    if not shows and not _is_open():
+    if not has_display() and not _is_open():
         expected = "a display, or a rerun viewer that is open already"
         raise MachineError("render_mode", expected=expected, remedy='without one use "rgb_array", or `dockair fly`')
 

@@ -1,6 +1,7 @@
 """What the command line shows to people: tables on stdout, progress on stderr."""
 
 import os
+import shlex
 import sys
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
@@ -14,6 +15,7 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 from rich.table import Table
 from rich.text import Text
 
+from dockair.scenarios.display import has_display
 from dockair.scenarios.no_attempt import cause_and_ending, ending
 
 if TYPE_CHECKING:  # the progress of a flight is told in these; importing them here would slow `--help` down
@@ -121,8 +123,14 @@ def show_result(result: Mapping[str, Any], folder: Path) -> None:
     for path in sorted(folder.iterdir()):
         console.print(Text.assemble(f"  {path}  ", (_size(path.stat().st_size), "dim")), soft_wrap=True)
     if (folder / "episode.rrd").exists():
-        viewer = os.path.relpath(Path(sys.executable).parent / "rerun")
-        console.print(f"look at it: {viewer} --bind 127.0.0.1 {folder / 'episode.rrd'}", soft_wrap=True)
+        console.print(f"look at it{_how_to_look(folder / 'episode.rrd')}", soft_wrap=True)
+
+
+def _how_to_look(recording: Path) -> str:
+    viewer = [os.path.relpath(Path(sys.executable).parent / "rerun"), "--bind", "127.0.0.1"]
+    if has_display():
+        return f": {shlex.join([*viewer, str(recording)])}"
+    return f" in a browser, there is no display here: {shlex.join([*viewer, '--serve-web', str(recording)])}"
 
 
 def _failed_attempt(attempt: Mapping[str, Any]) -> str:

@@ -58,7 +58,7 @@ def blueprint(camera: Camera) -> Any:
     drogue = _scene("world/drogue", "At the drogue: belief in orange", eye=(-2.2, 1.5, 0.7), target=(-0.3, 0.0, 0.0))
     views = rrb.Horizontal(cameras, scene, drogue, column_shares=[5, 6, 5])
     return rrb.Blueprint(
-        rrb.Vertical(_states(), views, _plots(), row_shares=[3, 11, 6]),
+        rrb.Vertical(_states(), views, _plots(), row_shares=[4, 11, 6]),
         rrb.TimePanel(timeline="sim_time", state="collapsed"),
         collapse_panels=True,
     )

@@ -9,7 +9,7 @@ import pytest
 from dockair.calibration import Window
 from dockair.errors import DockairError, MachineError
 from dockair.messages import CameraFrame
-from dockair.scenarios import envs_episode, envs_viewer
+from dockair.scenarios import display, envs_episode, envs_viewer
 from dockair.scenarios.envs import DockEnv, DockFastEnv, DockPixelsEnv
 from dockair.scenarios.envs_options import command_from
 from dockair.scenarios.loop import Flight
@@ -290,7 +290,7 @@ def test_attempts_that_would_be_ignored_are_refused():
 def test_a_viewer_that_cannot_be_shown_is_refused_before_a_flight_is_built(monkeypatch):
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
-    monkeypatch.setattr(envs_viewer.sys, "platform", "linux")
+    monkeypatch.setattr(display.sys, "platform", "linux")
     monkeypatch.setattr(envs_viewer, "_is_open", lambda: False)
     with pytest.raises(
         MachineError, match="^render_mode: expected a display, or a rerun viewer that is open already; "

@@ -1,9 +1,11 @@
 """What people are shown: progress that does not flood a log, figures only where there are any."""
 
 import io
+import shlex
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 from rich.console import Console
 
 from dockair.scenarios.doctor import Check
@@ -53,6 +55,31 @@ def test_a_flight_without_contact_shows_no_contact_figures_and_no_recording(caps
     assert "closing speed" not in out
     assert "range error" not in out
     assert "rerun" not in out
+
+
+@pytest.mark.parametrize(
+    ("platform", "display", "options"),
+    [
+        ("linux", {}, ["--serve-web"]),
+        ("linux", {"DISPLAY": ":0"}, []),
+        ("linux", {"WAYLAND_DISPLAY": "wayland-0"}, []),
+        ("darwin", {}, []),
+    ],
+)
+def test_where_no_window_can_be_opened_the_recording_is_shown_in_a_browser(
+    capsys, monkeypatch, tmp_path, platform, display, options
+):
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    for name, value in display.items():
+        monkeypatch.setenv(name, value)
+    monkeypatch.setattr("dockair.scenarios.display.sys.platform", platform)
+    folder = tmp_path / "of mine"
+    folder.mkdir()
+    (folder / "episode.rrd").touch()
+    show_result({"outcome": "contact", "scenario": "mine", "seed": 1}, None, folder)
+    command = capsys.readouterr().out.splitlines()[-1].rpartition(": ")[2]
+    assert shlex.split(command)[1:] == ["--bind", "127.0.0.1", *options, str(folder / "episode.rrd")]
 
 
 def test_every_failed_attempt_is_told_with_its_cause(capsys, tmp_path):
