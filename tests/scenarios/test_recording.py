@@ -16,6 +16,7 @@ from dockair.scenarios import picture
 from dockair.scenarios.flight_log import FlightLog
 from dockair.scenarios.message_log import MessageLog, NavigatorRecipe, read_messages
 from dockair.scenarios.picture import picture_of_flight
+from dockair.scenarios.picture_columns import not_valid
 from dockair.scenarios.recording import drawn_ticks, write_episode
 from dockair.scenarios.recording_frames import FRAME_BYTES, padded_shape, shown_frames, shown_pixels
 from dockair.scenarios.recording_overlays import believed_ring_px, frame_missing
@@ -315,4 +316,4 @@ def test_a_picture_needs_no_frames(flown):
 
 
 def test_where_there_is_no_track_the_picture_draws_none():
-    assert picture._gone(pa.table({"nav_valid": [True, False, True]})).tolist() == [False, True, False]
+    assert not_valid(pa.table({"nav_valid": [True, False, True]})).tolist() == [False, True, False]
