@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -84,6 +85,24 @@ def test_a_flight_without_contact_ends_at_its_duration():
     result = fly(truth_flight(**{"flight.duration_s": 2.0}))
     assert result.outcome == "timeout" and result.contact is None
     assert result.duration_s == pytest.approx(2.0)
+
+
+def test_a_touch_between_two_control_ticks_is_a_strike(monkeypatch):
+    """Most touches are shorter than a control period: this one lasts for the third of the ten physics ticks in it."""
+    whole = World.step
+
+    def step(world, command):
+        truth = whole(world, command)
+        return replace(truth, probe_touches_drogue=truth.tick == 43)
+
+    monkeypatch.setattr(World, "step", step)
+    flight, touched = Flight(truth_flight(**{"flight.duration_s": 0.1}), 0), []
+    while (tick := flight.step()).outcome is None:
+        touched.append(tick.touched)
+    assert touched == [False] * 4 + [True] + [False] * 4
+    assert tick.outcome is Outcome.RIM_STRIKE
+    (attempt,) = flight.referee.attempt_log(tick.truth.time_s, tick.outcome)
+    assert (attempt.outcome, attempt.begun_s) == ("rim_strike", pytest.approx(0.043))
 
 
 def test_receiver_docks_in_the_turn_of_the_racetrack_and_on_the_way_down_the_toboggan():
