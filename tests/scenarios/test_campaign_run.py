@@ -12,7 +12,9 @@ import sys
 import time
 from collections import Counter
 from functools import partial
+from itertools import count
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from rich.console import Console
@@ -58,6 +60,7 @@ def deadly(job):
     if job.seed == 3:
         os.kill(os.getpid(), signal.SIGKILL)
     if job.seed == 4:
+        open(f"{os.environ['FLOWN']}.asleep", "w").close()
         time.sleep(1000.0)
     if job.seed == 5:
         raise SystemExit(3)
@@ -913,8 +916,20 @@ def test_the_samplers_of_the_command_line_are_those_of_the_plan():
     assert [member.value for member in campaign_command.Sampler] == list(get_args(SamplerName))
 
 
+@pytest.fixture
+def eight_are_done_first(fakes, tmp_path, monkeypatch):
+    """A clock for the pool that stands still until one flight of nine sleeps and all others are done."""
+    asleep, journal, seconds = Path(f"{fakes}.asleep"), tmp_path / "out/journal.jsonl", count()
+
+    def monotonic():
+        return float(next(seconds)) if asleep.exists() and len(lines(journal)) == 8 else 0.0
+
+    monkeypatch.setattr(pool_module, "time", SimpleNamespace(monotonic=monotonic))
+
+
 @pytest.mark.slow
-def test_a_flight_that_breaks_its_process_is_a_row_and_not_the_end(fakes, tmp_path, capfd):
+@pytest.mark.usefixtures("eight_are_done_first")
+def test_a_flight_that_breaks_its_process_is_a_row_and_not_the_end(tmp_path, capfd):
     rows = fly(plan(tmp_path, 9, "timeout_s = 1.5"), tmp_path / "out", "deadly").rows
     assert [row["error"] for row in rows] == [
         "",
