@@ -6,13 +6,15 @@ say. Errors are those of the tick at which a frame has been used, so that they
 hold what the latency costs. In camera axes means: of the camera as it was built, which sees the drogue; the miss vector
 is what is left across the probe's line, and carries the camera's mounting.
 
-A flight is a file, `seed_<number>.json` below the output folder: what is there is not flown again.
+A flight is a file, `seed_<number>.json` below the output folder: what is there is not flown again, unless other code or
+another scenario flew it.
 """
 
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
+from hashlib import blake2b
 from pathlib import Path
 from typing import Any
 
@@ -24,11 +26,13 @@ from dockair.messages import NavSolution
 from dockair.nav.navigator import Navigator
 from dockair.nav.pose.planar import mirrored
 from dockair.rotations import Array, log
+from dockair.scenarios.campaign.code import Code
+from dockair.scenarios.campaign.jobs import scenario_hash
 from dockair.scenarios.loop import Flight
 from dockair.scenarios.metrics import normalised_error_squared, state_error
 from dockair.scenarios.output_folder import made_folder
 from dockair.scenarios.reproduce.reference import picture_name
-from dockair.scenarios.schema import load_scenario
+from dockair.scenarios.schema import Scenario, load_scenario
 from dockair.sim.truth import Truth
 
 ID = "fusion/closed-loop"
@@ -86,12 +90,12 @@ class Rows:
 
 def reproduce(out: Path | None, seeds: int = SEEDS) -> dict[str, Any]:
     """Fly what has not been flown; table by range, and errors against range in `out`."""
-    rows, shown = [], {}
+    rows, shown, code = [], {}, Code().digest
     folders = {name: None if out is None else made_folder(out / "closed_loop" / _file_name(name)) for name in CASES}
     for name, overrides in CASES.items():
         folder = folders[name]
-        count = 2 * seeds if "camera.sensing" in overrides else seeds
-        flown = [_kept(folder, seed, partial(fly, overrides, seed)) for seed in range(count)]
+        count, flown_by = 2 * seeds if "camera.sensing" in overrides else seeds, _flown_by(code, overrides)
+        flown = [_kept(folder, seed, flown_by, partial(fly, overrides, seed)) for seed in range(count)]
         rows.append({"case": name, "ours": figures(flown) | {"flights": len(flown)}, "reference": _WANTED})
         rows += [
             {"case": f"{name}, {low:g}-{high:g} m from the camera", "ours": _between(flown, low, high), "reference": {}}
@@ -107,18 +111,28 @@ def _file_name(case: str) -> str:
     return case.replace(",", "").replace(" ", "_")
 
 
-def _kept(folder: Path | None, seed: int, flying: Callable[[], Rows]) -> Rows:
-    """A flight that is in the folder, or flown now and put there whole or not at all."""
+def _scenario(overrides: Mapping[str, object]) -> Scenario:
+    return load_scenario(_SCENARIO, {**_FROM_12_M, **overrides})
+
+
+def _flown_by(code: str, overrides: Mapping[str, object]) -> str:
+    """Digest of all that decides a flight's rows but its seed: Dockair's code, the scenario, this file."""
+    parts = code, scenario_hash(_scenario(overrides)), Path(__file__).read_text(encoding="utf-8")
+    return blake2b("\0".join(parts).encode(), digest_size=8).hexdigest()
+
+
+def _kept(folder: Path | None, seed: int, flown_by: str, flying: Callable[[], Rows]) -> Rows:
+    """A flight that is in the folder, flown by what flies now; or flown now and put there whole or not at all."""
     if folder is None:
         return flying()
     path = folder / f"seed_{seed:03d}.json"
-    if not path.is_file():
+    table = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
+    if table.get("flown_by") != flown_by:
         flown = flying()
-        table = {"seed": seed, "columns": {name: _plain(flown[name]) for name in _COLUMNS}}
+        table = {"seed": seed, "flown_by": flown_by, "columns": {name: _plain(flown[name]) for name in _COLUMNS}}
         part = path.with_suffix(".part")
         part.write_text(json.dumps(table) + "\n", encoding="utf-8")
         part.replace(path)
-    table = json.loads(path.read_text(encoding="utf-8"))
     return Rows(seed=seed, columns={name: np.array(table["columns"][name], dtype=float) for name in _COLUMNS})
 
 
@@ -128,7 +142,7 @@ def _plain(column: Array) -> list[float | None]:
 
 def fly(overrides: Mapping[str, object], seed: int) -> Rows:
     """Fly one approach up to the coupling and return its used frames."""
-    flight = Flight(load_scenario(_SCENARIO, {**_FROM_12_M, **overrides}), seed)
+    flight = Flight(_scenario(overrides), seed)
     rows, newest_s = [], float("nan")
     try:
         while True:
