@@ -1,8 +1,8 @@
 """Where the basket leads a probe that does not come in through its middle: capture, rim strike or miss.
 
 The receiver is driven straight ahead at a constant speed, its tip beside the drogue's axis by an offset in one of five
-directions from below to above (left and right are the same, the drogue being its own mirror image), or with its nose
-raised or lowered. The referee says from the truth what came of it.
+directions from below to above, or with its nose raised or lowered. The drogue is its own mirror image, so that the other
+side is not fired at; the picture has it hollow. The referee says from the truth what came of it.
 
 In still air the drogue points 3.5 degrees up. A tip so far out that it passes beyond rim, tube and its own radius must
 miss:
@@ -36,6 +36,7 @@ _NOSE_DOWN_DEG = (-10.0, -5.0, 5.0, 10.0)
 _USUAL_M_S = 1.2
 _GAP_M, _BEYOND_M = 0.1, 1.1  # the flight begins so far behind the ring's plane and ends so far ahead of it
 _LOST_S = 0.6  # more than that: the drogue is being pushed along
+_SAME_M = 1e-6  # nearer to the plane of symmetry a place is its own mirror image
 _COLOURS = {Outcome.CONTACT: "tab:green", Outcome.RIM_STRIKE: "tab:red", Outcome.MISS: "tab:grey"}
 _SIZE_IN, _DPI = (15.0, 3.8), 110
 
@@ -128,17 +129,14 @@ def _draw(shots: list[Shot], path: Path) -> None:
             at = [shot for shot in shots if shot.speed_m_s == speed and shot.outcome is outcome]
             angle = np.radians([shot.direction_deg for shot in at])
             offset = np.array([shot.offset_m for shot in at])
-            for side in (1.0, -1.0):
-                axes.scatter(
-                    side * offset * np.cos(angle),
-                    offset * np.sin(angle),
-                    s=28.0,
-                    color=colour,
-                    label=outcome.value.replace("_", " ") if side > 0.0 else None,
-                )
+            left, up = offset * np.cos(angle), offset * np.sin(angle)
+            axes.scatter(left, up, s=28.0, color=colour, label=outcome.value.replace("_", " "))
+            aside = left > _SAME_M
+            axes.scatter(-left[aside], up[aside], s=24.0, facecolors="none", edgecolors=colour)
         axes.set(title=f"{speed} m/s", xlabel="left of the axis [m]", xlim=(0.4, -0.4), ylim=(-0.4, 0.4))
         axes.set_aspect("equal")
     figure.axes[0].set_ylabel("above the axis [m]")
     handles, labels = figure.axes[0].get_legend_handles_labels()
-    figure.legend(handles[: len(_COLOURS)], labels[: len(_COLOURS)], loc="outside upper center", ncols=3, frameon=False)
+    figure.legend(handles, labels, loc="outside upper center", ncols=len(_COLOURS), frameon=False)
+    figure.text(0.995, 0.98, "hollow: mirrored, not fired", ha="right", va="top", fontsize=9)
     figure.savefig(path)
