@@ -1,8 +1,8 @@
-"""How many links and how short a step: shape, swing and motion in one and the same gust, against the finest.
+"""How many links and how short a step: shape, swing and motion in one and the same gust, against finer ones.
 
 The gust is a sum of waves frozen in the air, which passes with V: its velocity depends on x + V t alone, neither on the
 step nor on a random number per tick. Amplitudes follow Dryden's spectrum, down to waves of one hose length. Every run
-begins at rest, and its first seconds do not count.
+begins at rest, and its first seconds do not count. What the rows stand beside is finer than any of them.
 """
 
 from dataclasses import dataclass, replace
@@ -19,8 +19,9 @@ from dockair.sim.hose.swing import LinearSwing
 
 ID = "world/convergence"
 TITLE = "links of the hose and physics rate: shape at rest, first swings, drogue in one gust"
-_SOURCE = "continuous cable for the shape; 32 links, or 4000 Hz, for the rest"
 _LINKS, _RATES_HZ = (4, 8, 12, 16, 18, 24, 32), (250, 500, 1000, 2000, 4000)
+_FINEST_LINKS, _FINEST_RATE_HZ = 40, 8000  # the references, in no row
+_SOURCE = f"continuous cable for the shape; {_FINEST_LINKS} links, or {_FINEST_RATE_HZ} Hz, for the rest"
 _DEFAULT_LINKS, _DEFAULT_RATE_HZ = 18, 1000
 _DURATION_S, _BEFORE_S, _SAMPLE_HZ = 12.0, 4.0, 50
 _SIGMA_M_S, _SCALE_M = 1.11, 533.4  # light turbulence at 6096 m
@@ -71,19 +72,13 @@ def reproduce(out: Path | None) -> dict[str, Any]:
     """Fly every number of links at the default rate, and the default number at every rate; errors in `out`."""
     case = HoseCase.of(180.0, 6000.0)
     gust = FrozenWaves.drawn(case.airspeed_m_s, case.hose.length_m, _DURATION_S)
-    cases = {links: replace(case, hose=replace(case.hose, links=links)) for links in _LINKS}
-    by_links = {links: path_in_gust(cases[links], gust, _DEFAULT_RATE_HZ) for links in _LINKS}
-    by_rate = {rate: path_in_gust(cases[_DEFAULT_LINKS], gust, rate) for rate in _RATES_HZ if rate != _DEFAULT_RATE_HZ}
+    cases = {links: replace(case, hose=replace(case.hose, links=links)) for links in (*_LINKS, _FINEST_LINKS)}
+    by_links = {links: path_in_gust(cases[links], gust, _DEFAULT_RATE_HZ) for links in cases}
+    default = cases[_DEFAULT_LINKS]
+    others = [rate for rate in (*_RATES_HZ, _FINEST_RATE_HZ) if rate != _DEFAULT_RATE_HZ]
+    by_rate = {rate: path_in_gust(default, gust, rate) for rate in others}
     by_rate[_DEFAULT_RATE_HZ] = by_links[_DEFAULT_LINKS]
-    rows = _rows_by_links(cases, by_links)
-    rows += [
-        {
-            "case": f"{rate} Hz, {_DEFAULT_LINKS} links",
-            "ours": _motion(by_rate[rate], by_rate[_RATES_HZ[-1]]),
-            "reference": _rms(by_rate[_RATES_HZ[-1]]),
-        }
-        for rate in _RATES_HZ
-    ]
+    rows = _rows_by_links(cases, by_links) + _rows_by_rate(by_rate)
     if out is not None:
         _draw(rows, by_links, out / picture_name(ID))
     return {"id": ID, "source": _SOURCE, "rows": rows}
@@ -91,16 +86,26 @@ def reproduce(out: Path | None) -> dict[str, Any]:
 
 def _rows_by_links(cases: dict[int, HoseCase], paths: dict[int, Array]) -> list[dict[str, Any]]:
     shapes = {links: _shape_and_swing(case) for links, case in cases.items()}
-    most = max(cases)
-    place, tension = continuous_cable(cases[most])
+    place, tension = continuous_cable(cases[_FINEST_LINKS])
     cable = {"aft_m": float(place[-1, 0]), "below_m": float(place[-1, 1]), "root_tension_n": float(tension[0])}
     return [
         {
             "case": f"{links} links, {_DEFAULT_RATE_HZ} Hz",
-            "ours": {**shapes[links], **_motion(paths[links], paths[most])},
-            "reference": {**shapes[most], **cable, **_rms(paths[most])},
+            "ours": {**shapes[links], **_motion(paths[links], paths[_FINEST_LINKS])},
+            "reference": {**shapes[_FINEST_LINKS], **cable, **_rms(paths[_FINEST_LINKS])},
         }
-        for links in cases
+        for links in _LINKS
+    ]
+
+
+def _rows_by_rate(paths: dict[int, Array]) -> list[dict[str, Any]]:
+    return [
+        {
+            "case": f"{rate} Hz, {_DEFAULT_LINKS} links",
+            "ours": _motion(paths[rate], paths[_FINEST_RATE_HZ]),
+            "reference": _rms(paths[_FINEST_RATE_HZ]),
+        }
+        for rate in _RATES_HZ
     ]
 
 
@@ -140,11 +145,11 @@ def _draw(rows: list[dict[str, Any]], by_links: dict[int, Array], path: Path) ->
     left.set(xlabel="time [s]", ylabel="hose's end, lateral [m]", title="the same gust")
     left.legend(frameon=False, fontsize=8)
     errors = [row["ours"]["rms_from_finest_mm"] for row in rows]
-    middle.loglog(_LINKS[:-1], errors[: len(_LINKS) - 1], "o-")
-    middle.set(xlabel="links", ylabel="rms from 32 links [mm]", title=f"{_DEFAULT_RATE_HZ} Hz")
-    right.loglog(_RATES_HZ[:-1], errors[len(_LINKS) : -1], "o-")
-    right.set(xlabel="physics rate [Hz]", ylabel="rms from 4000 Hz [mm]", title=f"{_DEFAULT_LINKS} links")
-    for axes, ticks in (middle, _LINKS[:-1:2]), (right, _RATES_HZ[:-1]):
+    middle.loglog(_LINKS, errors[: len(_LINKS)], "o-")
+    middle.set(xlabel="links", ylabel=f"rms from {_FINEST_LINKS} links [mm]", title=f"{_DEFAULT_RATE_HZ} Hz")
+    right.loglog(_RATES_HZ, errors[len(_LINKS) :], "o-")
+    right.set(xlabel="physics rate [Hz]", ylabel=f"rms from {_FINEST_RATE_HZ} Hz [mm]", title=f"{_DEFAULT_LINKS} links")
+    for axes, ticks in (middle, _LINKS[::2]), (right, _RATES_HZ):
         axes.set_xticks(ticks, [str(tick) for tick in ticks])
         axes.set_xticks([], minor=True)
         axes.grid(which="both", lw=0.3)

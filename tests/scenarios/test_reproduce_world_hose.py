@@ -94,10 +94,12 @@ def test_gust_of_the_convergence_rides_the_air_and_has_the_spectrums_strength():
 def test_default_links_and_rate_are_within_a_millimetre_of_much_finer_ones(tmp_path, monkeypatch):
     monkeypatch.setattr(world_convergence, "_LINKS", (4, 18, 32))
     monkeypatch.setattr(world_convergence, "_RATES_HZ", (250, 1000, 2000))
+    monkeypatch.setattr(world_convergence, "_FINEST_RATE_HZ", 4000)
     monkeypatch.setattr(world_convergence, "_DURATION_S", 6.0)
     monkeypatch.setattr(world_convergence, "_BEFORE_S", 2.0)
     rows = _checked(world_convergence.reproduce(tmp_path), tmp_path, "world-convergence.png")
     off = {name: row["ours"]["rms_from_finest_mm"] for name, row in rows.items()}
+    assert len(off) == 6 and min(off.values()) > 0.01  # none is its own reference
     assert off["18 links, 1000 Hz"] < 1.0
     assert off["4 links, 1000 Hz"] > 5.0 * off["18 links, 1000 Hz"]
     assert off["250 Hz, 18 links"] > 2.0 * off["18 links, 1000 Hz"]
