@@ -1,8 +1,8 @@
 """Where the basket leads a probe that does not come in through its middle: capture, rim strike or miss.
 
 The receiver is driven straight ahead at a constant speed, its tip beside the drogue's axis by an offset in one of five
-directions from below to above, or with its nose raised or lowered. The drogue is its own mirror image, so that the other
-side is not fired at; the picture has it hollow. The referee says from the truth what came of it.
+directions from below to above, or with its nose raised or lowered. The drogue is its own mirror image, so that nothing
+is fired at the other side; the picture has it hollow. The referee says from the truth what came of it.
 
 In still air the drogue points 3.5 degrees up. A tip so far out that it passes beyond rim, tube and its own radius must
 miss:
