@@ -9,6 +9,32 @@ import pytest
 from dockair.errors import DockairError
 from dockair.scenarios.reproduce import fusion_closed_loop, registry
 
+#: What makes each reproduction, whole or on less of everything; whoever registers another one writes its test.
+MADE_BY = {
+    "test_reproduce.py": ("sensor/band", "sensor/contact-sheet"),
+    "test_reproduce_closed_loop.py": ("fusion/closed-loop",),
+    "test_reproduce_dop.py": ("dop/fig5", "dop/fig6", "dop/fig7", "dop/fig8"),
+    "test_reproduce_fusion.py": ("fusion/consistency", "fusion/outages"),
+    "test_reproduce_heading.py": ("heading/fig5-7",),
+    "test_reproduce_heading_flight.py": ("heading/racetrack",),
+    "test_reproduce_image.py": (
+        "ground/fig29", "image/fig10", "image/fig11", "image/fig16", "image/fig17", "image/fig18-20", "image/fig28",
+        "image/fig4-5", "image/fig8", "image/fig9",
+    ),
+    "test_reproduce_integrity.py": ("integrity/coasting", "integrity/slow-fault", "pose/flips", "pose/integrity"),
+    "test_measurement_light.py": ("measurement-model/light",),
+    "test_reproduce_pose.py": ("pose/divergence", "pose/efficiency", "pose/frontal", "pose/opencv"),
+    "test_reproduce_small.py": (
+        "guidance/foretelling", "guidance/path-plan", "heading/fig2", "heading/fig8", "heading/fig9-11",
+        "image/frames", "image/identification", "measurement-model/fit", "pose/fig21", "pose/fig22", "pose/fig23-25",
+        "pose/table3", "world/contact", "world/large-swing", "world/reel", "world/velocity-hold", "world/whip",
+    ),
+    "test_reproduce_world_air.py": ("world/bow-wave", "world/wake"),
+    "test_reproduce_world_gusts.py": ("world/excursions", "world/gusts"),
+    "test_reproduce_world_hose.py": ("world/convergence", "world/hose-checks", "world/static", "world/swing"),
+    "test_reproduce_world_receiver.py": ("world/receiver",),
+}  # fmt: skip
+
 
 @pytest.fixture(scope="module")
 def band():
@@ -28,6 +54,17 @@ def test_a_reproduction_has_the_printed_form_is_json_and_draws_one_picture(tmp_p
         assert row["reference"].keys() <= row["ours"].keys() and row["reference"]
     pictures = list((tmp_path / "new" / "folder").glob("*.png"))
     assert len(pictures) == 1 and cv2.imread(str(pictures[0])).std() > 10.0
+
+
+def test_every_reproduction_is_made_by_a_test():
+    listed = [wanted for made in MADE_BY.values() for wanted in made]
+    assert sorted(listed) == sorted(registry.ids())
+    for name, made in MADE_BY.items():
+        text = Path(__file__).with_name(name).read_text(encoding="utf-8")
+        for wanted in made:
+            function = registry._REPRODUCTIONS[wanted][1]
+            module = getattr(function, "func", function).__module__.rpartition(".")[2]
+            assert f'"{wanted}"' in text or module in text, (name, wanted)
 
 
 def test_an_unknown_id_is_refused_with_those_that_exist():

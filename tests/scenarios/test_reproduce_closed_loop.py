@@ -154,3 +154,20 @@ def test_a_flight_of_before_its_code_was_written_down_is_flown_again(flown, tmp_
     path.write_text(json.dumps(table), encoding="utf-8")
     fusion_closed_loop.reproduce(tmp_path, seeds=1)
     assert flown == [(0, 0)]
+
+
+@pytest.mark.slow
+def test_a_flight_has_a_row_of_every_used_frame_until_contact_is_gone_for(monkeypatch):
+    """On the measurement model from 4 m before the drogue, as long as the receiver waits behind it."""
+    monkeypatch.setattr(fusion_closed_loop, "_FROM_12_M", {"start.aft_m": 4.0})
+    monkeypatch.setattr(fusion_closed_loop, "_BEFORE_CONTACT", ("join_up", "pre_contact"))
+    flown = fusion_closed_loop.fly(fusion_closed_loop.CASES["as drawn"], 0)
+    frames = len(flown["time_s"])
+    assert frames > 20 and (np.diff(flown["time_s"]) > 0.0).all()
+    assert np.median(np.diff(flown["time_s"])) == pytest.approx(0.02, abs=1e-6)
+    settled = fusion_closed_loop._settled(flown)
+    assert settled.any()
+    for name in fusion_closed_loop._COLUMNS:
+        assert np.isfinite(flown[name][settled]).all(), name
+    assert (np.abs(flown["range_error_m"][settled]) < 0.05).all() and (flown["wrong"][settled] == 0.0).all()
+    assert 0.01 < flown["nees"][settled].mean() / 9.0 < 5.0
