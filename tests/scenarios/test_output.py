@@ -77,7 +77,7 @@ def test_where_no_window_can_be_opened_the_recording_is_shown_in_a_browser(
     folder = tmp_path / "of mine"
     folder.mkdir()
     (folder / "episode.rrd").touch()
-    show_result({"outcome": "contact", "scenario": "mine", "seed": 1}, None, folder)
+    show_result({"outcome": "contact", "scenario": "mine", "seed": 1}, folder)
     command = capsys.readouterr().out.splitlines()[-1].rpartition(": ")[2]
     assert shlex.split(command)[1:] == ["--bind", "127.0.0.1", *options, str(folder / "episode.rrd")]
 
@@ -105,7 +105,7 @@ def test_without_an_attempt_the_cause_is_told_with_what_the_navigation_said_last
     phases = [("join_up", 0.01, ""), ("pre_contact", 12.0, "at the stand-off point"), ("clear", 45.0, "time slot over")]
     timeline = [{"phase": phase, "begun_s": begun_s, "reason": reason} for phase, begun_s, reason in phases]
     result = {"outcome": "abort", "scenario": "mine", "seed": 1, "attempts": 0, "attempt_log": [], "duration_s": 45.01}
-    show_result(result | {"cause": "never_steady", "timeline": timeline}, None, tmp_path)
+    show_result(result | {"cause": "never_steady", "timeline": timeline}, tmp_path)
     lines = capsys.readouterr().out.splitlines()
     assert lines[1] == "no attempt after 45.0 s; never steady: time slot over in pre contact"
 
@@ -113,7 +113,7 @@ def test_without_an_attempt_the_cause_is_told_with_what_the_navigation_said_last
 def test_a_files_size_is_told_in_a_unit_that_shows_it(capsys, tmp_path):
     for count in (7, 2_345, 99_999, 100_000, 2_345_678):
         (tmp_path / f"{count}").write_bytes(bytes(count))
-    show_result({"outcome": "miss", "scenario": "mine", "seed": 1}, None, tmp_path)
+    show_result({"outcome": "miss", "scenario": "mine", "seed": 1}, tmp_path)
     sizes = {line.split()[0].rpartition("/")[2]: line.split()[1:] for line in capsys.readouterr().out.splitlines()[1:]}
     assert sizes == {
         "7": ["0.0", "kB"], "2345": ["2.3", "kB"], "99999": ["100.0", "kB"], "100000": ["0.1", "MB"],
