@@ -1063,11 +1063,14 @@ def test_a_pose_that_is_refused_for_millimetres_says_that_the_belief_is_off_by_n
 
 
 @pytest.mark.parametrize("speed_m_s", [1.0, 1.5])
-@pytest.mark.parametrize(("frames_after", "level_m"), [(3, 0.06), (4, 0.01), (6, 0.01), (8, 0.01)])
-def test_after_a_blow_the_claim_is_no_wider_than_the_beliefs_own(speed_m_s, frames_after, level_m):
+@pytest.mark.parametrize(
+    ("frames_after", "level_m", "ticks"), [(3, 0.06, 2), (4, 0.01, 12), (6, 0.01, 12), (8, 0.01, 12)]
+)
+def test_after_a_blow_the_claim_is_no_wider_than_the_beliefs_own(speed_m_s, frames_after, level_m, ticks):
     """The drogue is struck sideways, and the camera goes out after some frames more.
 
-    Of the level that is claimed first: 0.05 m while the belief still doubts its motion, 6 mm as soon as it does not.
+    The first level that is claimed then is 0.05 m while the belief still doubts its motion, 6 mm as soon as it does
+    not; so many ticks pass until it is as wide as the limit.
     """
 
     def path(t):
@@ -1085,7 +1088,7 @@ def test_after_a_blow_the_claim_is_no_wider_than_the_beliefs_own(speed_m_s, fram
             over.append(off_m / levels[-1])
         assert not solution.contact_usable or off_m < 0.04
     assert np.isfinite(sky.navigator._filter.doubted_s)
-    assert over and max(over) <= 1.0
+    assert len(over) >= ticks and max(over) <= 1.0
     assert levels[0] < level_m
 
 
