@@ -8,6 +8,7 @@ import pytest
 from scipy.stats import binom
 
 from dockair.nav import contact_watch
+from dockair.nav.integrity.fault_test import IntegritySettings
 from dockair.scenarios.reproduce import (
     faulted_frames,
     integrity_coasting,
@@ -75,7 +76,7 @@ def test_good_frames_are_blamed_at_the_set_rate(integrity):
 def test_levels_cover_the_errors_of_faulted_frames_and_are_no_empty_claim(integrity):
     for row in rows(integrity, "coverage"):
         ours = row["ours"]
-        allowed = binom.ppf(1.0 - LUCK / 10, ours["trials"], 1e-3)
+        allowed = binom.ppf(1.0 - LUCK / 10, ours["trials"], IntegritySettings().missed_detection)
         assert max(ours["range_exceeded"], ours["lateral_exceeded"], ours["attitude_exceeded"]) <= allowed
     (every,) = rows(integrity, "coverage, all")
     assert every["ours"]["without_levels"] <= 4
