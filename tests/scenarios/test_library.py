@@ -5,6 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from dockair.scenarios import build
+from dockair.scenarios.loop import Flight
 from dockair.scenarios.scenario_file import scenario_names, scenario_text
 from dockair.scenarios.schema import load_scenario
 
@@ -21,6 +23,20 @@ def test_a_scenario_claims_something_in_a_sentence_and_is_held_to_figures(name):
     assert scenario.claim and scenario.claim[0].islower() and not scenario.claim.endswith(".")
     accept = scenario.accept
     assert accept.unsafe_max == 0 and (accept.claims_rates or accept.outcome == "abort")  # then every flight has to
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", NAMES)
+def test_a_scenario_is_built_and_flies_to_its_first_frame(name, monkeypatch):
+    monkeypatch.setattr(build, "SETTLE_S", 0.0)  # of the hose, before the flight: most of the time that it takes
+    flight = Flight(load_scenario(name), 1)
+    try:
+        ticks = [flight.step() for _ in range(10)]
+    finally:
+        flight.close()
+    assert [tick.outcome for tick in ticks] == [None] * 10
+    assert any(tick.frame is not None for tick in ticks) == (flight.camera is not None)
+    assert ticks[-1].solution.phase in ("join_up", "pre_contact")
 
 
 @pytest.mark.parametrize("name", [name for name in NAMES if name not in HARMLESS])
