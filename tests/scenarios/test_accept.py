@@ -113,6 +113,11 @@ def test_where_no_rate_is_asked_for_every_flight_must_show_what_one_must():
     ]
 
 
+def test_a_flight_that_crashed_falls_short_of_any_figure_that_every_flight_must_show():
+    crashed = Accept(radial_offset_max_m=0.15).judge([row(0), row(1, **CRASHED)])
+    assert crashed == ["1 of 2 flights fall short: seeds 1"]
+
+
 def test_one_unsafe_flight_is_too_many_unless_the_scenario_grants_it_whatever_else_is_asked_for():
     flights = rows(99, 1, {"unsafe": "touch outside the rim, 0.27 m off the axis"})
     assert Accept().judge(flights) == ["unsafe in 1 of 100 flights, wanted at most 0: seeds 99"]
@@ -160,6 +165,7 @@ def test_one_flight_that_is_asked_to_be_clean_is_held_to_it():
     assert clean.shortfalls("contact", 0.14, 1.2) == []
     assert clean.shortfalls("contact", 0.24, 1.2) == ["radial offset 0.240 m, wanted 0 to 0.15"]
     assert clean.shortfalls("contact", 0.14, 2.7) == ["closure speed 2.700 m/s, wanted 0 to 2.6"]
+    assert Accept(clean_rate_min=1.0, outcome="timeout").shortfalls("timeout", None, None) == []  # asked for by name
 
 
 def test_a_median_of_no_contact_is_none():

@@ -270,6 +270,7 @@ def test_a_receiver_that_falls_away_has_departed_whatever_else_went_wrong(flight
     assert cause_of_flight([], fallen, "abort") == "departed"
     assert cause_of_flight([attempt(cause="gust")], fallen, "abort") == "departed"  # it departed after that attempt
     assert cause_of_flight([attempt(outcome="contact", cause="")], fallen, "abort") == ""
+    assert cause_of_flight([attempt(cause="diverged")], fallen, "diverged") == "diverged"  # as of the attempt itself
 
 
 def test_an_attempt_that_ended_before_the_departure_has_its_own_cause(flight):
