@@ -46,7 +46,8 @@ def _check_navigator(name: str) -> None:
     try:
         navigator_class_of(name)
     except DockairError as error:
-        raise error.at("navigation.navigator") from error
+        got = f"{name}: {error.got}"
+        raise DockairError("navigation.navigator", expected=error.expected, got=got) from error
 
 
 def _check_ring(ring: LedRing, drogue: DrogueParameters) -> None:

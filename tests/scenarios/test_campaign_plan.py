@@ -264,7 +264,7 @@ def test_every_packaged_plan_can_be_flown_and_says_what_for(name):
         ),
         (
             'scenarios = ["default"]\n[set]\n"navigation.navigator" = "no_such_module:Navigator"',
-            'navigation.navigator: expected an importable "module:Class", got "No module named',
+            'navigation.navigator: expected an importable "module:Class", got "no_such_module:Navigator: No module',
         ),
         (
             'scenarios = ["default"]\n[set]\n"navigation.navigator" = "dockair.messages:Mine"',

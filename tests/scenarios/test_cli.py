@@ -136,7 +136,7 @@ def flights(monkeypatch, tmp_path):
         (("campaign", "night"), "plan: expected a plan, got 'a scenario, for dockair fly night'"),
         (
             ("fly", "--set", "navigation.navigator=nosuch:Class"),
-            'navigation.navigator: expected an importable "module:Class", got "No module named \'nosuch\'"',
+            'navigation.navigator: expected an importable "module:Class", got "nosuch:Class: No module named \'nosuch',
         ),
     ],
 )

@@ -143,7 +143,7 @@ def test_result_json_has_the_documented_keys_and_no_others(hand_made, tmp_path):
         "schema_version", "scenario", "seed", "outcome", "success", "first_attempt", "cause", "unsafe", "attempts",
         "attempt_log", "contact", "hold", "disconnect", "fuel_kg", "collided_with", "sensing", "truth_navigation",
         "background", "nav", "heading", "frames", "duration_s", "real_time_factor", "wall_time_s", "versions",
-        "timeline", "nav_by_range", "out_dir",
+        "timeline", "nav_by_range", "shortfalls", "out_dir",
     ]  # fmt: skip
     page = (Path(__file__).parents[2] / "docs" / "results.md").read_text(encoding="utf-8")
     documented = page[page.index("## result.json") : page.index("## as_built.json")]
