@@ -48,7 +48,7 @@ class PhaseLimits:
     come_along_m: float = 0.2  # assumed: a drogue farther ahead of the tip than this, or behind it, is not held by it
     frames_stop_s: float = 0.1  # assumed: camera out; the belief of a drogue that is pushed runs off by 0.2 m in 0.17 s
     #: A hose is slack on which the drogue has turned by this much (`slack_hose`), ...
-    slack_tilt_rad: float = 0.087  # 5 degrees: of 75 taut hoses 3.2 at most, of 16 slack ones 6.7 at least
+    slack_tilt_rad: float = 0.087  # 5 degrees: of 93 taut hoses 3.3 at most, of 24 slack ones 6.0 at least
     slack_from_s: float = 0.15  # ... looked at from so long after contact ...
     slack_to_s: float = 0.35  # ... until then: half of the time that it takes to be torn off
     slack_before_s: float = 1.0  # and before contact over so long: a third of a swing

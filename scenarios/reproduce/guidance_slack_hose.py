@@ -1,0 +1,119 @@
+"""How far the drogue turns on the probe after contact: on hoses that the reel takes up, and on ones that it does not.
+
+Each flight is flown on measured LEDs up to half a second after contact, and the navigation's own belief of the drogue's
+axis is held against its mean of the second before, as `nav.guidance.slack_hose` does; the receiver's attitude, by which
+the axis is told in axes that do not turn, is the true one here.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from dockair.nav.guidance.phases import PhaseLimits
+from dockair.rotations import Array
+from dockair.scenarios.loop import Flight
+from dockair.scenarios.reproduce.reference import picture_name
+from dockair.scenarios.schema import load_scenario
+
+ID = "guidance/slack-hose"
+TITLE = "how far the drogue turns on the probe after contact, on hoses that are taken up and on slack ones"
+_SOURCE = "none: the two kinds of hose beside each other"
+#: Scenario -> how many seeds; the first is a dead reel.
+FLOWN: Mapping[str, int] = {"dead_reel_unnoticed": 8, "default": 4, "moderate_gusts": 8, "slow_set": 4, "racetrack": 2}
+_FIRST_SEED = 25867
+_OVERRIDES = {"camera.sensing": "measurements"}
+_AFTER_S, _LONGEST_S = 0.5, 90.0
+_SIZE_IN, _DPI = (7.0, 4.2), 110
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Contact:
+    """The drogue's axis about contact, and what guidance said of the hose."""
+
+    before: Array  #: (n, 3) of the second before, axes that do not turn
+    after: Array  #: (m, 3) from contact on, one a control tick
+    step_s: float  #: control period
+    told_slack: bool
+
+
+def reproduce(out: Path | None) -> dict[str, Any]:
+    """Fly; the angle over time in `out`."""
+    turned: dict[str, list[tuple[Array, Array]]] = {}
+    rows = []
+    for name, seeds in FLOWN.items():
+        flown = [contact(name, seed) for seed in range(_FIRST_SEED, _FIRST_SEED + seeds)]
+        contacts = [found for found in flown if found is not None]
+        turned[name] = [turn_deg(found) for found in contacts]
+        rows.append({"case": name, "ours": _figures(contacts), "reference": {}})
+    if out is not None:
+        _draw(turned, out / picture_name(ID))
+    return {"id": ID, "source": _SOURCE, "rows": rows}
+
+
+def contact(scenario: str, seed: int) -> Contact | None:
+    """Fly a seed until a little after its first contact; None if it makes none."""
+    loaded = load_scenario(scenario, _OVERRIDES)
+    step_s, flight = 1.0 / loaded.rates.control_hz, Flight(loaded, seed)
+    axes: list[Array] = []
+    start: int | None = None
+    told = False
+    try:
+        while (tick := flight.step()).outcome is None and tick.truth.time_s < _LONGEST_S:
+            axes.append(tick.truth.R_WB @ tick.solution.R_BD[:, 0])
+            told |= tick.solution.phase_reason == "hose is slack"
+            if start is None and tick.solution.phase == "contact":
+                start = len(axes) - 1
+            if start is not None and (len(axes) - start) * step_s > _AFTER_S:
+                break
+    finally:
+        flight.close()
+    if start is None:
+        return None
+    first = max(start - round(PhaseLimits().slack_before_s / step_s), 0)
+    return Contact(before=np.array(axes[first:start]), after=np.array(axes[start:]), step_s=step_s, told_slack=told)
+
+
+def turn_deg(found: Contact) -> tuple[Array, Array]:
+    """(m,) times since contact [s], and (m,) angles from the mean axis before it."""
+    rest = found.before.mean(axis=0)
+    sine = np.linalg.norm(np.cross(found.after, rest), axis=1)
+    times = found.step_s * np.arange(len(found.after))
+    return times, np.degrees(np.arctan2(sine, found.after @ rest))
+
+
+def tilt_deg(found: Contact) -> float:
+    """Eq. (1) of `nav.guidance.slack_hose`."""
+    limits, (times, angles) = PhaseLimits(), turn_deg(found)
+    looked_at = (times >= limits.slack_from_s) & (times <= limits.slack_to_s)
+    return float(np.median(angles[looked_at]))
+
+
+def _figures(contacts: list[Contact]) -> dict[str, float]:
+    tilts = [tilt_deg(found) for found in contacts]
+    if not tilts:
+        return {"contacts": 0}
+    return {
+        "contacts": len(contacts),
+        "least_deg": min(tilts),
+        "most_deg": max(tilts),
+        "told_slack": sum(found.told_slack for found in contacts),
+    }
+
+
+def _draw(turned: Mapping[str, list[tuple[Array, Array]]], path: Path) -> None:
+    from matplotlib.figure import Figure
+
+    limits = PhaseLimits()
+    figure = Figure(figsize=_SIZE_IN, dpi=_DPI, layout="constrained")
+    panel = figure.subplots()
+    panel.axvspan(limits.slack_from_s, limits.slack_to_s, color="0.92", label="looked at")
+    panel.axhline(np.degrees(limits.slack_tilt_rad), color="black", ls="--", lw=1.0, label="told slack: median above")
+    for k, (name, flights) in enumerate(turned.items()):
+        for number, (times, angles) in enumerate(flights):
+            panel.plot(times, angles, color=f"C{(3, 0, 1, 2, 4)[k % 5]}", lw=0.9, label=name if number == 0 else None)
+    panel.set(xlabel="since contact [s]", ylabel="drogue turned on the probe [deg]", ylim=(0.0, None))
+    panel.legend(frameon=False, fontsize=8, loc="upper right")
+    figure.savefig(path)
