@@ -62,10 +62,11 @@ class SlackHose:
             on_probe = abs(coupling[0]) <= limits.come_along_m and beside_m <= limits.rim_m
             if seen and on_probe and self._before:
                 self._tilts_rad.append(_angle_rad(along, np.sum(self._before, axis=0)))
-        elif self._contact_s > limits.slack_to_s:
+        elif self._contact_s > limits.slack_to_s and self._tilts_rad:
             looked_s = self._step_s * len(self._tilts_rad)
             enough = looked_s >= 0.5 * (limits.slack_to_s - limits.slack_from_s)
             self.is_slack = enough and float(np.median(self._tilts_rad)) > limits.slack_tilt_rad
+            self._tilts_rad.clear()
 
 
 def _angle_rad(a: Array, b: Array) -> float:
