@@ -12,7 +12,7 @@ Not modelled: where the hose is; how long it whips.
 """
 
 from dockair.nav.guidance.guidance_settings import GuidanceSettings
-from dockair.nav.guidance.phases import Phase, PhaseLimits, Situation, is_off_the_probe
+from dockair.nav.guidance.phases import Phase, PhaseLimits, Situation, is_off_the_probe, is_reached
 
 _ON_PROBE = (Phase.CONTACT, Phase.HOLD)
 _GOING_BACK = (Phase.DISCONNECT, Phase.BACK_OFF, Phase.BREAKAWAY)
@@ -42,9 +42,9 @@ class Evasion:
         if phase not in _GOING_BACK:
             self._was_held, self._left_s = False, 0.0
             return False
-        ends_hold = before in _ON_PROBE
-        self._was_held = self._was_held or ends_hold or _is_reached(self._limits, situation)
-        slips_off = is_off_the_probe(self._limits, situation)
+        ends_hold, coupling = before in _ON_PROBE, (situation.ahead_m, situation.beside_m)
+        self._was_held = self._was_held or ends_hold or is_reached(self._limits, *coupling)
+        slips_off = is_off_the_probe(self._limits, *coupling)
         self._slipped_off = slips_off if ends_hold else self._slipped_off and not _is_seen_ahead(situation)
         self._left_s = max(self._left_s - self._step_s, 0.0)
         slipped_unseen = self._slipped_off and _is_unseen(self._limits, situation)
@@ -53,11 +53,6 @@ class Evasion:
         if whips and not self.hose_has_whipped:
             self._left_s, self.hose_has_whipped = self._lasts_s, True
         return self._left_s > 0.0
-
-
-def _is_reached(limits: PhaseLimits, s: Situation) -> bool:
-    """By a receiver that had been called back already."""
-    return s.ahead_m <= limits.coupling_reached_m and not is_off_the_probe(limits, s)
 
 
 def _is_seen_ahead(s: Situation) -> bool:

@@ -136,14 +136,19 @@ def _beside(limits: PhaseLimits, s: Situation) -> bool:
     return s.entered_m > limits.rim_m
 
 
-def is_off_the_probe(limits: PhaseLimits, s: Situation) -> bool:
-    """Whether the coupling is believed to be elsewhere than at the tip."""
-    return abs(s.ahead_m) > limits.come_along_m or s.beside_m > limits.rim_m
+def is_off_the_probe(limits: PhaseLimits, ahead_m: float, beside_m: float) -> bool:
+    """Whether a coupling so far ahead of the tip, and beside the probe's line, is elsewhere than at the tip."""
+    return abs(ahead_m) > limits.come_along_m or beside_m > limits.rim_m
+
+
+def is_reached(limits: PhaseLimits, ahead_m: float, beside_m: float) -> bool:
+    """Whether the tip has come to it; a receiver that was called back may, too."""
+    return ahead_m <= limits.coupling_reached_m and not is_off_the_probe(limits, ahead_m, beside_m)
 
 
 def _left(limits: PhaseLimits, s: Situation) -> bool:
     """Off the probe, or lost. That the probe pushes it only frames tell; without them the belief passes through it."""
-    return (is_off_the_probe(limits, s) and not s.frames_stopped) or s.track_lost_s > limits.lost_s
+    return (is_off_the_probe(limits, s.ahead_m, s.beside_m) and not s.frames_stopped) or s.track_lost_s > limits.lost_s
 
 
 def _far_enough(limits: PhaseLimits, s: Situation) -> bool:

@@ -17,7 +17,7 @@ from collections import deque
 
 import numpy as np
 
-from dockair.nav.guidance.phases import Phase, PhaseLimits
+from dockair.nav.guidance.phases import Phase, PhaseLimits, is_off_the_probe, is_reached
 from dockair.rotations import Array
 
 _BEFORE = (Phase.JOIN_UP, Phase.PRE_CONTACT, Phase.APPROACH)
@@ -54,13 +54,11 @@ class SlackHose:
             if seen:
                 self._before.append(along)
             return
-        limits, beside_m = self._limits, float(np.hypot(coupling[1], coupling[2]))
-        reached = coupling[0] <= limits.coupling_reached_m and beside_m <= limits.rim_m
-        if self._contact_s == -np.inf and (phase is Phase.CONTACT or reached):
+        limits, ahead_m, beside_m = self._limits, float(coupling[0]), float(np.hypot(coupling[1], coupling[2]))
+        if self._contact_s == -np.inf and (phase is Phase.CONTACT or is_reached(limits, ahead_m, beside_m)):
             self._contact_s = 0.0
         if limits.slack_from_s <= self._contact_s <= limits.slack_to_s:
-            on_probe = abs(coupling[0]) <= limits.come_along_m and beside_m <= limits.rim_m
-            if seen and on_probe and self._before:
+            if seen and self._before and not is_off_the_probe(limits, ahead_m, beside_m):
                 self._tilts_rad.append(_angle_rad(along, np.sum(self._before, axis=0)))
         elif self._contact_s > limits.slack_to_s and self._tilts_rad:
             looked_s = self._step_s * len(self._tilts_rad)
