@@ -6,9 +6,10 @@ tear it off. With the drogue's axis a in axes that do not turn with the receiver
 
     tilt = median angle between a and its mean before contact                                             (1)
 
-of which the blow itself, which turns it on a taut hose, too, is the lesser part.
+over a while that is longer than a wave takes to turn it back. It is looked at from when the blow of contact, which
+turns it on a taut hose, too, is over; and for some time, for a slack hose may lie straight for a moment.
 
-Nothing is said where the drogue has not been seen on the probe for half of that time.
+Nothing is said where the drogue has not been seen on the probe for half of that while.
 
 Not modelled: a reel that takes up late or slowly; a coupling that does not let the drogue turn.
 """
@@ -35,7 +36,7 @@ class SlackHose:
         self._limits, self._step_s = limits, step_s
         self._before: deque[Array] = deque(maxlen=round(limits.slack_before_s / step_s))
         self._contact_s = -np.inf  # since contact; -inf before it
-        self._tilts_rad: list[float] = []
+        self._tilts_rad: deque[float] = deque(maxlen=round(limits.slack_over_s / step_s))  # NaN where not seen
         self.is_slack = False  #: nothing takes up the hose
 
     def step(self, phase: Phase, coupling: Array, along: Array, *, seen: bool) -> None:
@@ -57,14 +58,14 @@ class SlackHose:
         limits, ahead_m, beside_m = self._limits, float(coupling[0]), float(np.hypot(coupling[1], coupling[2]))
         if self._contact_s == -np.inf and (phase is Phase.CONTACT or is_reached(limits, ahead_m, beside_m)):
             self._contact_s = 0.0
-        if limits.slack_from_s <= self._contact_s <= limits.slack_to_s:
-            if seen and self._before and not is_off_the_probe(limits, ahead_m, beside_m):
-                self._tilts_rad.append(_angle_rad(along, np.sum(self._before, axis=0)))
-        elif self._contact_s > limits.slack_to_s and self._tilts_rad:
-            looked_s = self._step_s * len(self._tilts_rad)
-            enough = looked_s >= 0.5 * (limits.slack_to_s - limits.slack_from_s)
-            self.is_slack = enough and float(np.median(self._tilts_rad)) > limits.slack_tilt_rad
-            self._tilts_rad.clear()
+        if self.is_slack or not limits.slack_from_s <= self._contact_s <= limits.slack_to_s:
+            return
+        is_seen = seen and bool(self._before) and not is_off_the_probe(limits, ahead_m, beside_m)
+        self._tilts_rad.append(_angle_rad(along, np.sum(self._before, axis=0)) if is_seen else np.nan)
+        known = [tilt for tilt in self._tilts_rad if np.isfinite(tilt)]
+        full = len(self._tilts_rad) == self._tilts_rad.maxlen
+        if full and len(known) >= 0.5 * len(self._tilts_rad):
+            self.is_slack = float(np.median(known)) > limits.slack_tilt_rad
 
 
 def _angle_rad(a: Array, b: Array) -> float:

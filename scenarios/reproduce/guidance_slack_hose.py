@@ -1,8 +1,8 @@
 """How far the drogue turns on the probe after contact: on hoses that the reel takes up, and on ones that it does not.
 
-Each flight is flown on measured LEDs up to half a second after contact, and the navigation's own belief of the drogue's
-axis is held against its mean of the second before, as `nav.guidance.slack_hose` does; the receiver's attitude, by which
-the axis is told in axes that do not turn, is the true one here.
+Each flight is flown on measured LEDs until little more than half a second after contact, and the navigation's own
+belief of the drogue's axis is held against its mean of the second before, as `nav.guidance.slack_hose` does; the
+receiver's attitude, by which the axis is told in axes that do not turn, is the true one here.
 """
 
 from collections.abc import Mapping
@@ -25,7 +25,7 @@ _SOURCE = "none: the two kinds of hose beside each other"
 FLOWN: Mapping[str, int] = {"dead_reel_unnoticed": 8, "default": 4, "moderate_gusts": 8, "slow_set": 4, "racetrack": 2}
 _FIRST_SEED = 25867
 _OVERRIDES = {"camera.sensing": "measurements"}
-_AFTER_S, _LONGEST_S = 0.5, 90.0
+_AFTER_S, _LONGEST_S = 0.6, 90.0
 _SIZE_IN, _DPI = (7.0, 4.2), 110
 
 
@@ -85,10 +85,11 @@ def turn_deg(found: Contact) -> tuple[Array, Array]:
 
 
 def tilt_deg(found: Contact) -> float:
-    """Eq. (1) of `nav.guidance.slack_hose`."""
+    """Eq. (1) of `nav.guidance.slack_hose`, the greatest."""
     limits, (times, angles) = PhaseLimits(), turn_deg(found)
     looked_at = (times >= limits.slack_from_s) & (times <= limits.slack_to_s)
-    return float(np.median(angles[looked_at]))
+    over = round(limits.slack_over_s / found.step_s)
+    return float(np.median(np.lib.stride_tricks.sliding_window_view(angles[looked_at], over), axis=1).max())
 
 
 def _figures(contacts: list[Contact]) -> dict[str, float]:
