@@ -48,10 +48,10 @@ class PhaseLimits:
     come_along_m: float = 0.2  # assumed: a drogue farther ahead of the tip than this, or behind it, is not held by it
     frames_stop_s: float = 0.1  # assumed: camera out; the belief of a drogue that is pushed runs off by 0.2 m in 0.17 s
     #: A hose is slack on which the drogue has turned by this much (`slack_hose`), ...
-    slack_tilt_rad: float = 0.094  # 5.4 degrees: of 165 taut hoses 4.3 at most, of 68 slack ones 6.2 at least
-    slack_over_s: float = 0.12  # ... over so long, a frame or two at least, ...
+    slack_tilt_rad: float = 0.087  # 5 degrees: of 90 taut hoses 4.2 at most, of 52 slack ones 5.9 at least
     slack_from_s: float = 0.20  # ... looked at from so long after contact, when its blow is over, ...
-    slack_to_s: float = 0.5  # ... until then: gusts and the way in turn a taut hose, too, from 0.6 s on
+    slack_over_s: float = 0.12  # ... for so long at least, ...
+    slack_to_s: float = 0.5  # ... until then: half of the time that it takes to be torn off
     slack_before_s: float = 1.0  # and before contact over so long: a third of a swing
     take_in_m: float = 1.5  # inside the refuelling range 0.5-6 m (KDC-10 procedures)
     taken_in: float = 0.9  # of that way when holding begins: the receiver comes to rest on the remaining tenth

@@ -2,14 +2,14 @@
 
 A hose that is taken up stays taut, and holds the drogue along itself. One that is not is slack within a tenth of a
 second: the drogue, on the probe, turns with every wave that the blow of contact sends up and down it, long before they
-tear it off. With the drogue's axis a in axes that do not turn with the receiver, looked at for a time after contact,
+tear it off. With the drogue's axis a in axes that do not turn with the receiver,
 
     tilt = median angle between a and its mean before contact                                             (1)
 
-over a while that is longer than a wave takes to turn it back. It is looked at from when the blow of contact, which
-turns it on a taut hose, too, is over; and for some time, for a slack hose may lie straight for a moment.
+since the blow of contact, which turns the drogue on a taut hose, too, is over. It is asked for some time, for a slack
+hose may lie straight for a moment between two waves.
 
-Nothing is said where the drogue has not been seen on the probe for half of that while.
+Nothing is said where the drogue has not been seen on the probe for half of that time.
 
 Not modelled: a reel that takes up late or slowly; a coupling that does not let the drogue turn.
 """
@@ -36,7 +36,7 @@ class SlackHose:
         self._limits, self._step_s = limits, step_s
         self._before: deque[Array] = deque(maxlen=round(limits.slack_before_s / step_s))
         self._contact_s = -np.inf  # since contact; -inf before it
-        self._tilts_rad: deque[float] = deque(maxlen=round(limits.slack_over_s / step_s))  # NaN where not seen
+        self._tilts_rad: list[float] = []  # since the blow was over, where it was seen on the probe
         self.is_slack = False  #: nothing takes up the hose
 
     def step(self, phase: Phase, coupling: Array, along: Array, *, seen: bool) -> None:
@@ -60,12 +60,11 @@ class SlackHose:
             self._contact_s = 0.0
         if self.is_slack or not limits.slack_from_s <= self._contact_s <= limits.slack_to_s:
             return
-        is_seen = seen and bool(self._before) and not is_off_the_probe(limits, ahead_m, beside_m)
-        self._tilts_rad.append(_angle_rad(along, np.sum(self._before, axis=0)) if is_seen else np.nan)
-        known = [tilt for tilt in self._tilts_rad if np.isfinite(tilt)]
-        full = len(self._tilts_rad) == self._tilts_rad.maxlen
-        if full and len(known) >= 0.5 * len(self._tilts_rad):
-            self.is_slack = float(np.median(known)) > limits.slack_tilt_rad
+        if seen and self._before and not is_off_the_probe(limits, ahead_m, beside_m):
+            self._tilts_rad.append(_angle_rad(along, np.sum(self._before, axis=0)))
+        looked = round((self._contact_s - limits.slack_from_s) / self._step_s) + 1
+        if looked >= round(limits.slack_over_s / self._step_s) and len(self._tilts_rad) >= 0.5 * looked:
+            self.is_slack = float(np.median(self._tilts_rad)) > limits.slack_tilt_rad
 
 
 def _angle_rad(a: Array, b: Array) -> float:

@@ -87,9 +87,9 @@ def turn_deg(found: Contact) -> tuple[Array, Array]:
 def tilt_deg(found: Contact) -> float:
     """Eq. (1) of `nav.guidance.slack_hose`, the greatest."""
     limits, (times, angles) = PhaseLimits(), turn_deg(found)
-    looked_at = (times >= limits.slack_from_s) & (times <= limits.slack_to_s)
-    over = round(limits.slack_over_s / found.step_s)
-    return float(np.median(np.lib.stride_tricks.sliding_window_view(angles[looked_at], over), axis=1).max())
+    looked_at = angles[(times >= limits.slack_from_s) & (times <= limits.slack_to_s)]
+    least = round(limits.slack_over_s / found.step_s)
+    return float(max(np.median(looked_at[:n]) for n in range(least, len(looked_at) + 1)))
 
 
 def _figures(contacts: list[Contact]) -> dict[str, float]:
