@@ -43,6 +43,7 @@ from dockair.sim.as_built import AsBuilt
 from dockair.sim.camera.defects import Defects
 from dockair.sim.camera.electronics import OUTPUT_BITS, output_black, output_gain
 from dockair.sim.camera.exposure import ExposureControl
+from dockair.sim.camera.image_point import image_points
 from dockair.sim.camera.obstacles import Obstacles
 from dockair.sim.camera.occlusion import hidden
 from dockair.sim.camera.point_spread import blur_px
@@ -235,7 +236,7 @@ class MeasuredLeds:
         intensity = self._as_built.led_intensity_w_sr * self._faults.led_factors(time_s, exposure_s)
         axis_C = (R_WD @ _LED_AXIS_D) @ R_WC
         electrons = led_electrons(self._response, leds, intensity, p_C, axis_C, exposure_s, self._extinction_1_m)
-        pixels = camera.pixels_from_points(p_C)
+        pixels = image_points(camera, p_C)
         last = np.array([camera.width_px - 1, camera.height_px - 1])
         clear = ((pixels >= 0.0) & (pixels <= last)).all(axis=1)  # not where it is NaN
         clear &= ~hidden(self._obstacles, data, p_WC, leds_W, leds.occlusion_clearance_m)

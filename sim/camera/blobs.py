@@ -3,6 +3,9 @@
 A source of side a at depth x is imaged f a/x wide. Up to WIDE_PX it is spread by the lens [optics], beyond that it is
 a patch of its own width [patches]. Whether something hides a source is asked only of those whose light would reach the
 window: rays cost more than the rest, and what does not reach it leaves every pixel as it is.
+
+Far beside the field the distortion is that of its margin [image_point]: the polynomial would fold light from 76 degrees
+off the axis into the frame.
 """
 
 import math
@@ -15,6 +18,7 @@ from numpy.typing import NDArray
 from dockair.calibration import Camera
 from dockair.rotations import Array
 from dockair.sim.camera.dirt import Dirt
+from dockair.sim.camera.image_point import margin_slope
 from dockair.sim.camera.optics import PointSpread
 from dockair.sim.camera.patches import add_patches
 from dockair.sim.camera.point_sources import WIDE_PX, Sources
@@ -24,7 +28,8 @@ _FAINTEST_E = 0.5  # a whole blob with fewer electrons is left out
 _WIDE = -1.0  # in the place of a size: drawn first, without the lens's blur
 _SQUARE_SIGMAS = float(np.sqrt(12.0))  # side of a square over its standard deviation
 
-Lens = tuple[float, float, float, float, float, float, float, float]  # f, c_u, c_v [px], k1, k2, p1, p2, k3
+#: f, c_u, c_v [px], k1, k2, p1, p2, k3, and the slope off the axis up to which the distortion's polynomial holds.
+Lens = tuple[float, float, float, float, float, float, float, float, float]
 
 
 class Blobs:
@@ -37,8 +42,7 @@ class Blobs:
 
     def __init__(self, camera: Camera, spread: PointSpread) -> None:
         self._camera, self._spread = camera, spread
-        u, v = camera.principal_point_px
-        self._lens: Lens = camera.focal_length_px, float(u), float(v), *(camera.distortion or (0.0,) * 5)
+        self._lens = _lens(camera)
 
     def add(
         self,
@@ -78,9 +82,15 @@ class Blobs:
                 spread.splat(image, start, pixels, electrons, sources.p_C[:, 0], size_m, smear, of)
 
 
+def _lens(camera: Camera) -> Lens:
+    (u, v), distortion = camera.principal_point_px, camera.distortion
+    margin = math.inf if distortion is None else margin_slope(camera)
+    return camera.focal_length_px, float(u), float(v), *(distortion or (0.0,) * 5), margin
+
+
 @njit(cache=True)
 def _image(p_C: Array, way_C: Array, size_m: Array, lens: Lens, pixels: Array, smear: Array, width_px: Array) -> None:
-    """Fill (n, 2) pixels of points, their motion, and (n,) widths: `Camera.pixels_from_points`, compiled."""
+    """Fill (n, 2) pixels of points, their motion, and (n,) widths: `image_points`, compiled."""
     for i in range(len(p_C)):
         x, y, z = p_C[i]
         dx, dy, dz = 0.5 * way_C[i, 0], 0.5 * way_C[i, 1], 0.5 * way_C[i, 2]
@@ -100,14 +110,18 @@ def _sizes(near: NDArray[np.int64], size_m: Array, width_px: Array, out: Array) 
 
 @njit(cache=True)
 def _pixel(x: float, y: float, z: float, lens: Lens) -> tuple[float, float]:
-    """[calibration, eq 1]; NaN behind the lens."""
+    """[calibration, eq 1], far off the axis [image_point, eq 1]; NaN behind the lens."""
     if x <= 0.0:
         return math.nan, math.nan
-    f, c_u, c_v, k1, k2, p1, p2, k3 = lens
+    f, c_u, c_v, k1, k2, p1, p2, k3, margin = lens
     a, b = -y / x, -z / x
-    r2 = a * a + b * b
+    r2, beyond_a, beyond_b = a * a + b * b, 0.0, 0.0
+    if r2 > margin * margin:
+        part = margin / math.sqrt(r2)
+        beyond_a, beyond_b = a - part * a, b - part * b
+        a, b, r2 = part * a, part * b, margin * margin
     s = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
     return (
-        c_u + f * (a * s + 2 * p1 * a * b + p2 * (r2 + 2 * a * a)),
-        c_v + f * (b * s + p1 * (r2 + 2 * b * b) + 2 * p2 * a * b),
+        c_u + f * (a * s + 2 * p1 * a * b + p2 * (r2 + 2 * a * a) + beyond_a),
+        c_v + f * (b * s + p1 * (r2 + 2 * b * b) + 2 * p2 * a * b + beyond_b),
     )

@@ -31,6 +31,7 @@ from dockair.sim.camera.electronics import digitise, output_gain
 from dockair.sim.camera.exposure import ExposureControl
 from dockair.sim.camera.fixed_pattern import FixedPattern
 from dockair.sim.camera.glare import Glare
+from dockair.sim.camera.image_point import image_points
 from dockair.sim.camera.normals_ahead import NormalsAhead
 from dockair.sim.camera.optics import PointSpread
 from dockair.sim.camera.point_sources import PointSources
@@ -285,7 +286,7 @@ class NearInfraredCamera:
     def led_pixels(self, data: mujoco.MjData) -> Array:
         """(n, 2) where the lens puts the LEDs on the sensor, hidden or not [px]: truth, for logs and tests."""
         R_WC, p_WC = self.pose(data)
-        return self._as_built.camera.pixels_from_points((self._sources.leds_W(data) - p_WC) @ R_WC)
+        return image_points(self._as_built.camera, (self._sources.leds_W(data) - p_WC) @ R_WC)
 
     def visible_leds(self, data: mujoco.MjData) -> NDArray[np.bool_]:
         """(n,) which LEDs nothing hides from the lens: truth, for logs and tests. Outside the picture counts too."""

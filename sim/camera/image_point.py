@@ -31,16 +31,24 @@ def image_point(camera: Camera, direction_C: Array) -> Array:
     f, c = camera.focal_length_px, np.array(camera.principal_point_px)
     if camera.distortion is None:
         return np.asarray(c + f * ab)
-    inner = ab * min(1.0, _margin(camera) / max(math.hypot(*ab), 1e-12))
+    inner = ab * min(1.0, margin_slope(camera) / max(math.hypot(*ab), 1e-12))
     return np.asarray(camera.pixels_from_slopes(inner[np.newaxis])[0] + f * (ab - inner))
+
+
+def image_points(camera: Camera, p_C: Array) -> Array:
+    """(n, 2) pixels (u, v) of points p_C (n, 3) [m], camera axes, Eq. (1); NaN where x <= 0."""
+    pixels, slopes = camera.pixels_from_points(p_C), np.hypot(p_C[:, 1], p_C[:, 2])
+    for i in np.flatnonzero((p_C[:, 0] > 0.0) & (slopes > margin_slope(camera) * p_C[:, 0])):
+        pixels[i] = image_point(camera, p_C[i])
+    return pixels
 
 
 def in_field(camera: Camera, direction_C: Array) -> bool:
     """Whether the distortion's polynomial holds for a direction (3,): on the sensor or not far beside it."""
-    return bool(math.hypot(*direction_C[1:]) <= _margin(camera) * direction_C[0])
+    return bool(math.hypot(*direction_C[1:]) <= margin_slope(camera) * direction_C[0])
 
 
-def _margin(camera: Camera) -> float:
+def margin_slope(camera: Camera) -> float:
     """Slope m: of the array's farthest corner, distortion left out, and some more."""
     (u, v), width, height = camera.principal_point_px, camera.width_px - 1.0, camera.height_px - 1.0
     return _MARGIN * math.hypot(max(u, width - u), max(v, height - v)) / camera.focal_length_px

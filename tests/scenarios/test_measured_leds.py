@@ -57,10 +57,10 @@ class Stand:
         )  # fmt: skip
         self.put(7.0)
 
-    def put(self, depth_m: float, board_before: int | None = None) -> None:
-        """Put the drogue ahead of the lens, the board half-way to an LED."""
+    def put(self, depth_m: float, board_before: int | None = None, side_m: float = 0.1) -> None:
+        """Put the drogue ahead of the lens and so far to the left, the board half-way to an LED."""
         R_WC, p_WC = self.built.mounting.R_BC, self.built.mounting.p_BC
-        self.data.mocap_pos[1] = p_WC + R_WC @ np.array([depth_m, 0.1, -0.05])
+        self.data.mocap_pos[1] = p_WC + R_WC @ np.array([depth_m, side_m, -0.05])
         self.data.mocap_pos[2] = [0.0, 0.0, 99.0]
         if board_before is not None:
             led = self.data.mocap_pos[1] + self.built.ring_positions_D[board_before]
@@ -92,6 +92,21 @@ def test_a_board_before_an_led_hides_that_one_alone():
     stand = Stand()
     stand.put(7.0, board_before=3)
     assert tuple(stand.look().led_numbers) == (0, 1, 2, 4, 5, 6, 7)
+
+
+def test_leds_beside_the_lens_are_not_on_the_sensor_though_its_polynomial_would_fold_them_into_the_frame():
+    stand = Stand()
+    k1, k2, p1, p2, k3 = stand.built.camera.distortion
+    stand.built = replace(stand.built, camera=replace(stand.built.camera, distortion=(k1, -0.004, p1, p2, k3)))
+    stand.leds._as_built = stand.built
+    folded = 0
+    for side_m in np.arange(0.7, 1.1, 0.01):
+        stand.put(0.2, side_m=side_m)
+        camera, view = stand.built.camera, stand.leds.view(stand.data, 1.0, SHEETS.exposure.exposure_s)
+        size = camera.width_px - 1.0, camera.height_px - 1.0
+        folded += int(((stand.true_px() > 0.0) & (stand.true_px() < size)).all(axis=1).any())
+        assert not view.clear.any()
+    assert folded > 0
 
 
 def test_the_stated_sigma_is_that_of_photons_on_a_gaussian():

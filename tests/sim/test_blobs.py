@@ -8,9 +8,10 @@ import pytest
 from numpy.typing import NDArray
 
 from dockair.calibration import Camera
-from dockair.sim.camera.blobs import Blobs, _image
+from dockair.sim.camera.blobs import Blobs, _image, _lens
 from dockair.sim.camera.coarse_grid import CoarseGrid, nodes_around
 from dockair.sim.camera.dirt import Dirt
+from dockair.sim.camera.image_point import image_points
 from dockair.sim.camera.lobes import ROW
 from dockair.sim.camera.optics import PointSpread
 from dockair.sim.camera.patches import add_patches
@@ -19,6 +20,7 @@ from dockair.sim.camera.sheets import CameraSheets
 
 SHEETS = CameraSheets.load()
 BENT = (-0.2, 0.05, 1e-3, -5e-4, 0.01)
+FOLDING = (1e-3, -3.9e-3, 1e-5, -4e-5, 0.0)  # the polynomial brings light from 76 degrees off the axis into the frame
 CAMERA = Camera(
     focal_length_m=0.016, pixel_pitch_m=5.5e-6, width_px=2048, height_px=1088, principal_point_px=(1020.0, 550.0)
 )
@@ -55,7 +57,7 @@ def _all_seen(which: NDArray[np.intp]) -> NDArray[np.bool_]:
 def test_a_points_pixel_and_motion_are_those_of_the_calibrations_formula(distortion: Any) -> None:
     """To 1e-9 px; a place behind the lens has no pixel."""
     camera = replace(CAMERA, distortion=distortion)
-    lens = camera.focal_length_px, 1020.0, 550.0, *(distortion or (0.0,) * 5)
+    lens = _lens(camera)
     p, way = np.random.default_rng(1).uniform([1.0, -0.3, -0.2], [9.0, 0.3, 0.2], (200, 3)), np.full((200, 3), 0.01)
     p[:10, 0] *= -1.0
     pixels, smear, width = np.empty((200, 2)), np.empty((200, 2)), np.empty(200)
@@ -65,6 +67,36 @@ def test_a_points_pixel_and_motion_are_those_of_the_calibrations_formula(distort
     np.testing.assert_allclose(smear, moved, rtol=0.0, atol=1e-9)
     np.testing.assert_allclose(width[10:], 0.1 * camera.focal_length_px / p[10:, 0])
     assert np.isnan(pixels[:10]).all()
+
+
+def _beside(slope: float, about_rad: Any) -> NDArray[np.float64]:
+    """(n, 3) points 0.2 m ahead of the lens and `slope` times as far beside its axis."""
+    about = np.atleast_1d(about_rad)
+    return 0.2 * np.column_stack([np.ones(len(about)), slope * np.cos(about), slope * np.sin(about)])
+
+
+@pytest.mark.parametrize("distortion", [None, FOLDING])
+def test_far_off_the_axis_too_a_points_pixel_is_the_lenss(distortion: Any) -> None:
+    camera = replace(CAMERA, distortion=distortion)
+    p = np.vstack([_beside(slope, np.linspace(0.0, 6.0, 9)) for slope in (0.3, 0.5, 0.6, 2.0, 4.0, 30.0)])
+    pixels, smear, width = np.empty((len(p), 2)), np.empty((len(p), 2)), np.empty(len(p))
+    _image(p, np.zeros_like(p), np.zeros(len(p)), _lens(camera), pixels, smear, width)
+    np.testing.assert_allclose(pixels, image_points(camera, p), rtol=0.0, atol=1e-8)
+
+
+def test_no_light_from_far_beside_the_axis_is_folded_into_the_frame() -> None:
+    """The probe's mast, 76 degrees off the axis and near, glints fifteen times as bright as an LED at 10 m."""
+    camera = replace(CAMERA, distortion=FOLDING)
+    p = np.vstack([_beside(slope, np.linspace(0.0, 6.2, 40)) for slope in np.arange(3.7, 4.3, 0.02)])
+    u, v = camera.pixels_from_points(p).T
+    assert ((u > 0.0) & (u < 2047.0) & (v > 0.0) & (v < 1087.0)).any()  # what the polynomial alone would show
+    sources = Sources(
+        p_C=p, electrons=np.full(len(p), 1.5e5), size_m=np.full(len(p), 2e-3), way_C_m=np.zeros_like(p),
+        patches_W=np.zeros((len(p), ROW)),
+    )  # fmt: skip
+    image = np.zeros((1088, 2048), dtype=np.float32)
+    Blobs(camera, _spread(camera)).add(image, (0, 0), sources, None, _all_seen)
+    assert not image.any()
 
 
 @pytest.mark.parametrize("seed", range(4))

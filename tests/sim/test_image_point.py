@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dockair.calibration import Camera
-from dockair.sim.camera.image_point import image_point, in_field
+from dockair.sim.camera.image_point import image_point, image_points, in_field
 
 # In the field it moves light by less than two pixels; from 81 degrees off the axis it would bring it into the frame
 FOLDING = replace(Camera(), distortion=(-4.2e-4, -7.7e-4, 0.0, 0.0, 0.0))
@@ -34,6 +34,14 @@ def test_light_from_far_beside_the_axis_stays_far_beside_the_sensor() -> None:
             off_px = np.hypot(*(image_point(FOLDING, direction) - FOLDING.principal_point_px))
             assert off_px == pytest.approx(FOLDING.focal_length_px * np.tan(np.deg2rad(angle_deg)), rel=0.01)
     assert folded > 0  # what the polynomial alone would have shown
+
+
+@pytest.mark.parametrize("camera", [Camera(), FOLDING], ids=["pinhole", "distorted"])
+def test_many_points_are_imaged_as_each_by_itself(camera: Camera) -> None:
+    ahead = 3.0 * np.array([_off_axis(angle, 4.0 * angle) for angle in (0.0, 10.0, 25.0, 30.0, 60.0, 81.0, 89.0)])
+    pixels = image_points(camera, np.vstack([ahead, -ahead]))
+    np.testing.assert_array_equal(pixels[:7], [image_point(camera, p) for p in ahead])
+    assert np.isnan(pixels[7:]).all()
 
 
 def test_the_margin_is_no_step() -> None:
