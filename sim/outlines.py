@@ -21,7 +21,8 @@ from dockair.rotations import Array, matrix_from_yaw_pitch_roll, quaternion_from
 Point = tuple[float, float, float]
 Pod = Literal["centreline", "left_wing", "right_wing"]  #: the unit whose hose is out
 
-NOSE_BEHIND_TIP_M = 1.2  #: where the nose ends, behind the probe's tip: the boom must clear the basket
+_NOSE_BEHIND_TIP_M = 1.2  # where the nose ends, behind the probe's tip: the boom must clear the basket
+_SHORTEST_NOSE_M = 2.3  # ahead of the centre of gravity; with less the fuselage ahead of the wing has no length
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -127,12 +128,26 @@ def receiver_pieces(mounting: Mounting, outline: str = "fighter") -> list[Piece]
     """Outline of the receiver in body axes B, without its probe: "fighter" or "unmanned".
 
     Raises:
-        DockairError: another outline.
+        DockairError: another outline; no room for a nose.
     """
     kinds = {"fighter": _fighter, "unmanned": _unmanned}
     if outline not in kinds:
         raise DockairError("outline", expected="a receiver's outline", got=outline, exists=sorted(kinds))
-    return kinds[outline](float(mounting.p_BP[0]) - NOSE_BEHIND_TIP_M)
+    return kinds[outline](nose_x_m(mounting))
+
+
+def nose_x_m(mounting: Mounting) -> float:
+    """Where the receiver's nose ends, ahead of its centre of gravity [m].
+
+    Raises:
+        DockairError: a probe's tip so far aft that there is no room for a nose.
+    """
+    nose_x = float(mounting.p_BP[0]) - _NOSE_BEHIND_TIP_M
+    if not nose_x > _SHORTEST_NOSE_M:
+        ahead_m = _NOSE_BEHIND_TIP_M + _SHORTEST_NOSE_M
+        expected = f"a tip more than {ahead_m:g} m ahead of the centre of gravity"
+        raise DockairError("mounting.probe_tip_m", expected=expected, got=np.asarray(mounting.p_BP).tolist())
+    return nose_x
 
 
 def _fighter(nose_x: float) -> list[Piece]:
@@ -140,7 +155,7 @@ def _fighter(nose_x: float) -> list[Piece]:
     return [
         Piece("fuselage_middle", "capsule", (1.6, 0.0, -0.1), (0.62, 0.0, 0.0), to=(-4.6, 0.0, -0.1)),
         # Three ellipsoids, slender toward the tip, so that the camera beside the nose looks past it
-        Piece("fuselage_front", "ellipsoid", (1.4, 0.0, -0.05), (nose_x - 2.3, 0.52, 0.52)),
+        Piece("fuselage_front", "ellipsoid", (1.4, 0.0, -0.05), (nose_x - _SHORTEST_NOSE_M, 0.52, 0.52)),
         Piece("fuselage_nose", "ellipsoid", (nose_x - 1.6, 0.0, -0.05), (1.6, 0.26, 0.26)),
         Piece("fuselage_intake", "ellipsoid", (0.6, 0.0, -0.75), (2.2, 0.45, 0.42)),
         Piece("canopy", "ellipsoid", (1.1, 0.0, 0.42), (1.5, 0.36, 0.5)),

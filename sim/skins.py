@@ -18,7 +18,7 @@ from dockair.calibration import Mounting
 from dockair.errors import DockairError
 from dockair.rotations import Array
 from dockair.sim.lofts import Mesh, body, mirrored, surface
-from dockair.sim.outlines import NOSE_BEHIND_TIP_M, TankerParameters
+from dockair.sim.outlines import TankerParameters, nose_x_m
 
 _FULL = 1.0
 _NEAREST = 4  # corners whose mean height is that of the part above
@@ -60,10 +60,10 @@ def receiver_skins(mounting: Mounting, outline: str = "fighter") -> list[Skin]:
         outline: name of its table.
 
     Raises:
-        DockairError: no such table.
+        DockairError: no such table; no room for a nose.
     """
     table = _table(outline)
-    stretch = (float(mounting.p_BP[0]) - NOSE_BEHIND_TIP_M) / table["reference"]["nose_x_m"]
+    stretch = nose_x_m(mounting) / table["reference"]["nose_x_m"]
     skins = []
     for part in table["body"]:
         stations = np.array(part["stations"])

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from dockair.errors import DockairError
 from dockair.rotations import Array
 from dockair.sim.aircraft.flight_path import FlightPathParameters
 from dockair.sim.aircraft.own_sensors import OwnSensorsParameters
@@ -12,7 +13,11 @@ from dockair.sim.aircraft.regulator import Swing, Tolerances
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class FlightControlParameters:
-    """Sheet `flight_control`."""
+    """Sheet `flight_control`.
+
+    Raises:
+        DockairError: swings that would be cut whole before they begin to be.
+    """
 
     velocity_tolerance_m_s: Array  #: (3,) forward, left, up
     integral_tolerance_m: Array  #: (3,)
@@ -58,6 +63,12 @@ class FlightControlParameters:
     airspeed_sigma_m_s: float
     inertial_velocity_sigma_m_s: float
     inertial_velocity_time_s: float
+
+    def __post_init__(self) -> None:
+        begins, whole = self.increment_bank_rad
+        if not begins < whole:
+            where, expected = "flight_control.increment_bank_rad", "two banks, the second larger than the first"
+            raise DockairError(where, expected=expected, got=[float(begins), float(whole)])
 
     @property
     def tolerances(self) -> Tolerances:

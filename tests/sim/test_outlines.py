@@ -1,5 +1,7 @@
 """Outlines of tanker and receiver."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,6 +10,7 @@ from dockair.errors import DockairError
 from dockair.parameters import load_parameters
 from dockair.rotations import matrix_from_quaternion
 from dockair.sim.outlines import Piece, TankerParameters, receiver_pieces, tanker_pieces
+from dockair.sim.skins import receiver_skins
 
 TANKER = load_parameters("tanker", TankerParameters)
 MOUNTING = Mounting(R_BC=np.eye(3), p_BC=np.array([3.3, -0.45, 0.75]), p_BP=np.array([6.0, -0.9, 0.6]))
@@ -59,3 +62,15 @@ def test_the_right_pods_exit_mirrors_the_left_ones_and_the_centreline_stays() ->
 def test_an_unknown_pod_is_refused() -> None:
     with pytest.raises(DockairError, match="tanker.pod"):
         TANKER.at_pod("middle")  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("outline", ["fighter", "unmanned"])
+@pytest.mark.parametrize("tip_x_m", [-10.0, 1.2, 2.0, 3.5])
+def test_a_probe_before_which_there_is_no_room_for_a_nose_is_refused(outline: str, tip_x_m: float) -> None:
+    """Its sheet's range allows it; of the fuselage ahead of the wing nothing would be left."""
+    mounting = replace(MOUNTING, p_BP=np.array([tip_x_m, -0.9, 0.6]))
+    for make in (receiver_pieces, receiver_skins):
+        with pytest.raises(DockairError, match=r"probe_tip_m: expected a tip more than 3\.5 m ahead"):
+            make(mounting, outline)
+    nearly = replace(MOUNTING, p_BP=np.array([3.6, -0.9, 0.6]))
+    assert min(size for piece in receiver_pieces(nearly, outline) for size in piece.size[:1]) > 0.0

@@ -1,10 +1,12 @@
 """The reference that the receiver flies: smooth, limited, consistent in its derivatives."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
+from dockair.errors import DockairError
 from dockair.messages import ReceiverCommand
 from dockair.parameters import load_parameters
 from dockair.sim.aircraft.flight_control import FlightControlParameters
@@ -77,3 +79,9 @@ def test_shares_take_back_the_acceleration_axis_by_axis() -> None:
     for _ in range(1500):
         chain = reference.step(np.eye(3), command, 0.0, shares)
     np.testing.assert_allclose(chain[1], shares * limits.acceleration_m_s2, rtol=0.02)
+
+
+@pytest.mark.parametrize("banks_rad", [(0.4, 0.4), (0.7, 0.4)])
+def test_banks_between_which_nothing_could_be_taken_back_are_refused(banks_rad: tuple[float, float]) -> None:
+    with pytest.raises(DockairError, match=r"increment_bank_rad: expected two banks, the second larger"):
+        replace(PARAMETERS, increment_bank_rad=np.array(banks_rad))
