@@ -1,6 +1,8 @@
 """The tanker's wake against closed forms, Biot and Savart's integral, and what every such field must be."""
 
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,6 +21,7 @@ ALONE = replace(SHEET, bound_m=np.zeros(3), tail_circulation_fraction=0.0)  # th
 THIN = replace(ALONE, core_fraction=1e-7, core_growth=0.0)
 HALF = np.pi / 8.0 * SPAN  # the legs' distance from the axis
 FAR_BEHIND = -1e7
+PAGE = Path(__file__).parents[2] / "docs" / "models" / "wake.md"
 
 
 def table(parameters: WakeParameters) -> np.ndarray:
@@ -186,6 +189,16 @@ def test_the_tailplane_lifts_down_and_takes_some_of_the_downwash_away() -> None:
     x, half = 40.0 + SHEET.tail_bound_m[0], 0.5 * SHEET.tail_vortex_span_m
     up = gamma(SHEET) / 30.0 / (2.0 * np.pi * half) * (1.0 + np.hypot(x, half) / x)
     assert (wake_velocity(point, k) - wake_velocity(point, k[:-1]))[0, 2] == pytest.approx(up, rel=0.02)  # cores' share
+
+
+def test_the_page_says_what_is_flown_in_the_wings_plane_and_at_the_drogue() -> None:
+    """Tailplane, cores and all; the drogue as it hangs in the wake."""
+    rows = re.findall(r"^\| (\d+) \| ([\d.]+) m/s \| ([\d.]+) m/s \|", PAGE.read_text(encoding="utf-8"), re.MULTILINE)
+    assert [row[0] for row in rows] == ["1", "4", "16"]
+    (x, _, z), drogue = SHEET.bound_m, (-34.74, 0.0, -4.97)
+    for filaments, *said in rows:
+        down = -at(replace(SHEET, filaments=int(filaments)), (x - 34.0, 0.0, z), drogue)[:, 2]
+        np.testing.assert_allclose(down, np.array(said, dtype=float), rtol=0.0, atol=0.006)
 
 
 def test_on_the_vortices_themselves_the_air_moves_at_finite_speed() -> None:
