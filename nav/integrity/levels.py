@@ -14,9 +14,10 @@ the test is free of it, and it need not be the lowest, x:
     PL = max over the x_i that pass of |x_i - x| + k sigma_i                              (2)
 
 The mirror image of a flat ring is a fault mode of its own: all LEDs may be good and the attitude is wrong. It is ruled
-out when it fails the test even without its worst LED (J - max t_i > T of two degrees of freedom less). While it is not,
-the distance to it and its own level join the maximum in (1), it is one of the x_i in (2), and no level of attitude is
-given. Nor is there one that reaches the frontal attitude half way to the mirror image: there the linearisation ends.
+out when it fails the test even without its worst LED (J - max t_i > T of two degrees of freedom less; never where none
+are left, since any three LEDs fit). While it is not, the distance to it and its own level join the maximum in (1), it
+is one of the x_i in (2), and no level of attitude is given. Nor is there one that reaches the frontal attitude half way
+to the mirror image: there the linearisation ends.
 
 Not modelled: a fault that the places a frame is tested on have followed, frame by frame (`navigator`): what they
 contribute to the pose is added to the levels there.
@@ -74,7 +75,8 @@ def slope_levels(
     bounds, alone = _slope_bound(found, test), True
     for other in minima[1:]:
         mirror = sensitivity(sight, other.R_CD, other.p_CD, other.covariance)
-        if other.cost - mirror.local_chi2.max() <= fewer.threshold:
+        without_worst = other.cost - mirror.local_chi2.max()  # 0 but for rounding where no freedom is left
+        if not fewer.degrees_of_freedom or without_worst <= fewer.threshold:
             bounds = np.maximum(bounds, _distance(other, minima[0]) + _slope_bound(mirror, test))
             alone = False
     return _levels(bounds, minima[0], sight, alone), alone

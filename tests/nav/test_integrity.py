@@ -247,6 +247,22 @@ def test_while_the_mirror_image_may_be_it_the_level_reaches_it_and_no_attitude_i
     assert result.levels.lateral_m >= np.hypot(*apart[1:]) + there[LATERAL] - 1e-12
 
 
+@pytest.mark.parametrize("seed", [2163, 2749, 4691])  # rounding makes J - max t_i positive, where it is 0
+def test_of_four_leds_any_three_fit_the_mirror_image_so_that_it_is_never_ruled_out(seed):
+    rng = np.random.default_rng(seed)
+    R, p = pose_at(rng.uniform(2.0, 6.0), rng.uniform(4.0, 15.0))
+    leds = np.sort(rng.choice(8, 4, replace=False))
+    result = check_integrity(solve_pose(pixels_at(R, p, seed)[leds], RING[leds], CAMERA, sigma_px=SIGMA_PX))
+    other = result.pose.alternative
+    assert result.status is IntegrityStatus.CONSISTENT and other is not None
+    assert not result.mirror_ruled_out and np.isinf(result.levels.attitude_rad)
+    found = sensitivity(other.measurement, other.R_CD, other.p_CD, other.covariance)
+    test, apart = fault_test(2, IntegritySettings()), other.p_CD - result.pose.p_CD
+    there = found.slopes.max(axis=0) * test.least_fault + np.array(test.error_sigmas) * found.sigmas
+    assert result.levels.range_m >= abs(apart[0]) + there[RANGE] - 1e-12
+    assert result.levels.lateral_m >= np.hypot(*apart[1:]) + there[LATERAL] - 1e-12
+
+
 def test_no_attitude_is_promised_where_its_level_reaches_the_frontal_attitude():
     near, frontal = (checked(pixels_at(*pose_at(5.0, tilt_deg), seed=5)) for tilt_deg in (15.0, 1.0))
     assert near.mirror_ruled_out and frontal.mirror_ruled_out
