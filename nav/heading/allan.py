@@ -32,6 +32,7 @@ _FEWEST_INTERVALS = 3  # of the longest averaging time, by default
 _PER_DECADE = 10
 _ROUNDS = 8  # of re-weighting by the model
 _CORRELATIONS_PER_DECADE = 12
+_SMALL = 0.01  # r below which the next term of the series of G is a share of 1e-12
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -95,13 +96,15 @@ def identify_gyro_noise(
         terms: which of Q, N, B, K to look for.
 
     Raises:
-        DockairError: see `allan_deviation`; terms that do not exist.
+        DockairError: see `allan_deviation`; terms that do not exist; a record that never changes.
     """
     if not terms or set(terms) - set("QNBK") or len(set(terms)) < len(terms):
         raise DockairError("terms", expected="letters of the terms, each once", got=terms, exists=tuple("QNBK"))
     if bias_correlation_s is not None and not bias_correlation_s > 0.0:
         raise DockairError("bias_correlation_s", expected="a time > 0", got=bias_correlation_s)
     curve = allan_deviation(rates_rad_s, sample_rate_hz)
+    if not np.ptp(np.asarray(rates_rad_s, dtype=float), axis=0).all():
+        raise DockairError("rates", expected="records of gyros that are on", got="one whose samples are all alike")
     candidates = [bias_correlation_s] if bias_correlation_s is not None else _correlations(curve.taus_s)
     if "B" not in terms:
         candidates = [1.0]
@@ -137,8 +140,9 @@ def _correlations(taus_s: Array) -> Array:
 
 
 def _gauss_markov(r: Array) -> Array:
-    """G of Eq. (3)."""
-    return np.asarray(2.0 / r * (1.0 - (3.0 - 4.0 * np.exp(-r) + np.exp(-2.0 * r)) / (2.0 * r)))
+    """G of Eq. (3); of a small r by its series, since the difference is r^2/3 and would be lost in rounding."""
+    near = r * (2.0 / 3.0 - r * (1.0 / 2.0 - r * (7.0 / 30.0 - r * (1.0 / 12.0 - r * 31.0 / 1260.0))))
+    return np.where(r < _SMALL, near, 2.0 / r * (1.0 - (3.0 - 4.0 * np.exp(-r) + np.exp(-2.0 * r)) / (2.0 * r)))
 
 
 def _fit(curve: AllanCurve, T: float, terms: str) -> tuple[Array, Array, float]:

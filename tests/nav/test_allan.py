@@ -1,10 +1,13 @@
 """Allan deviation against published values and allantools; noise terms back from records that were made of them."""
 
+from decimal import Decimal, localcontext
+
 import allantools
 import numpy as np
 import pytest
 
 from dockair.errors import DockairError
+from dockair.nav.heading import allan
 from dockair.nav.heading.allan import allan_deviation, identify_gyro_noise
 
 NBS14 = np.array([892.0, 809.0, 823.0, 798.0, 671.0, 644.0, 883.0, 903.0, 677.0])  # NIST SP 1065, table 30
@@ -103,6 +106,20 @@ def test_terms_not_asked_for_are_not_found():
     assert noise.bias_instability_rad_s == 0.0 and np.isnan(noise.bias_correlation_s)
 
 
+@pytest.mark.parametrize("r", [1e-7, 1e-5, 1e-3, 0.0099, 0.0101, 1.0, 1e4])
+def test_the_term_of_the_bias_is_equation_3_in_sixty_digits(r):
+    with localcontext(prec=60):
+        R = Decimal(r)
+        G = 2 / R * (1 - (3 - 4 * (-R).exp() + (-2 * R).exp()) / (2 * R))
+    assert allan._gauss_markov(np.array([r]))[0] == pytest.approx(float(G), rel=1e-9)
+
+
+def test_a_bias_without_white_noise_is_found_at_averaging_times_far_below_its_own():
+    noise = identify_gyro_noise(_record(6, B=5e-5, T=300.0, rate=200.0), 200.0, terms="NB")
+    assert noise.bias_instability_rad_s == pytest.approx(5e-5, rel=0.3)  # two hours are 24 of its times
+    assert noise.noise_density_rad_s_rthz < 1e-7
+
+
 @pytest.mark.parametrize(
     ("where", "make"),
     [
@@ -110,6 +127,8 @@ def test_terms_not_asked_for_are_not_found():
         ("rates", lambda: allan_deviation([1.0, np.nan, 2.0], 1.0)),
         ("rates", lambda: allan_deviation(np.zeros((4, 2, 2)), 1.0)),
         ("sample_rate_hz", lambda: allan_deviation(NBS14, 0.0)),
+        ("rates", lambda: identify_gyro_noise(np.full(1000, 0.3), 50.0)),
+        ("rates", lambda: identify_gyro_noise(np.column_stack([np.arange(9.0), np.zeros(9)]), 50.0)),
         ("taus_s", lambda: allan_deviation(NBS14, 1.0, [5.0])),
         ("taus_s", lambda: allan_deviation(NBS14, 1.0, [0.1])),
         ("terms", lambda: identify_gyro_noise(NBS14, 1.0, terms="NX")),
