@@ -31,7 +31,11 @@ def refusal(error: ValidationError, model: type[BaseModel], place: Callable[[str
         model: the outermost model.
         place: from a dotted key to what its writer would call the place (file and key).
     """
-    first, *others = sorted(error.errors(include_url=False), key=lambda found: found["type"] != _UNKNOWN)
+    found = error.errors(include_url=False)
+    places = [one["loc"] for one in found]
+    # of a list with a wrong entry pydantic says besides that it is too short: only the entry is at fault
+    found = [one for one in found if not any(_holds(one["loc"], place) for place in places)]
+    first, *others = sorted(found, key=lambda one: one["type"] != _UNKNOWN)
     where = place(_dotted(first["loc"]))
     also = [_dotted(other["loc"]) for other in others]
     if first["type"] == _UNKNOWN:
@@ -41,6 +45,10 @@ def refusal(error: ValidationError, model: type[BaseModel], place: Callable[[str
     if first["type"] == "missing":
         return DockairError(where, expected=_expected(field), also=also)
     return DockairError(where, expected=_expected(field), got=first["input"], exists=_choices(field), also=also)
+
+
+def _holds(outer: Sequence[int | str], inner: Sequence[int | str]) -> bool:
+    return len(outer) < len(inner) and tuple(inner[: len(outer)]) == tuple(outer)
 
 
 def _dotted(location: Sequence[int | str]) -> str:
@@ -114,4 +122,6 @@ def _bounds(field: FieldInfo) -> list[str]:
         words.append(f"from {limits['ge']}" if "le" in limits else f"of at least {limits['ge']}")
     if "le" in limits:
         words.append(f"to {limits['le']}" if "ge" in limits else f"up to {limits['le']}")
+    if "lt" in limits:
+        words.append(f"below {limits['lt']}")
     return words

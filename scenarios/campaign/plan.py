@@ -4,6 +4,8 @@ Only `name` and `scenarios` are required. Unknown keys are refused. A scenario i
 TOML file from the plan's folder.
 """
 
+import operator
+from collections.abc import Callable
 from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field
@@ -22,16 +24,26 @@ def _seeds(value: Any) -> Any:
     return tuple_from_list(value)
 
 
-def flat(value: Any) -> Any:
-    """Return nested tables as one of dotted keys; what is not a table as it is."""
+def flat(value: Any, is_value: Callable[[dict[str, Any]], bool] = operator.not_) -> Any:
+    """Return nested tables as one of dotted keys; what is not a table as it is.
+
+    Args:
+        value: as it was read.
+        is_value: whether a table is one of the values; an empty one by default, as `--set` takes it.
+    """
     if not isinstance(value, dict):
         return value
     level: dict[str, Any] = {}
     for key, entry in value.items():
-        inner = flat(entry)
-        nested = isinstance(inner, dict) and inner  # an empty table is a value: as `--set` takes it
-        level |= {f"{key}.{name}": v for name, v in inner.items()} if nested else {key: inner}
+        if isinstance(entry, dict) and not is_value(entry):
+            level |= {f"{key}.{name}": inner for name, inner in flat(entry, is_value).items()}
+        else:
+            level[key] = entry
     return level
+
+
+def _flat_draws(value: Any) -> Any:
+    return flat(value, lambda table: not table or not all(isinstance(entry, dict) for entry in table.values()))
 
 
 _Seed = Annotated[int, Field(ge=0, le=LARGEST_SEED)]
@@ -89,7 +101,7 @@ class Plan(Table):
     seeds: _Seeds = (0,)
     first_seed: int = Field(default=0, ge=0, le=2**62)  #: added to every seed
     set: _Set = {}  #: dotted key -> value instead of the scenario's
-    draw: dict[str, Any] = {}  #: dotted key -> table of `Draw`
+    draw: Annotated[dict[str, Any], BeforeValidator(_flat_draws)] = {}  #: dotted key -> table of `Draw`
     sampler: SamplerName = "latin_hypercube"
     draws: int | None = Field(default=None, ge=1, le=MOST_SEEDS)  #: points, flown with every seed; none: one a seed
     draw_seed: int = Field(default=0, ge=0, le=2**62)

@@ -344,6 +344,25 @@ def test_what_cannot_be_flown_is_refused_with_one_line_that_says_where(plan, tex
     assert said in refusal_of(plan, text)
 
 
+def test_what_holds_a_wrong_entry_is_not_told_to_be_wrong_too(plan):
+    assert "also wrong" not in refusal_of(plan, 'scenarios = ["default"]\nseeds = ["1"]')
+    assert refusal_of(plan, "scenarios = [{ scenario = 3, seeds = 0 }]").endswith("; also wrong: scenarios[0].seeds")
+
+
+def test_a_limit_that_a_value_may_not_reach_is_told(plan):
+    said = refusal_of(plan, 'scenarios = ["default"]\n[gate]\nfalse_alarm = 0.9')
+    assert "gate.false_alarm: expected a number above 0.0 below 0.5, got 0.9" in said
+
+
+def test_a_drawn_key_may_be_written_as_nested_tables_as_one_that_is_set(plan):
+    quoted, nested = (
+        jobs_of(plan(f'scenarios = ["default"]\nseeds = 3\n[draw.{key}]\nlow = 0.2\nhigh = 1.0'))
+        for key in ('"turbulence.sigma_m_s"', "turbulence.sigma_m_s")
+    )
+    assert [job.drawn for job in nested] == [job.drawn for job in quoted]
+    assert [*nested[0].drawn] == ["turbulence.sigma_m_s"]
+
+
 def test_what_the_command_line_asks_in_vain_is_said_to_be_its_own(plan):
     assert refusal_of(plan, 'scenarios = ["default"]', settings={"start.aft_m": "-1"}).startswith(
         "--set start.aft_m: expected"
