@@ -60,6 +60,7 @@ class Journal:
 
         Raises:
             MachineError: there is no room; what was there is as it was.
+            DockairError: the folder has been moved or removed, and the entry with it: no table could be written.
         """
         line = (json.dumps(entry, allow_nan=False) + "\n").encode()
         try:
@@ -75,11 +76,21 @@ class Journal:
             raise MachineError(str(self.path), expected="room to write", remedy=remedy) from None
         self._size += len(line)
         self.entries[entry["key"]] = entry
+        self._require_in_place()
 
     def clear(self) -> None:
         """Forget everything."""
         os.ftruncate(self._file, 0)
         self.entries, self._size = {}, 0
+
+    def _require_in_place(self) -> None:
+        try:
+            in_place = os.path.samestat(os.stat(self.path), os.fstat(self._file))
+        except OSError:
+            in_place = False
+        if not in_place:
+            expected = "the journal to stay where the campaign began (moved back, the same command goes on)"
+            raise DockairError(str(self.path), expected=expected, got="another file or none")
 
     def _lock(self) -> None:
         try:

@@ -549,6 +549,27 @@ def test_one_campaign_at_a_time_writes_a_folder(here, tmp_path):
     assert len(fly(plan(tmp_path), tmp_path / "out").rows) == 4
 
 
+@pytest.mark.parametrize("replaced", [False, True])
+def test_a_folder_that_is_moved_meanwhile_ends_the_campaign_and_in_its_place_it_goes_on(here, tmp_path, replaced):
+    out, elsewhere = tmp_path / "out", tmp_path / "elsewhere"
+
+    def watch(jobs, done):
+        def told(row, wall_time_s):
+            if row is not None and row["seed"] == 1:
+                out.rename(elsewhere)
+                if replaced:
+                    out.mkdir()
+                    (out / "journal.jsonl").touch()
+
+        return told
+
+    with pytest.raises(DockairError, match=r"journal\.jsonl: expected the journal to stay where the campaign began"):
+        fly(plan(tmp_path), out, watch=watch)
+    assert [row["seed"] for row in rows_of(elsewhere)] == [0, 1, 2]
+    assert len(fly(plan(tmp_path), elsewhere).rows) == 4
+    assert len(lines(here)) == 4
+
+
 def test_other_peoples_files_are_refused_untouched(here, tmp_path):
     folder = tmp_path / "thesis"
     folder.mkdir()
