@@ -21,7 +21,7 @@ def scenario_names() -> list[str]:
 
 
 def scenario_text(name_or_path: str | Path) -> str:
-    """Return a scenario's file as it was written.
+    """Return a scenario's file as it was written, without a byte order mark.
 
     Args:
         name_or_path: a name in the library, or the path of a TOML file.
@@ -29,7 +29,7 @@ def scenario_text(name_or_path: str | Path) -> str:
     Raises:
         DockairError: no such scenario.
     """
-    return SCENARIOS.find(name_or_path).read_text(encoding="utf-8")
+    return SCENARIOS.find(name_or_path).read_text(encoding="utf-8-sig")
 
 
 class ScenarioFile:

@@ -33,7 +33,7 @@ def _from_toml(cls: type[Any], path: str | Path) -> Any:
     if not path.is_file():
         raise DockairError(str(path), expected="a calibration file", got="no such file")
     try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
+        table = tomllib.loads(path.read_text(encoding="utf-8-sig"))  # some editors begin a file with a byte order mark
     except OSError as error:
         raise DockairError(str(path), expected="a file that can be read", got=str(error.strerror)) from None
     except ValueError as error:  # no TOML, or not even UTF-8

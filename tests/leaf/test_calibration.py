@@ -106,6 +106,8 @@ def test_sheet_is_read_from_toml(tmp_path):
     assert Camera.from_toml(file) == Camera(focal_length_m=0.025, distortion=(-0.1, 0.0, 0.0, 0.0, 0.0))
     file.write_text(SHEET, encoding="utf-8")
     assert Camera.from_toml(file) == Camera()
+    file.write_text("\ufeff" + SHEET.replace("\n", "\r\n"), encoding="utf-8")  # as editors on Windows write it
+    assert Camera.from_toml(file) == Camera()
 
 
 @pytest.mark.parametrize(

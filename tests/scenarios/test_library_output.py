@@ -29,3 +29,10 @@ def test_one_scenario_is_shown_as_it_was_written_brackets_included(capsys, tmp_p
     out = capsys.readouterr().out
     assert out.startswith(path.read_text(encoding="utf-8").rstrip())
     assert out.splitlines()[-1] == "held to: timeout"
+
+
+def test_a_scenario_is_shown_without_the_mark_that_an_editor_put_before_it(capsys, tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text('\ufeffname = "mine"\n', encoding="utf-8")
+    show_scenario(str(path), load_scenario(path))
+    assert capsys.readouterr().out == 'name = "mine"\n'
