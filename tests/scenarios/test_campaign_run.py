@@ -528,15 +528,22 @@ def test_a_full_disk_is_one_line_and_the_earlier_rows_stay(here, tmp_path, monke
     assert (tmp_path / "out/journal.jsonl").read_bytes().endswith(b"\n")
 
 
-def test_a_file_is_written_whole_or_stays_as_it_was(tmp_path, monkeypatch):
+@pytest.mark.parametrize(
+    ("number", "kind", "said"),
+    [
+        (errno.ENOSPC, MachineError, "file: expected room to write; make some .* is kept"),
+        (errno.EIO, OSError, "Input/output"),
+    ],
+)
+def test_a_file_is_written_whole_or_stays_as_it_was(tmp_path, monkeypatch, number, kind, said):
     path = tmp_path / "file"
     write_whole(path, b"before")
 
-    def no_room(file):
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+    def fails(file):
+        raise OSError(number, os.strerror(number))
 
-    monkeypatch.setattr(os, "fsync", no_room)
-    with pytest.raises(OSError, match="No space left"):
+    monkeypatch.setattr(os, "fsync", fails)
+    with pytest.raises(kind, match=said):
         write_whole(path, b"after")
     assert path.read_bytes() == b"before"
     assert [found.name for found in tmp_path.iterdir()] == ["file"]
