@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from dockair.errors import DockairError
-from dockair.scenarios.campaign.folder import rows_of
+from dockair.scenarios.campaign.folder import default_folder, rows_of
 from dockair.scenarios.campaign.manifest import FILE_NAME, read_manifest
 from dockair.scenarios.output_folder import FLIGHT_FILES
 from dockair.scenarios.report.groups import Row, drawn_of, groups_of
@@ -46,6 +46,9 @@ def read_campaigns(folders: Sequence[Path]) -> list[Campaign]:
 def _refuse_what_is_no_campaign(folder: Path) -> None:
     """Say of a flight's folder, or of a file, what it is: neither has a manifest, which says little to who gave it."""
     expected = "the folder of a campaign, which `dockair campaign PLAN` makes"
+    by_plan = default_folder(str(folder))
+    if not os.path.exists(folder) and os.path.isdir(by_plan):  # given by its plan's name
+        raise DockairError(str(folder), expected=expected, got="no folder", exists=(str(by_plan),))
     if os.path.isfile(folder):  # Path.is_file raises where a name is too long
         raise DockairError(str(folder), expected=expected, got="a file")
     present = any(os.path.isfile(folder / name) for name in FLIGHT_FILES)

@@ -4,6 +4,7 @@ import errno
 import os
 import stat
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -93,6 +94,17 @@ def test_of_a_flight_a_report_is_refused_with_what_it_is_and_what_is_wanted(tmp_
     assert ended.value.code == 2
     wanted = f"{tmp_path / given}: expected the folder of a campaign, which `dockair campaign PLAN` makes, got '{is_}"
     assert said.startswith(f"dockair: {wanted}") and said.count("\n") == 1
+
+
+def test_of_a_plan_s_name_a_report_says_where_its_campaign_is(campaign, tmp_path, monkeypatch):
+    made = tmp_path / "out" / "campaigns"
+    made.mkdir(parents=True)
+    campaign("a").rename(made / "levels")
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(DockairError, match=r"^levels: expected the folder .*; exists: out/campaigns/levels"):
+        read_campaigns([Path("levels")])
+    with pytest.raises(DockairError, match="^level/manifest.json: expected the manifest of a campaign"):
+        read_campaigns([Path("level")])
 
 
 def test_a_campaigns_folder_in_which_somebody_flew_is_still_a_campaigns(campaign):
