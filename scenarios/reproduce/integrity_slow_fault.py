@@ -29,8 +29,19 @@ from dockair.scenarios.reproduce.reference import picture_name
 ID = "integrity/slow-fault"
 TITLE = "an LED that leaves its place more slowly than any frame can see, and what is claimed for contact meanwhile"
 PITCHES_RAD = (-0.12, 0.0, 0.12)  # of the drogue, positive nose down: a flight of each, with a seed of its own
-_LEDS = (0, 1, 2, 3)  # the other four stand opposite them
-_OUTWARD_M_S = 1e-4
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SlowFault:
+    """An LED that goes outward, and the LEDs that are seen after `_SETTLED_S`."""
+
+    led: int
+    outward_m_s: float = 1e-4
+    begins_s: float = 0.0
+    lasts_s: float = 60.0
+    seen: tuple[int, ...] = tuple(range(8))
+
+
 _STATION = Approach(
     duration_s=60.0,
     first_m=4.3,  # tip to ring, and the tip is 2.7 m ahead of the camera
@@ -42,6 +53,11 @@ _STATION = Approach(
     belief=FusionSettings(start_velocity_sigma_m_s=0.1),  # joined up: the ring stays on the sensor
 )
 _SETTLED_S = 2.0  # from the start: before, the belief is that of the start geometry
+_OF_EIGHT = {f"LED {led}": SlowFault(led=led) for led in (0, 1, 2, 3)}  # the other four stand opposite them
+_OF_FEW = {
+    f"LED {seen[0]} of {seen}": SlowFault(led=seen[0], outward_m_s=6e-4, begins_s=_SETTLED_S, lasts_s=20.0, seen=seen)
+    for seen in ((0, 2, 5), (5, 0, 2), (1, 3, 6), (4, 5, 6, 7))
+}
 _SEED = 73
 _SIZE_IN, _DPI = (11.0, 4.0), 110
 
@@ -61,23 +77,34 @@ class Watched:
 def reproduce(out: Path | None, pitches_rad: Sequence[float] = PITCHES_RAD) -> dict[str, Any]:
     """Fly, and table errors, levels and claims by LED; the first flights' frames in the picture."""
     flights = [fly(replace(_STATION, drogue_pitch_rad=pitch), seed) for seed, pitch in enumerate(pitches_rad)]
-    watched = {led: [watch(flown, led, seed) for seed, flown in enumerate(flights)] for led in _LEDS}
-    rows = [{"case": f"LED {led}", "ours": _figures(of_led), "reference": {}} for led, of_led in watched.items()]
-    every = [one for of_led in watched.values() for one in of_led]
-    rows.append({"case": "all four", "ours": _figures(every), "reference": {}})
+    watched = {
+        case: [watch(flown, fault, seed) for seed, flown in enumerate(flights)]
+        for case, fault in (_OF_EIGHT | _OF_FEW).items()
+    }
+    rows = [{"case": case, "ours": _figures(of_fault), "reference": {}} for case, of_fault in watched.items()]
+    every = [one for case in _OF_EIGHT for one in watched[case]]
+    rows.insert(len(_OF_EIGHT), {"case": "all four", "ours": _figures(every), "reference": {}})
     if out is not None:
-        _draw({led: of_led[0] for led, of_led in watched.items()}, out / picture_name(ID))
+        _draw({fault.led: watched[case][0] for case, fault in _OF_EIGHT.items()}, out / picture_name(ID))
     return {"id": ID, "source": "made-up flights", "rows": rows}
 
 
-def watch(flown: Flown, led: int, seed: int) -> Watched:
+def watch(flown: Flown, fault: SlowFault, seed: int) -> Watched:
     """Run the navigation along a flight on whose ring one LED goes outward; the seed is that of the pixels' noise."""
     sheets, rng, rows = flown.sheets, np.random.default_rng((_SEED, seed)), []
     navigator, samples = Navigator(sheets), sheets.gyro.rate_hz // sheets.camera_rate_hz
+    seen, others = np.sort(fault.seen), np.setdiff1d(fault.seen, fault.led)
     for tick in range(0, len(flown.imu), samples):
         time_s = float(flown.time_s[tick])
-        seen = _observed(_with_outward(flown, led, _OUTWARD_M_S * time_s), tick, rng)
-        solution = navigator.step(flown.imu[max(tick - samples + 1, 0) : tick + 1], seen)
+        if time_s > fault.begins_s + fault.lasts_s:
+            break
+        outward_m = fault.outward_m_s * max(time_s - fault.begins_s, 0.0)
+        shown = _observed(_with_outward(flown, fault.led, outward_m), tick, rng)
+        if time_s >= _SETTLED_S:
+            shown = replace(
+                shown, led_numbers=seen, centroids_px=shown.centroids_px[seen], sigma_px=shown.sigma_px[seen]
+            )
+        solution = navigator.step(flown.imu[max(tick - samples + 1, 0) : tick + 1], shown)
         claim = navigator.contact_claim()
         if claim is None or time_s < _SETTLED_S:
             continue
@@ -85,8 +112,7 @@ def watch(flown: Flown, led: int, seed: int) -> Watched:
         error_C = sheets.mounting.R_BC.T @ true_error(flown, tick, solution)[3:6]
         errors_m = abs(float(error_C[0])), float(np.hypot(error_C[1], error_C[2]))
         levels_m = claim.levels.range_m, claim.levels.lateral_m
-        others = np.delete(without, led).any()
-        rows.append((_OUTWARD_M_S * time_s, without[led], others, solution.contact_usable, errors_m, levels_m))
+        rows.append((outward_m, without[fault.led], without[others].any(), solution.contact_usable, errors_m, levels_m))
     return Watched(**dict(zip(_names(), map(np.array, zip(*rows, strict=True)), strict=True)))
 
 
