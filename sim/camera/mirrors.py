@@ -13,6 +13,7 @@ edge remains a ball. How all these are cut, `tiles` says.
 A material follows from the geom's name. Not modelled: planes, height fields.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
@@ -25,7 +26,7 @@ from dockair.rotations import Array
 from dockair.sim.camera.meshes import mesh_of
 from dockair.sim.camera.sheets import SurfaceParameters
 from dockair.sim.camera.solids import VISIBLE_GROUPS
-from dockair.sim.camera.tiles import EDGE_COS, Tile, ellipsoid_tiles, face, is_flat, triangle_tile
+from dockair.sim.camera.tiles import EDGE_COS, Tile, ellipsoid_tiles, face, is_flat, mesh_tiles
 
 PAINT, METAL, RUBBER, GLASS = range(4)
 RIM_GEOMS = "basket_rim"  #: how the names of the rim's pieces begin
@@ -201,7 +202,7 @@ def _tubes(model: mujoco.MjModel, i: int) -> list[tuple[float, float]]:
     return []
 
 
-def _facets(model: mujoco.MjModel, i: int) -> list[Tile]:
+def _facets(model: mujoco.MjModel, i: int) -> Sequence[Tile]:
     """Frame, half sides and curvature of each tile of geom i."""
     kind, size = model.geom_type[i], np.array(model.geom_size[i])
     if kind == _G.mjGEOM_BOX:
@@ -213,8 +214,7 @@ def _facets(model: mujoco.MjModel, i: int) -> list[Tile]:
     if kind == _G.mjGEOM_ELLIPSOID and is_flat(size):
         return ellipsoid_tiles(size)
     if kind == _G.mjGEOM_MESH:
-        corners, normals, triangles = mesh_of(model, int(model.geom_dataid[i]))
-        return [triangle_tile(corners[t], normals[t]) for t in triangles]
+        return mesh_tiles(mesh_of(model, int(model.geom_dataid[i])))
     return []
 
 

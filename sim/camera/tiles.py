@@ -10,10 +10,13 @@ Source: do Carmo, Differential Geometry of Curves and Surfaces, section 3-3.
 """
 
 import math
+from functools import lru_cache
 
 import numpy as np
 
 from dockair.rotations import Array
+from dockair.sim.camera.meshes import Mesh
+from dockair.vectors import cross
 
 Vector = tuple[float, float, float]
 #: Frame (4, 3): centre [m], normal, two tangents along the sides; half sides [m]; 11, 12, 22 of C, positive for convex.
@@ -50,19 +53,39 @@ def face(half: Array, axis: int, side: float) -> list[Tile]:
     return tiles
 
 
+def mesh_tiles(mesh: Mesh) -> tuple[Tile, ...]:
+    """A mesh's triangles as tiles, in their order; read-only.
+
+    Every mesh is cut once a process: to cut their thousands of triangles was most of what a camera took to be made.
+    """
+    corners, normals, triangles = mesh
+    return _mesh_tiles(corners[triangles].tobytes(), normals[triangles].tobytes())
+
+
+@lru_cache(maxsize=128)  # meshes; a scene has some twenty
+def _mesh_tiles(corners: bytes, normals: bytes) -> tuple[Tile, ...]:
+    pairs = zip(*(np.frombuffer(a).reshape(-1, 3, 3) for a in (corners, normals)), strict=True)
+    tiles = tuple(triangle_tile(*pair) for pair in pairs)
+    for frame, _, _ in tiles:
+        frame.setflags(write=False)
+    return tiles
+
+
 def triangle_tile(corners: Array, normals: Array) -> Tile:
     """A triangle's tile, Eq. (1); normals are those of its corners."""
     middle, n = corners.mean(axis=0), normals.sum(axis=0)
     n /= np.linalg.norm(n)
     helper = np.eye(3)[int(np.argmin(np.abs(n)))]
-    e_1 = np.cross(n, helper) / np.linalg.norm(np.cross(n, helper))
-    flat = (corners - middle) @ np.column_stack([e_1, np.cross(n, e_1)])
+    e_1 = cross(n, helper)
+    e_1 /= np.linalg.norm(e_1)
+    plane = np.column_stack([e_1, cross(n, e_1)])
+    flat = (corners - middle) @ plane
     spread, axes = np.linalg.eigh(flat.T @ flat / 12.0)  # second moments over the area
     area = 0.5 * abs(np.linalg.det(flat[1:] - flat[0]))
     ratio = math.sqrt(max(spread[1], 0.0) / max(spread[0], 1e-12))
     half = (0.5 * math.sqrt(area * ratio), 0.5 * math.sqrt(area / ratio))
-    t_1 = np.column_stack([e_1, np.cross(n, e_1)]) @ axes[:, 1]
-    t_2 = np.cross(n, t_1)
+    t_1 = plane @ axes[:, 1]
+    t_2 = cross(n, t_1)
     tangents = np.column_stack([t_1, t_2])
     k, dn = (np.roll(a, -1, axis=0) - a for a in (corners @ tangents, normals @ tangents))
     rows = np.zeros((6, 3))

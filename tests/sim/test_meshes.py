@@ -11,12 +11,12 @@ from dockair.calibration import Mounting
 from dockair.parameters import load_parameters
 from dockair.rotations import exp, quaternion_from_matrix
 from dockair.sim.camera.drawn import DrawnSolids
-from dockair.sim.camera.meshes import Meshes
+from dockair.sim.camera.meshes import Meshes, mesh_of
 from dockair.sim.camera.mirrors import Mirrors
 from dockair.sim.camera.obstacles import Obstacles
 from dockair.sim.camera.occlusion import first_hits
 from dockair.sim.camera.solids import VISIBLE_GROUPS, Haze, Lighting
-from dockair.sim.camera.tiles import triangle_tile
+from dockair.sim.camera.tiles import mesh_tiles, triangle_tile
 from dockair.sim.camera.traced import TracedSolids
 from dockair.sim.lofts import body
 from dockair.sim.outlines import TankerParameters
@@ -228,6 +228,21 @@ def test_triangles_of_a_round_body_have_its_curvature_and_area() -> None:
         np.testing.assert_allclose(frame[1:] @ frame[1:].T, np.eye(3), atol=1e-9)
         area += 4.0 * half[0] * half[1]
     assert area == pytest.approx(2.0 * 48 * 2.0 * 2.0 * np.sin(np.pi / 48), rel=5e-4)
+
+
+def test_a_mesh_is_cut_once_and_another_anew() -> None:
+    model, _ = _world(SKINS["fighter"])
+    corners, normals, triangles = mesh_of(model, 0)
+    tiles = mesh_tiles((corners, normals, triangles))
+    assert mesh_tiles((corners.copy(), normals.copy(), triangles.copy())) is tiles
+    for (frame, half, curvature), t in zip(tiles, triangles, strict=True):
+        alone = triangle_tile(corners[t], normals[t])
+        np.testing.assert_array_equal(frame, alone[0])
+        assert (half, curvature) == alone[1:]
+    for larger in ((2.0 * corners, normals, triangles), (corners, normals, triangles[:-1])):
+        assert mesh_tiles(larger) is not tiles
+    twice = mesh_tiles((2.0 * corners, normals, triangles))
+    assert twice[0][1] == pytest.approx(tuple(2.0 * side for side in tiles[0][1]))
 
 
 def test_meshes_mirror_with_every_triangle() -> None:
