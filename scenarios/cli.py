@@ -285,8 +285,9 @@ def main() -> None:
         if isinstance(ended.__context__, BrokenPipeError):  # of a pipe within: typer would pass it over with status 1
             raise ended.__context__ from None
         raise
-    except PermissionError as error:
-        print(f"dockair: {error.filename or 'a file'}: expected leave to use it, got {error.strerror}", file=sys.stderr)
+    except (PermissionError, IsADirectoryError, NotADirectoryError) as error:
+        path = error.filename2 or error.filename or "a file"  # of two, the second is the one that was to be written
+        print(f"dockair: {path}: expected a file that may be used, got {error.strerror}", file=sys.stderr)
         sys.exit(2)
     except OSError as error:
         if error.errno not in (errno.ENOSPC, errno.EDQUOT):

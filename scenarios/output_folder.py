@@ -38,17 +38,20 @@ def check_output_folder(folder: Path) -> None:
     """Refuse a folder that no flight may be written to; change nothing.
 
     Raises:
-        DockairError: it is not a folder, or holds files but no flight.
+        DockairError: it is not a folder, or holds files but no flight, or a folder in the place of a flight's file.
     """
     expected = "a new or empty folder, or one with an earlier flight"
     try:
         if folder.exists() and not folder.is_dir():
             raise DockairError(f"--out {folder}", expected=expected, got="a file")
         present = sorted(path.name for path in folder.iterdir()) if folder.is_dir() else []
+        in_the_way = [name for name in present if name in FLIGHT_FILES and (folder / name).is_dir()]
     except OSError as error:
         raise DockairError(f"--out {folder}", expected=expected, got=error.strerror) from None
     if present and not set(present) & {*FLIGHT_FILES, _UNDER_WAY, _LOCK}:
         raise DockairError(f"--out {folder}", expected=expected, got=f"a folder with {present[0]}")
+    if in_the_way:
+        raise DockairError(f"--out {folder / in_the_way[0]}", expected="a file, or nothing", got="a folder")
 
 
 class FlightFolder:

@@ -273,6 +273,14 @@ def test_a_folder_with_other_files_is_refused_untouched(command, flights, tmp_pa
     assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
 
 
+def test_a_folder_in_the_place_of_a_flights_file_is_refused_before_anything_is_flown(command, flights, tmp_path):
+    (tmp_path / "result.json").mkdir()
+    status, out, err = command("fly", "--out", str(tmp_path))
+    assert (status, out) == (2, "")
+    assert err == f"dockair: --out {tmp_path / 'result.json'}: expected a file, or nothing, got 'a folder'\n"
+    assert flights == []
+
+
 def test_what_goes_wrong_inside_a_flight_is_one_line(command, flights, monkeypatch):
     def fly(*_, **__):
         raise DockairError("navigation.navigator", expected="a module that can be imported", got="mine:Mine")
@@ -301,6 +309,17 @@ def test_a_full_disk_is_one_line_and_status_three(command, flights, monkeypatch)
     status, out, err = command("fly")
     assert (status, out) == (3, "")
     assert err == "dockair: out/default-0/episode.rrd: expected room to write, got a full disk\n"
+
+
+@pytest.mark.parametrize("number", [errno.EISDIR, errno.ENOTDIR, errno.EACCES])
+def test_a_file_that_cannot_be_one_is_one_line_and_status_two(number, command, flights, monkeypatch):
+    def fly(*_, **__):
+        raise OSError(number, os.strerror(number), "out/.part", None, "out/result.json")
+
+    monkeypatch.setitem(sys.modules, "dockair.scenarios.loop", SimpleNamespace(fly=fly))
+    status, out, err = command("fly")
+    assert (status, out) == (2, "")
+    assert err == f"dockair: out/result.json: expected a file that may be used, got {os.strerror(number)}\n"
 
 
 @contextmanager
