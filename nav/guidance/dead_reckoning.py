@@ -9,6 +9,13 @@ that the drogue was nearest to when it was last seen; else, and while no such fr
 with |d| on each axis no more than a drogue behind its tanker may seem to drift, and at first no more of what was learnt
 than may be believed. Both e and what is wrong in d die away with the time constant T (critically damped).
 
+A drogue behind its tanker is not found however far out. Once p is farther than
+
+    m + d_max t                                                                                             (2)
+
+from where d alone, as it was at first, would have it, t out of view, it went out by another edge: p is there again, and
+frames move it no more.
+
 Its last place does not say it: a drogue that goes out of view has been pushed aside or is at the end of a swing.
 
 Not modelled: the swing, which is over the longer it is not seen.
@@ -37,6 +44,9 @@ class DeadReckoning:
         self._ring_m: Array | None = None  # of a drogue that is in view
         self._most_m_s = settings.unseen_drift_m_s
         self._edge: int | None = None  # by which it went out of view; none of a drogue that nobody has seen
+        self._unseen_s = 0.0
+        self._first_drift_m_s: Array = np.zeros(3)  # d as it went out of view
+        self._unmoved_m: Array = np.zeros(3)  # p by that drift alone
 
     def see(self, ring_m: Array, middle_m: Array, drift_m_s: Array, *, bearable: bool) -> None:
         """Take note of a drogue that is in view.
@@ -68,12 +78,23 @@ class DeadReckoning:
         self.place_m = self.place_m + (self.drift_m_s - u_m_s + 2.0 * out_m / T) * self._step_s
         drift_m_s = self.drift_m_s + out_m / T**2 * self._step_s
         self.drift_m_s = np.clip(drift_m_s, -most_m_s, most_m_s)
+        self._give_up_edge(u_m_s)
+
+    def _give_up_edge(self, u_m_s: Array) -> None:
+        """Advance what bounds how far frames may move p, Eq. (2), and put it back once they have moved it farther."""
+        s = self._settings
+        self._unseen_s += self._step_s
+        self._unmoved_m = self._unmoved_m + (self._first_drift_m_s - u_m_s) * self._step_s
+        moved_m = float(np.linalg.norm(self.place_m - self._unmoved_m))
+        if self._edge is not None and moved_m > s.unseen_swing_m + s.unseen_drift_m_s * self._unseen_s:
+            self.place_m, self.drift_m_s, self._edge = self._unmoved_m, self._first_drift_m_s, None
 
     def _lose(self, ring_B: Array) -> None:
         """Note by which edge a drogue goes out of view, and keep of its drift what may be believed."""
         if self._field is not None:
             self._edge = self._field.nearest_edge(ring_B)
         self.drift_m_s, self._ring_m = np.clip(self.drift_m_s, -self._most_m_s, self._most_m_s), None
+        self._unseen_s, self._unmoved_m, self._first_drift_m_s = 0.0, self.place_m, self.drift_m_s
 
     def astern_m_s(self) -> Array:
         """(3,) velocity across to get astern of the drogue; none beside it."""

@@ -118,12 +118,43 @@ def test_a_drogue_that_nobody_has_seen_went_out_by_no_edge():
 @pytest.mark.parametrize("bearable", [True, False])
 def test_whatever_frames_do_not_show_it_drifts_no_faster_than_an_inertial_velocity_errs(bearable):
     """A camera that is blind, not out of view: the receiver is not led away faster than that, nor in gusts slower."""
+    _, drifts = led_by_a_blind_camera(bearable, 250)
+    most = SETTINGS.unseen_drift_m_s
+    assert drifts[-1, 2] == pytest.approx(-most)
+    assert (np.abs(drifts) <= most).all()
+
+
+@pytest.mark.parametrize("bearable", [True, False])
+def test_it_is_looked_for_beyond_one_edge_no_farther_than_it_swings_and_may_drift(bearable):
+    """And then where it went out of view: a receiver (25302 of severe gusts, by camera) sank 20 m after it in 10 s."""
+    places, drifts = led_by_a_blind_camera(bearable, 3000)
+    beyond_m = SETTINGS.unseen_swing_m + SETTINGS.unseen_drift_m_s * STEP_S * np.arange(3001)
+    moved_m = np.linalg.norm(places - places[0], axis=1)
+    assert moved_m.max() > SETTINGS.unseen_swing_m
+    assert (moved_m <= beyond_m).all()
+    np.testing.assert_allclose(places[-1], places[0], atol=1e-9)
+    np.testing.assert_array_equal(drifts[-1], STILL)
+
+
+def test_seen_again_it_is_looked_for_beyond_the_edge_by_which_it_then_goes():
     reckoning = DeadReckoning(SETTINGS, STEP_S, FIELD)
-    place = np.array([5.0, 0.0, -0.5])
+    for upper in (False, True):
+        edge = np.array([5.0, 0.0, 1.0 - lower_edge_m(5.0) if upper else lower_edge_m(5.0)])
+        reckoning.see(0.98 * edge, np.array([5.0, 0.0, 0.5]), STILL, bearable=True)
+        for _ in range(100):
+            reckoning.miss(STILL, LEVEL, not_shown=True)
+        assert np.sign(reckoning.drift_m_s[2]) == (1.0 if upper else -1.0)
+
+
+def led_by_a_blind_camera(bearable, ticks):
+    """(ticks + 1, 3) places on the receiver's own scale and drifts of a drogue that no frame shows any more."""
+    place, own = np.array([5.0, 0.0, -0.5]), np.zeros(3)
+    reckoning, places, drifts = DeadReckoning(SETTINGS, STEP_S, FIELD), [place], [STILL]
     reckoning.see(place, place, STILL, bearable=bearable)
-    for _ in range(3000):
+    for _ in range(ticks):
         u = reckoning.drift_m_s + reckoning.astern_m_s()
         reckoning.miss(u, LEVEL, not_shown=True)
-    most = SETTINGS.unseen_drift_m_s
-    assert reckoning.drift_m_s[2] == pytest.approx(-most)
-    assert (np.abs(reckoning.drift_m_s) <= most).all()
+        own += u * STEP_S
+        places.append(reckoning.place_m + own)
+        drifts.append(reckoning.drift_m_s)
+    return np.array(places), np.array(drifts)
