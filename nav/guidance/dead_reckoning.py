@@ -9,14 +9,14 @@ that the drogue was nearest to when it was last seen; else, and while no such fr
 with |d| on each axis no more than a drogue behind its tanker may seem to drift, and at first no more of what was learnt
 than may be believed. Both e and what is wrong in d die away with the time constant T (critically damped).
 
+Its last place does not say it: a drogue that goes out of view has been pushed aside or is at the end of a swing.
+
 A drogue behind its tanker is not found however far out. Once p is farther than
 
     m + d_max t                                                                                             (2)
 
 from where d alone, as it was at first, would have it, t out of view, it went out by another edge: p is there again, and
 frames move it no more.
-
-Its last place does not say it: a drogue that goes out of view has been pushed aside or is at the end of a swing.
 
 Not modelled: the swing, which is over the longer it is not seen.
 """
@@ -29,7 +29,7 @@ from dockair.rotations import Array
 
 
 class DeadReckoning:
-    """Eq. (1), one control tick at a time; stabilised axes.
+    """Eqs. (1) and (2), one control tick at a time; stabilised axes.
 
     Args:
         settings: of the guidance.
@@ -82,11 +82,13 @@ class DeadReckoning:
 
     def _give_up_edge(self, u_m_s: Array) -> None:
         """Advance what bounds how far frames may move p, Eq. (2), and put it back once they have moved it farther."""
+        if self._edge is None:
+            return
         s = self._settings
         self._unseen_s += self._step_s
         self._unmoved_m = self._unmoved_m + (self._first_drift_m_s - u_m_s) * self._step_s
         moved_m = float(np.linalg.norm(self.place_m - self._unmoved_m))
-        if self._edge is not None and moved_m > s.unseen_swing_m + s.unseen_drift_m_s * self._unseen_s:
+        if moved_m > s.unseen_swing_m + s.unseen_drift_m_s * self._unseen_s:
             self.place_m, self.drift_m_s, self._edge = self._unmoved_m, self._first_drift_m_s, None
 
     def _lose(self, ring_B: Array) -> None:

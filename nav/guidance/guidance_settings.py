@@ -83,7 +83,7 @@ class GuidanceSettings:
     unseen_drift_m_s: float = 0.5  # 2.5 sigma of an inertial velocity; a drogue keeps place behind its tanker
     unseen_drift_in_gusts_m_s: float = 0.2  # 1 sigma where the gusts cannot be borne: what was learnt there is theirs
     unseen_correction_s: float = 1.0  # T: a third of a swing, by when a drogue at its end would be in the field again
-    unseen_swing_m: float = 3.0  # m of Eq. (2) there: as far as severe gusts throw a drogue (docs/models/air.md)
+    unseen_swing_m: float = 3.0  # m of `dead_reckoning`: as far as severe gusts throw a drogue (docs/models/air.md)
     reckoned_gain_1_s: float = 0.5  # back astern of a drogue that went out of view: half of its place off in 1.4 s
     funnel_s: float = 0.25  # from the ring to the coupling; what the drogue does after that is the probe's own doing
     levelling_s: float = 10.0  # of the stabilised axes: long beside the swing, short beside a turn
