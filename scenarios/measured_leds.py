@@ -13,7 +13,7 @@ exposure t. The image stages state of the spot, on each axis,
 
 and it is measured with an error of e sigma, e = e_u or e_c. Of the texture's part a share stays with the LED for a
 time (Gauss-Markov); the rest is new in every frame. An LED is seen that is on the sensor, not hidden, and whose
-brightest pixel is above y (1 + y_s N(0, 1)), y = y_0 + y_T T levels. A share of the seen, in proportion to T, gets no
+brightest pixel is above y exp(y_s N(0, 1)), y = y_0 + y_T T levels. A share of the seen, in proportion to T, gets no
 name, a share a wrong place. Fewer than `ring_least` LEDs are no ring, and none of them is named unless a belief that
 follows does it, that is while the last LEDs that were named are not too old. In a share of the frames, in proportion to
 T, no LED is named anyway.
@@ -294,7 +294,7 @@ class MeasuredLeds:
         error = np.sqrt(variance - lasting)[:, None] * numbers.new + np.sqrt(lasting)[:, None] * self._lasting
         error = ratio * error + np.where(uniform[:count, 1:] < p.stray_share, p.stray_px * numbers.stray, 0.0)
         faintest_dn, clutter = p.faintest_dn + p.faintest_dn_per_e * texture_e, texture_e / max(p.texture_e, 1.0)
-        bright = levels.max(axis=1) - self._black > faintest_dn * (1.0 + p.faintest_spread * numbers.level)
+        bright = levels.max(axis=1) - self._black > faintest_dn * np.exp(p.faintest_spread * numbers.level)
         named = np.flatnonzero(view.clear & bright & (uniform[:count, 0] >= clutter * p.unnamed_share))
         least = 1 if time_s - self._named_s <= self._followed_s else p.ring_least
         if len(named) < least or uniform[count, 0] < np.median(clutter) * p.no_ring_share:  # where the ring is

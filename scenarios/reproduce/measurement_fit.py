@@ -25,6 +25,7 @@ _PLAIN_S = 50e-6  # exposures up to here show nothing but the spot
 _BRIGHT_E = 15000.0  # a peak that noise hardly moves
 _LAGS = (5, 10, 25, 50)  # frames
 _FLOOR = 2e-3  # of a probability: something else may always go wrong
+_DARK_DN = 1e-3  # so that it has a logarithm
 _SOFT = 0.1  # of the logarithm of a sigma: beyond, residuals count linearly
 
 Fitted = dict[str, float]
@@ -102,11 +103,11 @@ def _errors(seen: Seen) -> Fitted:
 
 
 def _seen(seen: Seen, texture_e: Array, black_dn: float) -> Fitted:
-    peak = seen.spot_peak_dn - black_dn + 0.5
+    peak = np.maximum(seen.spot_peak_dn - black_dn + 0.5, _DARK_DN)
 
     def unlikely(x: Array) -> float:
         level = np.exp(x[0]) + np.exp(x[1]) * texture_e
-        p = norm.cdf((peak / level - 1.0) / np.exp(x[2]))
+        p = norm.cdf(np.log(peak / level) / np.exp(x[2]))
         p = _FLOOR + (1.0 - 2.0 * _FLOOR) * p
         return -float(np.sum(np.log(np.where(seen.found, p, 1.0 - p))))
 

@@ -279,12 +279,15 @@ def test_the_measurement_model_is_fitted_to_half_a_second_of_the_camera(less, tm
         FITTED=(
             ("still_air", standing(1.0, []), 0, 0.4),
             ("default", standing(4.0, measurement_model._dimmed()), 3, 0.6),
+            ("still_air", standing(1.0, []), 100, 0.4),
+            ("default", standing(4.0, measurement_model._dimmed()), 103, 0.6),
         ),
         HELD_OUT=(("default", standing(4.0, []), 10, 0.4),),
     )
     rows = made("measurement-model/fit", tmp_path)
-    sheet = rows.pop("sheet")
-    assert sheet["ours"].keys() == sheet["reference"].keys()
+    sheet, errors = rows.pop("sheet"), rows.pop("standard error")["ours"]
+    assert sheet["ours"].keys() == sheet["reference"].keys() == errors.keys()
+    assert 0.0 < errors["spot_sigma_px"] < 0.05
     for name, within in {"spot_sigma_px": 0.1, "error_over_sigma": 0.3}.items():
         assert sheet["ours"][name] == pytest.approx(sheet["reference"][name], rel=within), name
     ((case, row),) = rows.items()
