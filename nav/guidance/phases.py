@@ -228,6 +228,7 @@ TRANSITIONS: dict[Phase, tuple[Transition, ...]] = {
         ),
     ),
     Phase.HOLD: (
+        Transition(Phase.BREAKAWAY, "hose is slack", lambda limits, s: s.hose_is_slack),
         Transition(Phase.BREAKAWAY, "drogue has left the probe", _left),
         Transition(Phase.DISCONNECT, RED_LIGHT, lambda limits, s: s.light_is_red),
         Transition(Phase.DISCONNECT, REFUELLED, lambda limits, s: s.in_phase_s >= limits.hold_s),

@@ -418,6 +418,20 @@ def test_from_a_hose_that_contact_leaves_slack_it_goes_down_before_the_drogue_is
         assert guidance.phase is (Phase.BACK_OFF if red else Phase.BREAKAWAY)
 
 
+def test_from_a_slack_hose_it_goes_down_though_it_holds_already():
+    """As where less than a metre is to be pushed in: that is done before the hose is told to be slack."""
+    guidance = Guidance(SETTINGS, RATE_HZ)
+    for _ in range(RATE_HZ):
+        guidance.step(state([-DEPTH_M, 0.0, 0.0]))
+        guidance.phase = Phase.APPROACH
+    guidance.phase = Phase.CONTACT
+    guidance.step(turned([-DEPTH_M, 0.0, 0.0], 8.0))
+    guidance.phase = Phase.HOLD
+    down = [guidance.step(turned([-DEPTH_M, 0.0, 0.0], 8.0)).velocity_m_s[2] for _ in range(RATE_HZ)]
+    assert (guidance.phase, guidance.phase_reason) == (Phase.BREAKAWAY, "hose is slack")
+    assert min(down) < -1.0
+
+
 def test_a_receiver_that_a_red_light_called_back_goes_down_from_a_slack_hose_that_it_comes_to_all_the_same():
     guidance = Guidance(SETTINGS, RATE_HZ)
     for ahead_m in np.linspace(0.5, DEPTH_M, RATE_HZ):

@@ -94,6 +94,7 @@ OPENING = {"closing_m_s": -1.0}
         ("hold", HELD | {"in_phase_s": 4.9}, None),
         ("hold", HELD | {"in_phase_s": 5.0}, "disconnect"),
         ("hold", HELD | {"ahead_m": 0.5}, "breakaway"),
+        ("hold", HELD | {"hose_is_slack": True}, "breakaway"),
         ("hold", HELD | {"beside_m": 0.26}, "breakaway"),
         ("hold", HELD | {"beside_m": 0.26, "frames_stopped": True}, None),
         ("hold", HELD | {"track_lost_s": 0.6}, "breakaway"),
