@@ -40,7 +40,7 @@ class Evasion:
             situation: that it was decided on.
         """
         if phase not in _GOING_BACK:
-            self._was_held, self._left_s = False, 0.0
+            self._was_held, self._slipped_off, self._left_s = False, False, 0.0
             return False
         ends_hold, coupling = before in _ON_PROBE, (situation.ahead_m, situation.beside_m)
         self._was_held = self._was_held or ends_hold or is_reached(self._limits, *coupling)

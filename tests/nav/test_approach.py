@@ -432,6 +432,22 @@ def test_from_a_slack_hose_it_goes_down_though_it_holds_already():
     assert min(down) < -1.0
 
 
+def test_that_a_drogue_slipped_off_is_forgotten_by_the_next_attempt():
+    """It slips off, the camera stops for the whole way back; a later approach that comes back from the coupling."""
+    guidance = on_the_probe(Phase.CONTACT)
+    guidance.step(state([0.2, 0.1, 0.0]))
+    assert guidance.phase is Phase.BACK_OFF
+    while guidance.phase is Phase.BACK_OFF:
+        guidance.step(state([0.2, 0.1, 0.0], usable=False, age_s=9.0, frame_age_s=9.0))
+    for _ in range(RATE_HZ):
+        guidance.step(state([4.0, 0.0, 0.0]))
+    guidance.phase = Phase.BACK_OFF
+    guidance.step(state([-DEPTH_M, 0.0, 0.0]))  # where it may hang on the probe
+    lost = state([-DEPTH_M, 0.0, 0.0], usable=False, age_s=0.2, frame_age_s=0.0)
+    down = [guidance.step(lost).velocity_m_s[2] for _ in range(RATE_HZ // 2)]
+    assert guidance.phase is Phase.BACK_OFF and min(down) > -0.5
+
+
 def test_a_receiver_that_a_red_light_called_back_goes_down_from_a_slack_hose_that_it_comes_to_all_the_same():
     guidance = Guidance(SETTINGS, RATE_HZ)
     for ahead_m in np.linspace(0.5, DEPTH_M, RATE_HZ):
