@@ -56,7 +56,7 @@ class FusionSettings:
     held_rate_sigma_rad_s: float = 0.05
     held_rate_time_s: float = 0.25
     manoeuvre_s: float = 1.0  # how long the gyro's error of scale keeps its sign: of one roll or pitch movement
-    saturated_share: float = 0.999  # of the gyro's range; the last digit may be rounded down
+    saturated_share: float = 0.999  # of the range of gyros and accelerometers; the last digit may be rounded down
     gate_probability: float = 0.9999  # a good frame is refused once in 10 000
     #: Which of two minima is right: a frame counts three tenths, because the LEDs are as far off in the next one, and
     #: is forgotten within fifty, so that what they say for the wrong one does not add up.

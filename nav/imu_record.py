@@ -1,8 +1,9 @@
 """The IMU's samples of the last moments, in body axes: which are believed, and the rate between them.
 
 Not taken are samples that are not newer than the last, whose stamp or rate is not a number, or with a rate at the
-gyro's limit, which says no more than that the true one is beyond. A stamp that jumps ahead is not believed until a
-second one near it says the same, and by more than a minute never: then it is no gap but another clock.
+gyro's limit, which says no more than that the true one is beyond. A specific force at its limit is none. A stamp that
+jumps ahead is not believed until a second one near it says the same, and by more than a minute never: then it is no gap
+but another clock.
 
 Not modelled: a first stamp that is wrong. It sets the clock, and those of a right one that is behind it are too old.
 """
@@ -48,11 +49,12 @@ class ImuRecord:
     Args:
         mounting: of the IMU.
         gyro: its sheet.
-        saturated: share of the gyro's range from which on a rate says nothing.
+        saturated: share of their ranges from which on a rate or a specific force says nothing.
     """
 
     def __init__(self, mounting: Mounting, gyro: GyroSheet, saturated: float) -> None:
-        self._R_BI, self._limit_rad_s = np.ascontiguousarray(mounting.R_BI, dtype=float), saturated * gyro.range_rad_s
+        self._R_BI = np.ascontiguousarray(mounting.R_BI, dtype=float)
+        self._limits = saturated * gyro.range_rad_s, saturated * gyro.accelerometer_range_m_s2  # rad/s, m/s^2
         self._times, self._rates, self._forces = np.empty(_FIRST_ROOM), np.empty((_FIRST_ROOM, 3)), self._none()
         self._first = self._end = 0
         self.newest_s = -np.inf  #: stamp of the newest sample; -inf before the first
@@ -84,7 +86,7 @@ class ImuRecord:
             self._make_room()
         rate_I = np.asarray(sample.angular_rate_rad_s, dtype=float)
         force_I = np.asarray(sample.specific_force_m_s2, dtype=float)
-        if not _put(self._rates, self._forces, self._end, rate_I, force_I, self._R_BI, self._limit_rad_s):
+        if not _put(self._rates, self._forces, self._end, rate_I, force_I, self._R_BI, self._limits):
             return False
         self._times[self._end] = self.newest_s = sample.time_stamp_s
         self._end += 1
@@ -131,13 +133,18 @@ class ImuRecord:
 
 
 @njit(cache=True, error_model="numpy")
-def _put(rates: Array, forces: Array, k: int, rate_I: Array, force_I: Array, R_BI: Array, limit: float) -> bool:
-    """Put rate and force (3,) in body axes into row k; False if a rate is beyond the limit or not a number."""
+def _put(
+    rates: Array, forces: Array, k: int, rate_I: Array, force_I: Array, R_BI: Array, limits: tuple[float, float]
+) -> bool:
+    """Put rate and force (3,) in body axes into row k; False if a rate is beyond its limit or not a number."""
     for i in range(3):
-        if not abs(rate_I[i]) < limit:
+        if not abs(rate_I[i]) < limits[0]:
             return False
     np.dot(R_BI, rate_I, rates[k])
     np.dot(R_BI, force_I, forces[k])
+    for i in range(3):
+        if not abs(force_I[i]) < limits[1]:
+            forces[k] = np.nan
     return True
 
 

@@ -110,4 +110,5 @@ def _gyro_sheet(imu: ImuParameters, rate_hz: int) -> GyroSheet:
         range_rad_s=imu.gyro_range_rad_s,
         accelerometer_noise_density_m_s2_rthz=imu.accelerometer_noise_density_m_s2_rthz,
         accelerometer_bias_sigma_m_s2=imu.accelerometer_turn_on_bias_sigma_m_s2,
+        accelerometer_range_m_s2=imu.accelerometer_range_m_s2,
     )

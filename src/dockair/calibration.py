@@ -255,6 +255,7 @@ class GyroSheet:
     range_rad_s: float = float("inf")  #: of each axis
     accelerometer_noise_density_m_s2_rthz: float = 0.0
     accelerometer_bias_sigma_m_s2: float = 0.0  #: when switched on
+    accelerometer_range_m_s2: float = float("inf")  #: of each axis
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

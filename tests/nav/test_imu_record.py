@@ -39,6 +39,17 @@ def test_a_rate_at_the_limit_of_any_axis_is_not_taken(axis):
     assert not record().take(ImuSample(time_stamp_s=1.0, angular_rate_rad_s=rate_I))
 
 
+@pytest.mark.parametrize("axis", range(3))
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_a_force_at_the_limit_of_any_axis_is_none_and_its_rate_is_taken_all_the_same(axis, sign):
+    kept = ImuRecord(MOUNTING, replace(GYRO, accelerometer_range_m_s2=20.0), 0.999)
+    for time_s, force in ((1.0, 19.9), (1.1, 20.0), (1.2, 19.9)):
+        force_I = np.where(np.arange(3) == axis, sign * force, 1.0)
+        assert kept.take(ImuSample(time_stamp_s=time_s, angular_rate_rad_s=np.zeros(3), specific_force_m_s2=force_I))
+    assert np.isfinite(kept.forces_B).all(axis=1).tolist() == [True, False, True]
+    assert np.isnan(kept.mean_force_B(1.0, 1.2)).all()
+
+
 def test_rates_and_forces_are_turned_into_body_axes():
     R_BI = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     kept = ImuRecord(replace(MOUNTING, R_BI=R_BI), GYRO, 0.999)
