@@ -17,8 +17,9 @@ are right up to that symmetry (`absolute` says which). Roll is the angle of LED 
 from left (0) toward up (pi/2), averaged over the LEDs less their 45 degrees each: without tilt the drogue's roll.
 
 The order in which candidates come does not matter. Cost is bounded: at most `max_candidates` (nearest to the prior's
-circle, else the brightest, else the uppermost), all their triples, beyond `few_candidates` in three patterns of slots
-only, and `max_fits` exact fits; twice that when a prediction fails and the ring is looked for as without.
+circle where it has a radius, too, else the brightest, else the uppermost), all their triples, beyond `few_candidates`
+in three patterns of slots only, and `max_fits` exact fits; twice that when a prediction fails and the ring is looked
+for as without.
 """
 
 from typing import TypeGuard
@@ -166,14 +167,14 @@ def _candidates(points: Array, prior: RingPrior, flux: Array, most: int) -> NDAr
     """Indices of the candidates that take part, in reading order: the order they come in does not matter."""
     index = np.flatnonzero((np.abs(points) < ANYWHERE_PX).all(axis=1))  # no frame is so large; false for NaN
     index = index[np.lexsort((flux[index], points[index, 0], points[index, 1]))]
+    rank = -flux[index]
     if prior.has_centre:
         # perspective makes the near side of a ring larger, by at most a tenth beyond 2 m
         reach = prior.gate[2] + 1.15 * prior.radius_range_px[1]
         distance = np.hypot(*(points[index] - prior.centre_px).T)
-        index, distance = index[distance <= reach], distance[distance <= reach]
-        rank = np.abs(distance - prior.expected_radius_px)
-    else:
-        rank = -flux[index]
+        index, distance, rank = index[distance <= reach], distance[distance <= reach], rank[distance <= reach]
+        if not np.isnan(prior.expected_radius_px):
+            rank = np.abs(distance - prior.expected_radius_px)
     return index[np.sort(np.argsort(rank, kind="stable")[:most])]
 
 

@@ -190,6 +190,19 @@ def test_the_brightest_take_part_when_there_are_too_many():
     np.testing.assert_array_equal(np.sort(result.members), np.arange(80, 88))
 
 
+def test_the_brightest_take_part_when_there_are_too_many_about_a_centre_of_which_the_radius_is_not_known():
+    rng = np.random.default_rng(8)
+    clutter = rng.uniform([600.0, 100.0], [1200.0, 390.0], (40, 2))  # all above the ring, and read before it
+    points, brightness = np.vstack([clutter, leds()]), np.concatenate([np.full(40, 100.0), np.full(8, 2000.0)])
+    for radius_px in (None, 100.0):
+        result = identify(
+            points, settings=IdentifySettings(max_candidates=20), brightness=brightness,
+            expected_centre_px=np.array([900.0, 500.0]), expected_radius_px=radius_px,
+        )  # fmt: skip
+        assert result.status is FOUND
+        assert set(result.members) == set(range(40, 48))
+
+
 @both_methods
 @pytest.mark.parametrize("count", range(8))
 def test_degenerate_candidates_give_no_ring_and_no_crash(method, count):
