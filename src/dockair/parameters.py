@@ -52,9 +52,9 @@ def sheet_names() -> list[str]:
 @cache
 def read_sheet(sheet: str) -> Mapping[str, Parameter]:
     """All parameters of a sheet, checked: no missing field, no empty source, low <= value <= high."""
-    path = files("dockair.assets").joinpath("parameters", f"{sheet}.toml")
-    if not path.is_file():
+    if sheet not in sheet_names():  # a file that is found by a path, as "../parameters/hose", is no sheet of that name
         raise DockairError("parameters", expected="a parameter sheet", got=sheet, exists=sheet_names())
+    path = files("dockair.assets").joinpath("parameters", f"{sheet}.toml")
     table = tomllib.loads(path.read_text(encoding="utf-8"))
     return {key: _parameter(f"{sheet}.toml: {key}", entry) for key, entry in table.items()}
 

@@ -106,10 +106,11 @@ def test_sheet_and_dataclass_must_have_the_same_keys(sheet, text):
         load_parameters("hose", Hose)
 
 
-def test_unknown_sheet_is_refused_with_the_known_ones(sheet):
+@pytest.mark.parametrize("name", ["hoze", "../parameters/hose", "./hose", "h" * 300, "a\0b", ""])
+def test_unknown_sheet_is_refused_with_the_known_ones(sheet, name):
     sheet(GOOD)
     with pytest.raises(DockairError) as error:
-        read_sheet("hoze")
+        read_sheet(name)
     assert error.value.exists == ("hose",)
 
 
