@@ -212,7 +212,7 @@ def _require_decisive(layers: Layers) -> None:
 
 def _require_as_drawn(source: PlanFile, scenario: Scenario, point: Point) -> None:
     """Refuse a drawn key that another setting replaces: its column would be of no flight."""
-    for key, drawn in point.items():
+    for key, drawn in _from_folder(point, source.folder).items():
         flown = _value_at(scenario, key)
         if flown != drawn:
             where, expected = source.place(f'draw."{key}"'), "a key in whose place nothing else is set or drawn"

@@ -515,3 +515,13 @@ def test_paths_of_sheets_in_a_plan_are_taken_from_its_folder_as_those_of_scenari
     monkeypatch.chdir(tmp_path.parent)
     (job,) = jobs_of(source)[:1]
     assert job.scenario.hardware.ring == str(source.folder / "ring.toml")
+
+
+def test_sheets_that_are_drawn_are_taken_from_the_plans_folder_too(plan, monkeypatch, tmp_path):
+    source = plan('scenarios = ["default"]\nsampler = "grid"\n[draw."hardware.ring"]\nvalues = ["a.toml", "b.toml"]')
+    for name in ("a.toml", "b.toml"):
+        (source.folder / name).write_text(f"# {name}\ndiameter_m = 0.5\ncount = 8\n")
+    monkeypatch.chdir(tmp_path.parent)
+    jobs = jobs_of(source)
+    assert [job.drawn for job in jobs] == [{"hardware.ring": name} for name in ("a.toml", "b.toml")]
+    assert [job.scenario.hardware.ring for job in jobs] == [str(source.folder / name) for name in ("a.toml", "b.toml")]
