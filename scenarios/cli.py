@@ -266,11 +266,23 @@ def _require_background(scenario: "Scenario") -> None:
         print(f"dockair: no OpenGL here ({why_analytic()}): the camera's background is analytic", file=sys.stderr)
 
 
+def _working_folder() -> str:
+    """Return the folder that one stands in.
+
+    Raises:
+        DockairError: it has been removed.
+    """
+    try:
+        return str(Path.cwd())
+    except OSError as error:
+        raise DockairError("working folder", expected="one that is there", got=error.strerror) from None
+
+
 def main() -> None:
     """Run a command; what a person did wrong ends in one line on stderr, not in a traceback."""
     outlive_readers()
-    sys.path.append(str(Path.cwd()))  # where one's own navigator lies; last, so that it hides nothing
     try:
+        sys.path.append(_working_folder())  # where one's own navigator lies; last, so that it hides nothing
         status = app(standalone_mode=False)
         sys.stdout.flush()
         if status == 130:  # typer makes a status of Ctrl-C

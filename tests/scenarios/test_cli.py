@@ -376,6 +376,15 @@ def test_a_stream_that_is_closed_is_no_traceback(arguments, status, closed):
     assert "Traceback" not in done.stderr and "dockair: " not in done.stdout
 
 
+@pytest.mark.parametrize("arguments", ["--version", "doctor", "fly nosuch"])
+def test_a_working_folder_that_has_gone_is_one_line_and_status_two(tmp_path, arguments):
+    (tmp_path / "gone").mkdir()
+    command = f'rmdir ../gone; "{sys.executable}" -m dockair {arguments}'
+    done = subprocess.run(["sh", "-c", command], cwd=tmp_path / "gone", capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == "dockair: working folder: expected one that is there, got 'No such file or directory'\n"
+
+
 def test_a_path_of_any_bytes_is_printed_as_it_is():
     code = "import os; from dockair.scenarios.std_streams import outlive_readers; outlive_readers()"
     done = subprocess.run([sys.executable, "-c", f"{code}; print(os.fsdecode(b'out/\\xff'))"], capture_output=True)
