@@ -22,7 +22,8 @@ from dockair.parameters import read_sheet
 from dockair.rotations import Array
 
 UNITS = {"rad/s": 1.0, "deg/s": float(np.pi / 180.0)}  #: in rad/s
-_NAMED = {"rad/s": re.compile(r"rad[/_]s(?![a-z])"), "deg/s": re.compile(r"deg[/_]s(?![a-z])")}
+#: Whole units alone: "mdeg/s" is a thousandth of one, "rad/s^2" and "rad_s2" no rate.
+_NAMED = {f"{angle}/s": re.compile(rf"(?<![a-z]){angle}[/_]s(?![a-z0-9²^]|\*\*)") for angle in ("rad", "deg")}
 _SHEET = "imu_mti"  # whose keys, units and ranges are written
 _LONG = 10.0  # correlation times that a record should last for B and K to be told apart
 _OPTIONS = {"sample_rate_hz": "--rate-hz", "bias_correlation_s": "--bias-correlation-s", "terms": "--terms"}
