@@ -28,10 +28,12 @@ def design_ring(
     from dockair.scenarios import design_ring_options as options
     from dockair.scenarios import design_ring_output as design
     from dockair.scenarios.output import show_working
+    from dockair.scenarios.output_folder import made_folder
 
     rings = options.rings_from_options(rim, inner, depth, diameter, spacing)
     corridor = options.corridor_from_options(ranges, tilt, sigma_px, camera)
-    folder = design.prepared_folder(out or Path("out") / "design-ring")
+    options.require_ranking(by)
+    folder = made_folder(out or Path("out") / "design-ring")
     with show_working(f"comparing {len(rings)} rings"):
         ranking = options.ranking_from(rings, corridor, by)
         tried = design.trials_of(ranking, trials)

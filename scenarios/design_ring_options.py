@@ -78,14 +78,18 @@ def numbers(option: str, text: str, low: float, high: float, unit: str) -> list[
     return list(dict.fromkeys(found))
 
 
-def ranking_from(rings: list[RingDesign], corridor: Corridor, by: str) -> Ranking:
-    """Return the ranking.
+def require_ranking(by: str) -> None:
+    """Refuse what nothing is ranked by.
 
     Raises:
         DockairError: no such ranking.
     """
     if by not in RANKINGS:
         raise DockairError("--by", expected="what to rank by", got=by, exists=RANKINGS)
+
+
+def ranking_from(rings: list[RingDesign], corridor: Corridor, by: str) -> Ranking:
+    """Return the ranking; `by` is one of RANKINGS."""
     low, high = corridor.ranges_m[[0, -1]]
     at = _AT_RANGE_M if low <= _AT_RANGE_M <= high else float(np.sqrt(low * high))
     return rank(rings, corridor, by, at)

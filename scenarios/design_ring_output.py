@@ -7,7 +7,6 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from dockair.errors import DockairError
 from dockair.nav.dop.dilution import DopStatus
 from dockair.rotations import Array
 from dockair.scenarios.design_ring import Corridor, Ranking, RingDesign, RingMap, bound_at
@@ -113,20 +112,6 @@ def _shown(ranking: Ranking) -> list[RingMap]:
     """The default ring, the best flat one and the best."""
     flat = next(ring for ring in ranking.maps if ring.design.inner == 0)
     return list({id(ring): ring for ring in (ranking.default, flat, ranking.maps[0])}.values())
-
-
-def prepared_folder(out: Path) -> Path:
-    """Return the folder for the picture, made when it did not exist.
-
-    Raises:
-        DockairError: it cannot be written.
-    """
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        (out / PICTURE).touch()
-    except OSError as error:
-        raise DockairError(f"--out {out}", expected="a folder that can be written", got=error.strerror) from None
-    return out
 
 
 def draw(ranking: Ranking, folder: Path) -> Path:

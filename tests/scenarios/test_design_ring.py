@@ -23,7 +23,7 @@ from dockair.scenarios.design_ring import (
     map_ring,
     rank,
 )
-from dockair.scenarios.design_ring_options import corridor_from_options, numbers, ranking_from, rings_from_options
+from dockair.scenarios.design_ring_options import corridor_from_options, numbers, rings_from_options
 from dockair.scenarios.design_ring_output import PICTURE, draw, trials_of
 from dockair.scenarios.design_ring_trials import try_ring
 
@@ -263,9 +263,10 @@ def test_with_json_the_command_prints_one_object_and_nothing_else(command, tmp_p
     assert np.shape(best["sigma"]["range_m"]) == (9, 5) and len(best["points_D_m"]) == 9
 
 
-def test_an_unknown_ranking_is_refused_with_those_that_exist():
-    with pytest.raises(DockairError, match="exists: all, range, lateral, attitude, camera"):
-        ranking_from([FLAT], CORRIDOR, "luck")
+def test_an_unknown_ranking_is_refused_with_those_that_exist_and_leaves_nothing(command, tmp_path):
+    status, _, err = command(*SMALL, "--by", "luck", "--out", str(tmp_path / "out"))
+    assert status == 2 and "exists: all, range, lateral, attitude, camera" in err
+    assert not (tmp_path / "out").exists()
 
 
 def test_attitudes_turn_by_the_tilt_about_axes_across_the_line_of_sight():
