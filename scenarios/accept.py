@@ -90,27 +90,31 @@ class Accept(Table):
         closure_speed_m_s: float | None,
         unsafe: Sequence[str] = (),
         *,
+        angle_deg: float | None = None,
         refuelled: bool = True,
     ) -> list[str]:
-        """Return a line for each figure that one flight did not reach; the two figures are None without contact."""
+        """Return a line for each figure that one flight did not reach; those of a contact are None without one."""
         lines = [f"unsafe: {what}" for what in unsafe]
         if self.outcome is not None and outcome != self.outcome:
             lines.append(f"outcome {outcome}, wanted {self.outcome}")
         if self.refuelled_rate_min and outcome == "contact" and not refuelled:
             lines.append("docked, and has not refuelled")
         offset_max_m, speed_max_m_s = self.radial_offset_max_m, self.closure_speed_max_m_s
+        angle_max_deg: float | None = None
         if self.clean_rate_min is not None and self.outcome is None:
             if outcome not in ("contact", *_UNTOUCHED):
                 lines.append(f"outcome {outcome}, wanted a contact or a clean departure")
             good = _good_contact()
             offset_max_m = offset_max_m or good.radial_offset_m
             speed_max_m_s = speed_max_m_s or good.closure_speed_m_s
+            angle_max_deg = good.angle_deg
         limits = (
-            ("radial offset", radial_offset_m, 0.0, offset_max_m, "m"),
+            ("radial offset", radial_offset_m, None, offset_max_m, "m"),
             ("closure speed", closure_speed_m_s, self.closure_speed_min_m_s, speed_max_m_s, "m/s"),
+            ("angle", angle_deg, None, angle_max_deg, "deg"),
         )
         for label, value, low, high, unit in limits:
-            if value is None:
+            if value is None or (low is None and high is None):
                 continue
             low, high = low or 0.0, np.inf if high is None else high
             if not low <= value <= high:  # also when the value is NaN

@@ -84,6 +84,7 @@ def held_to(accept: Accept, result: Result) -> Result:
         contact.radial_offset_m if contact else None,
         contact.closure_speed_m_s if contact else None,
         result.unsafe,
+        angle_deg=contact.angle_deg if contact else None,
         refuelled=was_refuelled(result.fuel_kg, [entry.reason for entry in result.timeline]),
     )
     return replace(result, shortfalls=tuple(lines) if lines or accept.claims_figures else None)

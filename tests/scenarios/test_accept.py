@@ -144,6 +144,13 @@ def test_the_acceptance_in_words_names_every_figure_asked_for():
     assert Accept().in_words == ""
 
 
+def test_what_could_not_be_measured_is_no_shortfall_where_nothing_is_asked_of_it():
+    nothing = float("nan")
+    assert Accept().shortfalls("contact", nothing, nothing, angle_deg=nothing) == []
+    speed = Accept(closure_speed_min_m_s=1.0)
+    assert speed.shortfalls("contact", nothing, nothing) == ["closure speed nan m/s, wanted 1 to inf"]
+
+
 def test_what_was_unsafe_in_one_flight_is_a_shortfall_of_any_scenario():
     assert Accept().shortfalls("contact", 0.1, 1.2, ("touch at 2.70 m/s",)) == ["unsafe: touch at 2.70 m/s"]
 
@@ -165,6 +172,9 @@ def test_one_flight_that_is_asked_to_be_clean_is_held_to_it():
     assert clean.shortfalls("contact", 0.14, 1.2) == []
     assert clean.shortfalls("contact", 0.24, 1.2) == ["radial offset 0.240 m, wanted 0 to 0.15"]
     assert clean.shortfalls("contact", 0.14, 2.7) == ["closure speed 2.700 m/s, wanted 0 to 2.6"]
+    assert clean.shortfalls("contact", 0.14, 1.2, angle_deg=9.9) == []
+    assert clean.shortfalls("contact", 0.14, 1.2, angle_deg=12.0) == ["angle 12.000 deg, wanted 0 to 10"]
+    assert Accept(outcome="contact").shortfalls("contact", 0.14, 1.2, angle_deg=12.0) == []  # no good one is asked for
     assert Accept(clean_rate_min=1.0, outcome="timeout").shortfalls("timeout", None, None) == []  # asked for by name
 
 

@@ -172,6 +172,12 @@ def test_a_flight_that_docks_and_is_called_back_is_not_as_claimed(command, fligh
     assert json.loads(out)["shortfalls"] == ["docked, and has not refuelled"]
 
 
+def test_a_flight_that_docks_askew_is_not_as_claimed_where_a_campaign_would_not_count_it():
+    askew = Contact(time_s=9.87, radial_offset_m=0.042, closure_speed_m_s=1.23, angle_deg=12.0)
+    result = a_result(load_scenario("severe_gusts"), 0, "out", contact=askew)
+    assert result.shortfalls == ("angle 12.000 deg, wanted 0 to 10",)
+
+
 def test_flying_without_a_name_flies_the_default_scenario_with_its_own_seed(command, flights):
     assert command("fly")[0] == 0
     assert (flights[0].scenario.name, flights[0].seed) == ("default", 0)
