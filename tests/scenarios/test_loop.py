@@ -131,6 +131,24 @@ def test_simulation_that_diverges_ends_the_flight_with_an_outcome_and_a_log_with
         assert np.isfinite(value).all()
 
 
+def test_a_flight_that_diverges_on_the_probe_has_diverged_and_its_attempt_has_docked(monkeypatch):
+    whole = World.step
+
+    def step(world, command):
+        if world.truth.tick >= 60:
+            raise DivergedError("world", expected="a physics step that converges", got="diverged at 0.061 s")
+        truth = whole(world, command)
+        return replace(truth, latched=truth.tick >= 20)
+
+    monkeypatch.setattr(World, "step", step)
+    flight = Flight(truth_flight(), 0)
+    for _ in range(7):
+        tick = flight.step()
+    assert tick.outcome is Outcome.DIVERGED and flight.referee.contact is not None
+    (attempt,) = flight.referee.attempt_log(tick.truth.time_s, tick.outcome)
+    assert attempt.outcome == "contact"
+
+
 def test_flight_that_diverges_is_recorded_to_its_last_sound_tick(tmp_path, monkeypatch):
     whole = World.step
 
