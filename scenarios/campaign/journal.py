@@ -29,7 +29,7 @@ class Journal:
         unread: there is no looking into it, for it will be cleared: damage is no matter then.
 
     Raises:
-        DockairError: another process writes it; a line other than the last is no entry; it cannot be opened.
+        DockairError: another process writes it; a line is no entry, and not the last one torn; it cannot be opened.
     """
 
     def __init__(self, folder: Path, *, unread: bool = False) -> None:
@@ -113,7 +113,7 @@ def read(path: Path) -> tuple[dict[str, Entry], int]:
     """Return the entries by key, later ones in place of earlier, and how many bytes they take.
 
     Raises:
-        DockairError: it cannot be read; a line other than the last is no entry.
+        DockairError: it cannot be read; a line is no entry, and not the last one torn.
     """
     entries: dict[str, Entry] = {}
     try:
@@ -122,13 +122,22 @@ def read(path: Path) -> tuple[dict[str, Entry], int]:
         raise DockairError(str(path), expected="a journal that can be read", got=error.strerror) from None
     for number, line in enumerate(lines, start=1):
         entry = _entry(line)
-        if entry is None and number < len(lines):
+        if entry is None and (number < len(lines) or _is_whole(line)):
             expected = "an entry of a campaign (`dockair campaign --fresh` begins it anew)"
             raise DockairError(f"{path}:{number}", expected=expected, got=line[:40])
         if entry is not None:
             entries[entry["key"]] = entry
             size += len(line)
     return entries, size
+
+
+def _is_whole(line: bytes) -> bool:
+    """Whether a line was written to its end: what it holds is then of no power cut, as an older version's row."""
+    try:
+        json.loads(line)
+    except (ValueError, RecursionError):
+        return False
+    return line.endswith(b"\n")
 
 
 def _entry(line: bytes) -> Entry | None:

@@ -229,6 +229,17 @@ def test_a_line_whose_row_is_no_row_is_damage(here, tmp_path, change):
             read(tmp_path / "out")
 
 
+def test_a_last_line_that_is_whole_and_no_entry_is_damage_and_stays(here, tmp_path):
+    """As where an older version's rows lacked a column: to cut it off would lose a flight without a word."""
+    fly(plan(tmp_path), tmp_path / "out")
+    entry = json.loads(lines(tmp_path / "out/journal.jsonl")[3])
+    del entry["row"]["cause"]
+    before = damaged(tmp_path / "out", 3, json.dumps(entry).encode() + b"\n")
+    with pytest.raises(DockairError, match=r"journal.jsonl:4: expected an entry of a campaign .*--fresh"):
+        fly(plan(tmp_path), tmp_path / "out")
+    assert (tmp_path / "out/journal.jsonl").read_bytes() == before
+
+
 def test_a_damaged_manifest_is_one_line_and_fresh_writes_another(here, tmp_path):
     fly(plan(tmp_path), tmp_path / "out")
     for text in ("", '{"plan": {"name": "p"}, "plug_ins": 3}'):
