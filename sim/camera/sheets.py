@@ -1,5 +1,6 @@
 """Parameter sheets of the camera: one frozen dataclass a file of `assets/parameters`, same keys, units there."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any
@@ -12,6 +13,7 @@ from dockair.rotations import Array
 
 OUTPUTS_OF_BITS = {10: (2, 4, 8, 16), 12: (2, 4)}  #: CMV2000: the LVDS outputs that can read so many bits a pixel
 OUTPUT_BIT_RATE_HZ = 480e6  #: CMV2000: the most that an output sends, 10 bits at 48 MHz or 12 at 40 MHz
+_ANGLES = 181  # from the Sun, at which the sky's light must not be negative
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -229,9 +231,22 @@ class SkyParameters:
     earth_radius_m: float
 
     def __post_init__(self) -> None:
-        """Refuse a sky overhead that endless air could not make."""
+        """Refuse a sky overhead that endless air could not make, and air that sends out less than no light."""
         if not self.zenith < self.airlight:
             raise DockairError("sky.zenith", expected=f"less than sky.airlight = {self.airlight}", got=self.zenith)
+        if np.any(self.beyond_even(np.cos(np.linspace(0.0, np.pi, _ANGLES))) < -1.0):
+            where, expected = "sky.aureole_decay_1_rad", "a decay that leaves light away from the Sun, for sky.aureole"
+            raise DockairError(where, expected=f"{expected} = {self.aureole}", got=self.aureole_decay_1_rad)
+
+    def beyond_even(self, cosine: Array) -> Array:
+        """(n,) f - 1 of [sky_radiance, eq 1]: how much more a beam makes than light from all round.
+
+        Args:
+            cosine: (n,) of the angle from the Sun.
+        """
+        decay = self.aureole_decay_1_rad
+        decayed = np.exp(-decay * np.arccos(cosine)) - math.exp(-0.5 * math.pi * decay)
+        return np.asarray(self.aureole * decayed + self.molecular * cosine * cosine)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -199,11 +199,7 @@ class SkyRadiance:
 
     def _source(self, cosine: Array, light: float, direct: float) -> Array:
         """J of Eq. (1) in air that `light` of all sunlight reaches, `direct` of that as a beam."""
-        p = self.parameters
-        angle = np.arccos(cosine)
-        decayed = np.exp(-p.aureole_decay_1_rad * angle) - math.exp(-0.5 * math.pi * p.aureole_decay_1_rad)
-        shape = p.aureole * decayed + p.molecular * cosine * cosine
-        return np.asarray(p.airlight * light * (1.0 + direct * shape))
+        return np.asarray(self.parameters.airlight * light * (1.0 + direct * self.parameters.beyond_even(cosine)))
 
     def _haze(self, cosine: Array) -> Array:
         """J_h of Eq. (7): the beam that gets through the haze makes J, the rest of the light is the same all round."""
