@@ -14,22 +14,26 @@ from dockair.scenarios.build_measured import require_measurable
 from dockair.scenarios.nominal_sheets import nominal_camera, nominal_ring
 from dockair.scenarios.plug_in import navigator_class_of
 from dockair.scenarios.schema import Scenario
+from dockair.sim.basket import require_fit
 from dockair.sim.camera.camera_noise import CameraNoise
 from dockair.sim.camera.defects import Defects
 from dockair.sim.camera.readout import row_time_s, shortest_period_s
 from dockair.sim.camera.sheets import CameraSheets
 from dockair.sim.faults import Faults
 from dockair.sim.hose.chain import DrogueParameters
+from dockair.sim.hose.coupling import CouplingParameters
 
 
 def require_buildable(scenario: Scenario) -> None:
-    """Refuse a rate of the camera, calibration sheets and faults that do not fit one another, and no navigator.
+    """Refuse a rate of the camera, sheets and faults that do not fit one another, and no navigator.
 
     Raises:
         DockairError: one of them does not, or the navigator's class is none.
     """
-    ring = nominal_ring(scenario)
-    _check_ring(ring, load_parameters("drogue", DrogueParameters, scenario.parameters.get("drogue")))
+    ring, own = nominal_ring(scenario), scenario.parameters
+    drogue = load_parameters("drogue", DrogueParameters, own.get("drogue"))
+    _check_ring(ring, drogue)
+    require_fit(drogue, load_parameters("coupling", CouplingParameters, own.get("coupling")))
     faults = Faults([table.fault for table in scenario.faults], ring.count)
     if scenario.navigation.is_truth:
         return

@@ -21,6 +21,21 @@ _SOCKET_STAVES = 12  # capsules around the coupling's mouth
 _CANOPY_PANELS = 24
 
 
+def require_fit(drogue: DrogueParameters, coupling: CouplingParameters) -> None:
+    """Refuse a coupling point that no tip can get to.
+
+    Raises:
+        DockairError: it does not lie between the throat and the hose's end.
+    """
+    where, bottom = "parameters.coupling.depth_m", coupling.depth_m + coupling.stop_gap_m
+    if not drogue.throat_x_m < coupling.depth_m:
+        expected = f"more than drogue.throat_x_m = {drogue.throat_x_m}, where the bore begins"
+        raise DockairError(where, expected=expected, got=coupling.depth_m)
+    if not bottom < drogue.hose_joint_x_m:
+        end, gap = f"drogue.hose_joint_x_m = {drogue.hose_joint_x_m}", f"coupling.stop_gap_m = {coupling.stop_gap_m}"
+        raise DockairError(where, expected=f"less than {end} by more than {gap}", got=coupling.depth_m)
+
+
 def grey(reflectance: float) -> list[float]:
     """RGBA of a reflectance."""
     return [reflectance, reflectance, reflectance, 1.0]
@@ -39,7 +54,11 @@ def add_drogue(body: Any, drogue: DrogueParameters, coupling: CouplingParameters
         drogue: sheet.
         coupling: sheet.
         touched_by: contact bits of what it collides with.
+
+    Raises:
+        DockairError: of `require_fit`.
     """
+    require_fit(drogue, coupling)
     body.explicitinertial, body.mass = True, drogue.mass_kg
     body.ipos, body.inertia = [drogue.centre_of_mass_x_m, 0.0, 0.0], drogue.inertia_kg_m2
     solid = {

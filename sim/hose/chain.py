@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
+from dockair.errors import DockairError
 from dockair.rotations import Array
 
 
@@ -46,7 +47,11 @@ class HoseParameters:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class DrogueParameters:
-    """assets/parameters/drogue.toml. Axes D: origin in the LED ring's centre, x forward along the hose."""
+    """assets/parameters/drogue.toml. Axes D: origin in the LED ring's centre, x forward along the hose.
+
+    Raises:
+        DockairError: no body, or a basket out of order.
+    """
 
     mass_kg: float
     drag_diameter_m: float
@@ -74,6 +79,19 @@ class DrogueParameters:
     contact_time_constant_s: float
     reflectance: float
     canopy_reflectance: float
+
+    def __post_init__(self) -> None:
+        """Refuse what is no body, and a basket out of order: LEDs, then the rim, then the throat."""
+        least, middle, most = np.sort(self.inertia_kg_m2)
+        if not least + middle >= most:
+            where, expected = "drogue.inertia_kg_m2", "the inertia of a body, no moment above the sum of the others"
+            raise DockairError(where, expected=expected, got=np.asarray(self.inertia_kg_m2).tolist())
+        if not self.rim_tube_radius_m < self.rim_x_m:
+            expected = f"more than drogue.rim_tube_radius_m = {self.rim_tube_radius_m}, or the rim hides the LEDs"
+            raise DockairError("drogue.rim_x_m", expected=expected, got=self.rim_x_m)
+        if not self.rim_x_m < self.throat_x_m:
+            expected = f"more than drogue.rim_x_m = {self.rim_x_m}"
+            raise DockairError("drogue.throat_x_m", expected=expected, got=self.throat_x_m)
 
     @property
     def drag_area_m2(self) -> float:

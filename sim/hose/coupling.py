@@ -22,13 +22,18 @@ from enum import Enum
 
 import numpy as np
 
+from dockair.errors import DockairError
 from dockair.sim.truth import Truth
 from dockair.vectors import cross
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CouplingParameters:
-    """assets/parameters/coupling.toml."""
+    """assets/parameters/coupling.toml.
+
+    Raises:
+        DockairError: a probe that does not fit the bore.
+    """
 
     depth_m: float
     capture_distance_m: float
@@ -46,6 +51,15 @@ class CouplingParameters:
     probe_boom_radius_m: float
     probe_boom_length_m: float
     probe_reflectance: float
+
+    def __post_init__(self) -> None:
+        """Refuse a probe whose tip is not its foremost point, or too thick for the bore."""
+        if not self.probe_boom_radius_m <= self.probe_tip_radius_m:
+            expected = f"at most coupling.probe_tip_radius_m = {self.probe_tip_radius_m}"
+            raise DockairError("coupling.probe_boom_radius_m", expected=expected, got=self.probe_boom_radius_m)
+        if not self.probe_tip_radius_m < self.socket_radius_m:
+            expected = f"less than coupling.socket_radius_m = {self.socket_radius_m}, or no tip gets in"
+            raise DockairError("coupling.probe_tip_radius_m", expected=expected, got=self.probe_tip_radius_m)
 
 
 class CouplingState(Enum):

@@ -1,12 +1,16 @@
 """The drogue's geometry, and whether its sheets fit each other."""
 
+import mujoco
 import numpy as np
 import pytest
 
 from dockair.calibration import LedRing
 from dockair.errors import DockairError
 from dockair.parameters import load_parameters
+from dockair.rotations import quaternion_from_matrix
 from dockair.sim.basket import place_leds
+from dockair.sim.camera.obstacles import Obstacles
+from dockair.sim.camera.occlusion import hidden
 from dockair.sim.hose.chain import DrogueParameters
 from dockair.sim.hose.coupling import CouplingParameters
 
@@ -24,9 +28,55 @@ def test_tip_anywhere_at_the_bottom_of_the_bore_is_near_enough_to_latch():
     assert np.hypot(aside, COUPLING.stop_gap_m) < COUPLING.capture_distance_m
 
 
-def test_coupling_point_lies_in_the_bore_behind_the_throat_and_before_the_hose():
-    assert DROGUE.rim_x_m < DROGUE.throat_x_m < COUPLING.depth_m
-    assert COUPLING.depth_m + COUPLING.stop_gap_m < DROGUE.hose_joint_x_m
+@pytest.mark.parametrize(
+    ("drogue", "coupling", "words"),
+    [
+        ({"rim_x_m": 0.01}, {}, "drogue.rim_x_m: expected more than drogue.rim_tube_radius_m = 0.02"),
+        ({"rim_x_m": 0.02}, {}, "drogue.rim_x_m"),
+        ({"rim_x_m": 0.1, "throat_x_m": 0.1}, {}, "drogue.throat_x_m: expected more than drogue.rim_x_m = 0.1"),
+        ({"throat_x_m": 0.3}, {}, "parameters.coupling.depth_m: expected more than drogue.throat_x_m = 0.3"),
+        ({}, {"depth_m": 0.6}, "parameters.coupling.depth_m: expected less than drogue.hose_joint_x_m = 0.55"),
+        ({}, {"depth_m": 0.47, "stop_gap_m": 0.1}, "parameters.coupling.depth_m: expected less than"),
+        ({}, {"probe_tip_radius_m": 0.05}, "coupling.probe_tip_radius_m: expected less than coupling.socket"),
+        (
+            {},
+            {"probe_boom_radius_m": 0.04},
+            "coupling.probe_boom_radius_m: expected at most coupling.probe",
+        ),
+        ({"inertia_kg_m2": [1.5, 0.5, 0.5]}, {}, "drogue.inertia_kg_m2: expected the inertia of a body"),
+    ],
+)
+def test_a_basket_or_coupling_out_of_order_is_refused_although_every_value_is_in_its_range(
+    make_world, drogue, coupling, words
+):
+    with pytest.raises(DockairError) as caught:
+        make_world(drogue=drogue, coupling=coupling)
+    assert str(caught.value).startswith(words)
+
+
+@pytest.mark.parametrize(
+    ("drogue", "coupling"),
+    [
+        ({"rim_x_m": 0.021, "throat_x_m": 0.1}, {"depth_m": 0.15}),
+        ({"rim_tube_radius_m": 0.029, "throat_x_m": 0.299}, {"depth_m": 0.49}),
+        ({"inertia_kg_m2": [1.0, 0.5, 0.5]}, {"probe_tip_radius_m": 0.049, "probe_boom_radius_m": 0.049}),
+    ],
+)
+def test_of_what_is_just_in_order_every_led_is_seen_and_the_tip_reaches_the_coupling_point(
+    make_world, drogue, coupling
+):
+    world = make_world(drogue=drogue, coupling=coupling)
+    model, data = world.model, world.data
+    R_WD, p_WD = data.body("drogue").xmat.reshape(3, 3), data.body("drogue").xpos
+    lens_W, leds_W = p_WD + R_WD @ np.array([-3.0, 0.3, 0.2]), p_WD + LedRing().positions_D @ R_WD.T
+    assert not hidden(Obstacles.of(model), data, lens_W, leds_W, 0.01).any()
+    address, tip_B = model.joint("receiver").qposadr[0], world.parameters.mounting.p_BP
+    data.qpos[address : address + 3] = data.site("coupling").xpos - R_WD @ tip_B
+    data.qpos[address + 3 : address + 7] = quaternion_from_matrix(R_WD)
+    model.opt.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
+    mujoco.mj_forward(model, data)
+    probe = [i for i in range(model.ngeom) if model.geom(i).name.startswith("probe_")]
+    assert not np.isin(data.contact.geom, probe).any()
 
 
 @pytest.mark.parametrize("name", ["rim", "rib", "stave"])
