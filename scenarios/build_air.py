@@ -6,6 +6,7 @@ from typing import Protocol, TypeVar
 import numpy as np
 
 from dockair.clock import Clock
+from dockair.errors import DockairError
 from dockair.rotations import Array
 from dockair.scenarios.schema import Scenario
 from dockair.sim.air.bow_wave import BowWaveParameters, bow_wave_coefficients
@@ -47,12 +48,16 @@ def air_motion(
         receiver_span_m: for the rolling gust.
         receiver_points_B: (m, 3) where the receiver feels the air, body axes [m].
         settle_s: how long the world runs before time 0.
+
+    Raises:
+        DockairError: turbulence whose field ends before the receiver's tail.
     """
     turbulence_sheet = load("turbulence", TurbulenceParameters)
     wake_sheet = load("wake", WakeParameters)
     bow_wave_sheet = load(scenario.hardware.receiver_sheet("bow_wave"), BowWaveParameters)
     V = world.airspeed_m_s
-    gusts = _turbulence(scenario, turbulence_sheet, V, clock, rng, receiver_span_m)
+    rearmost_m = _rearmost_m(scenario, world, receiver_points_B)
+    gusts = _turbulence(scenario, turbulence_sheet, V, clock, rng, receiver_span_m, rearmost_m)
     single = _single_gusts(scenario, world, clock, settle_s) if scenario.gusts else None
     wake = bow_wave = None
     if scenario.wake.present:
@@ -68,6 +73,12 @@ def air_motion(
     return AirMotion(gusts, single, wake, bow_wave, exit_T=exit_T, receiver_points_B=receiver_points_B)
 
 
+def _rearmost_m(scenario: Scenario, world: WorldParameters, receiver_points_B: Array) -> float:
+    """How far aft of the hose's exit, at most, the receiver feels the air where the flight begins [m]."""
+    tail_m = float(world.mounting.p_BP[0] - np.min(receiver_points_B[:, 0]))
+    return float(world.hose.length_m + scenario.start.aft_m + tail_m)
+
+
 def _turbulence(
     scenario: Scenario,
     parameters: TurbulenceParameters,
@@ -75,6 +86,7 @@ def _turbulence(
     clock: Clock,
     rng: np.random.Generator,
     span_m: float,
+    rearmost_m: float,
 ) -> DrydenField | None:
     turbulence = scenario.turbulence
     if turbulence.model == "none":
@@ -84,6 +96,12 @@ def _turbulence(
         sigma = gust_sigma(turbulence.intensity, scenario.flight.altitude_m)
     if sigma is not None:
         parameters = replace(parameters, sigma_m_s=sigma)
+    if parameters.extent_m - parameters.front_m < rearmost_m:
+        least_m = np.ceil(parameters.front_m + rearmost_m)
+        expected = (
+            f"at least {least_m:.0f} m, from turbulence.front_m back over hose and receiver; beyond it is one gust"
+        )
+        raise DockairError("parameters.turbulence.extent_m", expected=expected, got=parameters.extent_m)
     return DrydenField(parameters, airspeed_m_s, clock.step_s, rng, span_m)
 
 

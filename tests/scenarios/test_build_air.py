@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from dockair.clock import Clock
+from dockair.errors import DockairError
 from dockair.parameters import load_parameters
 from dockair.scenarios.build_air import air_motion
 from dockair.scenarios.schema import load_scenario
@@ -55,6 +56,15 @@ def test_each_table_switches_on_one_source_and_no_other(make, settings, there):
     air = make(settings)
     for name in ("gusts", "discrete", "wake", "bow_wave"):
         assert (getattr(air, f"_{name}") is not None) == (name == there)
+
+
+@pytest.mark.parametrize(("start_m", "least_m"), [(4.0, 70.0), (40.0, 106.0)])
+def test_a_field_that_ends_before_the_receivers_tail_is_refused(make, start_m, least_m):
+    """Front 40 m, hose 15 m, the tail 11 m behind the tip."""
+    settings = DRYDEN | {"start.aft_m": start_m}
+    make(settings | {"parameters.turbulence.extent_m": least_m})
+    with pytest.raises(DockairError, match=f"parameters.turbulence.extent_m: expected at least {least_m:.0f} m"):
+        make(settings | {"parameters.turbulence.extent_m": least_m - 0.1})
 
 
 def test_turbulence_none_overrules_a_strength_and_leaves_the_wake(make):
