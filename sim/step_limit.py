@@ -13,7 +13,10 @@ its joints go up and down by turns: then each joint moves m/3, and the tow is bo
 bending (M, K: mass and hinge stiffness of the chain), tension T, and the tube in the pod, which holds each joint by
 k_g, its stiffness times l, with a damping ratio z_g, and turns each link by k_g l^2 (`hose.reel.guide_loads`). It is
 the bound of an endless chain in the tube: whatever length of hose is wound in, it holds. Contacts and stops as soft
-springs need two steps in their time constant, or MuJoCo makes them softer in silence.
+springs need two steps in their time constant, or MuJoCo makes them softer in silence. The reel's brake, F_b over a band
+v_b of speed, and the drum's damping d act on all that the reel moves; Eq. (1) without a spring,
+
+    (F_b/v_b + d) dt < 2 m,      m = drum + hose + drogue                                                (4)
 Not modelled: the damping of hinges, which is implicit, and that of the air, which is explicit but slower.
 Source: Hairer, Lubich & Wanner, Geometric Numerical Integration, ch. I; MuJoCo's documentation on solver parameters;
 Eqs. (2) and (3) derived from the chain's kinetic and potential energy in that motion.
@@ -44,6 +47,7 @@ def check_step(model: mujoco.MjModel, parameters: WorldParameters, root_tension_
     key = min(softest, key=lambda name: softest[name])
     needed_hz = {key: _STEPS_IN_CONTACT / softest[key]}
     needed_hz["hose and reel"] = lowest_rate_hz(model, parameters, root_tension_n)
+    needed_hz["parameters.reel.brake_force_n over speed_band_m_s"] = lowest_rate_of_brake_hz(parameters)
     cause = max(needed_hz, key=lambda name: needed_hz[name])
     if step_s * needed_hz[cause] > 1.0 + 1e-9:  # rounding of a step that just fits
         lowest = int(np.ceil(needed_hz[cause] - 1e-9))
@@ -67,3 +71,10 @@ def lowest_rate_hz(model: mujoco.MjModel, parameters: WorldParameters, root_tens
     squared = bending + string + 15.0 * tube  # Eq. (2)
     damping = (6.0 + 24.0 / np.sqrt(3.0)) * reel.guide_damping_ratio * np.sqrt(tube)  # Eq. (3)
     return float(0.25 * (damping + np.sqrt(damping**2 + 4.0 * squared)))
+
+
+def lowest_rate_of_brake_hz(parameters: WorldParameters) -> float:
+    """Physics rate at which Eq. (4) is just met."""
+    hose, reel = parameters.hose, parameters.reel
+    moved_kg = reel.drum_mass_kg + hose.line_density_kg_m * hose.length_m + parameters.drogue.mass_kg
+    return float(0.5 * (reel.brake_force_n / reel.speed_band_m_s + reel.drum_damping_n_s_m) / moved_kg)

@@ -6,7 +6,9 @@ import pytest
 import dockair.sim.world
 from dockair.errors import DockairError
 from dockair.messages import ReceiverCommand
-from dockair.sim.step_limit import lowest_rate_hz
+from dockair.parameters import load_parameters
+from dockair.sim.hose.reel import Reel, ReelParameters
+from dockair.sim.step_limit import lowest_rate_hz, lowest_rate_of_brake_hz
 
 
 def test_step_longer_than_half_a_contact_is_refused_with_its_key(make_world):
@@ -24,6 +26,29 @@ def test_step_too_long_for_the_tube_is_refused_with_the_hose(make_world):
     stiff = {"reel": {"guide_stiffness_n_m2": 360000.0}, "hose": {"links": 40}}
     with pytest.raises(DockairError, match=r"rates\.physics_hz: expected at least \d+ Hz, because of hose and reel"):
         make_world(rate_hz=1000, **stiff)
+
+
+HARD_BRAKE = {"brake_force_n": 20000.0, "speed_band_m_s": 0.1, "drum_mass_kg": 10.0}
+
+
+def test_step_too_long_for_the_reels_brake_is_refused_with_its_keys(make_world):
+    keys = r"parameters\.reel\.brake_force_n over speed_band_m_s"
+    with pytest.raises(DockairError, match=rf"rates\.physics_hz: expected at least 1094 Hz, because of {keys}"):
+        make_world(rate_hz=1000, reel=HARD_BRAKE)
+
+
+@pytest.mark.parametrize(("share", "settles"), [(1.02, True), (0.98, False)])
+def test_below_the_brakes_rate_a_hose_that_runs_out_chatters_and_above_it_does_not(make_world, share, settles):
+    """One mass, pulled out by twice the set-point, under the reel's own law."""
+    world = make_world(rate_hz=1200, reel=HARD_BRAKE)
+    p, sheet = world.parameters, load_parameters("reel", ReelParameters, HARD_BRAKE)
+    step_s, rate_m_s, last = 1.0 / (share * lowest_rate_of_brake_hz(p)), 0.0, []
+    moved_kg = sheet.drum_mass_kg + p.hose.length_m * p.hose.line_density_kg_m + p.drogue.mass_kg
+    reel = Reel(sheet, static_root_tension_n=1918.0, static_pull_n=1876.0, set_point_n=1726.0, step_s=step_s)
+    for _ in range(4000):
+        rate_m_s += step_s * (reel.step(1726.0, 6.0, rate_m_s) - 3452.0) / moved_kg
+        last.append(rate_m_s)
+    assert (np.ptp(last[-200:]) < 1e-6) == settles
 
 
 def test_bound_grows_with_stiffness_with_damping_and_with_the_number_of_links(make_world):
