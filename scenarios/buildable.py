@@ -25,11 +25,12 @@ from dockair.sim.hose.coupling import CouplingParameters
 
 
 def require_buildable(scenario: Scenario) -> None:
-    """Refuse a rate of the camera, sheets and faults that do not fit one another, and no navigator.
+    """Refuse a flight into the ground, a rate of the camera, sheets and faults that do not fit, and no navigator.
 
     Raises:
         DockairError: one of them does not, or the navigator's class is none.
     """
+    _check_altitude(scenario)
     ring, own = nominal_ring(scenario), scenario.parameters
     drogue = load_parameters("drogue", DrogueParameters, own.get("drogue"))
     _check_ring(ring, drogue)
@@ -52,6 +53,18 @@ def _check_navigator(name: str) -> None:
     except DockairError as error:
         got = f"{name}: {error.got}"
         raise DockairError("navigation.navigator", expected=error.expected, got=got) from error
+
+
+def _check_altitude(scenario: Scenario) -> None:
+    """A toboggan ends above the ground: from under it the camera sees no Earth."""
+    flight, tanker = scenario.flight, scenario.tanker
+    if tanker.manoeuvre != "toboggan":
+        return
+    descends_s = max(flight.duration_s - tanker.starts_s, 0.0)
+    down_m = float(np.sin(np.radians(tanker.descent_deg))) * flight.airspeed_m_s * descends_s
+    if not flight.altitude_m > down_m:
+        expected = f"more than {down_m:.1f} m, as far as the tanker goes down in flight.duration_s"
+        raise DockairError("flight.altitude_m", expected=expected, got=flight.altitude_m)
 
 
 def _check_ring(ring: LedRing, drogue: DrogueParameters) -> None:

@@ -34,6 +34,7 @@ _TILE, _SIDE, _SHIFT = TILE, SIDE, 6  # as of `layer_tiles`; the power of 2
 _STEEPEST = 2.74  # as of `sky_table`
 _STRETCH = 2.0  # most by which Eq. (2) widens the way between two directions
 _KEYS_PER_DEPTH = 3.0
+_LEAST_DEPTH_M = 1.0  # for the keys' distance: a flight may begin on the layer
 _FROM, _UNTIL = 0.05, 0.45  # way from a key, in keys' distances, over which the next one's tiles are made
 _LOOK_AGAIN = 16  # frames from one look at what the next key lacks to another
 
@@ -70,7 +71,7 @@ class LayerTable:
         self, function: Callable[[Array, Array], Array], tiles: int, channels: int, height_m: float, radius_m: float
     ) -> None:
         self._height_m, self._radius_m, self._tiles = height_m, radius_m, tiles
-        self._keys = Keys(height_m / _KEYS_PER_DEPTH)
+        self._keys = Keys(max(height_m, _LEAST_DEPTH_M) / _KEYS_PER_DEPTH)
         self._own, self._next = (LayerTiles(function, tiles, channels) for _ in range(2))
         self._is_missing = np.zeros_like(self._own.is_known)  # false between looks
         self._count = 0

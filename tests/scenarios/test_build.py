@@ -13,6 +13,7 @@ from dockair.messages import Window
 from dockair.nav.guidance.approach import GuidanceSettings
 from dockair.parameters import load_parameters
 from dockair.scenarios.build import build, guidance_settings
+from dockair.scenarios.buildable import require_buildable
 from dockair.scenarios.message_log import numbers
 from dockair.scenarios.mounting_parameters import MountingParameters
 from dockair.scenarios.schema import load_scenario
@@ -121,6 +122,14 @@ def test_the_truth_is_given_to_no_navigator_but_truth(monkeypatch):
     monkeypatch.setitem(sys.modules, "disguise", SimpleNamespace(Disguised=Disguised))
     with pytest.raises(DockairError, match="perfect navigation"):
         build(load_scenario("still_air", {"navigation.navigator": "disguise:Disguised"}), 0)
+
+
+def test_a_toboggan_into_the_ground_is_refused_with_how_far_down_it_goes():
+    """180 m/s down 3 degrees for 118 s."""
+    with pytest.raises(DockairError, match=r"altitude_m: expected more than 1111.6 m, as far as the tanker goes"):
+        require_buildable(load_scenario("toboggan", {"flight.altitude_m": 1111.0}))
+    require_buildable(load_scenario("toboggan", {"flight.altitude_m": 1112.0}))
+    require_buildable(load_scenario("still_air", {"flight.altitude_m": 0.0}))
 
 
 def test_a_ring_that_does_not_fit_the_drogue_is_refused():

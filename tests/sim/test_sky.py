@@ -340,3 +340,13 @@ def test_a_sky_that_nobody_needs_is_gone_at_once() -> None:
         assert table() is None
     finally:
         gc.enable()
+
+
+def test_a_flight_that_begins_on_the_ground_sees_it_from_above_and_none_from_below() -> None:
+    sky = Sky(SkyRadiance(load_parameters("sky", SkyParameters), Weather(), np.array([-0.8, 0.1, 0.5]), 0.0, 5))
+    x, y = np.linspace(-0.02, 0.02, 8), np.array([-0.03, -0.01, 0.02, 0.05])
+    above, below = np.empty((2, 4, 8), dtype=np.float32)
+    sky.fill(above, np.eye(3), x, y, np.array([10.0, 0.0, 5.0]))
+    sky.fill(below, np.eye(3), x, y, np.array([10.0, 0.0, -5.0]))
+    np.testing.assert_array_equal(above[:2], below[:2])
+    assert np.isfinite(above).all() and (above[2:] != below[2:]).all()
