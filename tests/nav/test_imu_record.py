@@ -97,6 +97,18 @@ def test_mean_rate_is_of_the_samples_in_the_interval_or_else_the_rate_there():
     np.testing.assert_array_equal(record().mean_rate_B(0.0, 1.0), np.zeros(3))
 
 
+def test_of_a_control_period_as_many_samples_count_at_every_tick():
+    """500 Hz, stamps even to a microsecond as the messages', ticks not: a sixth sample would be 10 ms old."""
+    kept = record()
+    for k in range(2000):
+        kept.take(sample(round(0.002 * k, 6), 0.001 * k))
+    for tick in range(1, 400):
+        time_s = tick / 100.0 * (1.0 + 1e-10 * (-1) ** tick)
+        newest = round(time_s * 500)
+        if newest < 2000:
+            assert kept.mean_rate_B(time_s - 0.01, time_s)[1] == pytest.approx(0.001 * (newest - 2.0)), tick
+
+
 def test_a_stamp_that_leaps_needs_a_second_one():
     stamps = Stamps(1.0)
     assert stamps.believed(5.0, -np.inf)
