@@ -60,11 +60,15 @@ class ContactWatch:
             time_s: stamp of its frame.
         """
         is_newest = self._tested(checked, points_D, time_s)
-        self._used_time_s = float(np.fmax(time_s, self._used_time_s))  # a late one, too, has corrected the belief
+        self.corrected(time_s)  # as a late one has, too
         if not is_newest:
             return
         if self._coasting.due(time_s):
             self._ask_coasting(time_s)
+
+    def corrected(self, time_s: float) -> None:
+        """Take note of a frame that has corrected the belief, also with LEDs too few for a pose."""
+        self._used_time_s = float(np.fmax(time_s, self._used_time_s))
 
     def refused(self, checked: Integrity, points_D: Array, time_s: float) -> None:
         """Take note of a pose that passed its own test and has not corrected the belief; arguments as of `used`."""

@@ -293,6 +293,7 @@ class Navigator:
             self._contact.contradicted(time_s)
             return "LEDs refused by the gate"
         self._used_time_s = max(time_s, self._used_time_s)
+        self._contact.corrected(time_s)
         return "LEDs used"
 
     def contact_claim(self) -> ContactClaim | None:
