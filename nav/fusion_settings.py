@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import solve_continuous_lyapunov
 
-from dockair.calibration import GyroSheet, NavigationSheets
+from dockair.calibration import GyroSheet, LedRing, NavigationSheets
 from dockair.errors import DockairError
 from dockair.nav.belief import Taking
 from dockair.nav.belief_motion import GUST, PHI, REST, SWING, SWING_RATE, VELOCITY, Motion
@@ -76,10 +76,11 @@ class FusionSettings:
     longest_gap_s: float = 0.02  # between samples of acceleration: a receiver does not change it much sooner
     longest_step_s: float = 0.01  # of Eq. (2) of `belief_motion`: the swing's period is 300 of them
     #: Hardware beside its sheets, 1 sigma each: 0.05 degrees of mounting and 1 px of principal point; 2 mm of mounting;
-    #: 0.05 % of focal length and 0.3 mm of the ring's diameter of 0.5 m (as-built hardware is drawn so).
+    #: 0.05 % of focal length; 0.3 mm of the ring's diameter (as-built hardware is drawn so).
     camera_axes_sigma_rad: float = 9.4e-4
     camera_place_sigma_m: float = 2e-3
-    camera_scale_sigma: float = 7.8e-4
+    focal_scale_sigma: float = 5e-4
+    ring_diameter_sigma_m: float = 3e-4
     led_place_sigma_m: float = 3e-4  # each LED, in the ring's plane
     led_place_share: float = 0.3  # of what a frame says of the LEDs' places (docs/fusion.md)
     #: LEDs out of the ring's plane and the lens's distortion show as places that change with the view: 0.03 mm in 10 s.
@@ -162,7 +163,7 @@ def start_of(settings: FusionSettings, sheets: NavigationSheets) -> Belief:
             np.full(3, settings.start_formation_sigma_m_s2**2 + gyro.accelerometer_bias_sigma_m_s2**2),
             np.full(3, turning2),
             np.zeros(3),
-            _hardware_variances(settings, len(sheets.ring.positions_D)),
+            _hardware_variances(settings, sheets.ring),
         ]
     )
     P = np.diag(variances)
@@ -187,13 +188,13 @@ def swing_covariance(settings: FusionSettings, axis: int) -> Array:
     return np.asarray(solve_continuous_lyapunov(A, -np.diag([0.0, settings.drogue_acceleration_density**2, gust2])))
 
 
-def _hardware_variances(settings: FusionSettings, leds: int) -> Array:
-    """(23,) of camera axes, camera place, scale, and of each LED's place."""
+def _hardware_variances(settings: FusionSettings, ring: LedRing) -> Array:
+    """(23,) of camera axes, camera place, scale (lens and ring show alike), and of each LED's place."""
     return np.concatenate(
         [
             np.full(3, settings.camera_axes_sigma_rad**2),
             np.full(3, settings.camera_place_sigma_m**2),
-            [settings.camera_scale_sigma**2],
-            np.full(2 * leds, settings.led_place_sigma_m**2),
+            [settings.focal_scale_sigma**2 + (settings.ring_diameter_sigma_m / ring.diameter_m) ** 2],
+            np.full(2 * len(ring.positions_D), settings.led_place_sigma_m**2),
         ]
     )

@@ -118,7 +118,8 @@ def calibrated(settings: FusionSettings) -> FusionSettings:
         settings,
         camera_axes_sigma_rad=0.0,
         camera_place_sigma_m=0.0,
-        camera_scale_sigma=0.0,
+        focal_scale_sigma=0.0,
+        ring_diameter_sigma_m=0.0,
         led_place_sigma_m=0.0,
         led_place_walk_m_rts=0.0,
     )

@@ -10,7 +10,7 @@ from dockair.calibration import Camera, GyroSheet, LedRing, Mounting, Navigation
 from dockair.errors import DockairError
 from dockair.messages import ImuSample
 from dockair.nav import belief_buffer
-from dockair.nav.belief_motion import ERRORS, GUST, SWING, SWING_RATE, VELOCITY, propagated
+from dockair.nav.belief_motion import CALIBRATION, ERRORS, GUST, SWING, SWING_RATE, VELOCITY, propagated
 from dockair.nav.fusion import FusionSettings, RelativeFilter
 from dockair.nav.fusion_settings import motion_of, refusals_until_doubt, start_of, swing_covariance, taking_of
 from dockair.nav.pose.estimate import PoseEstimate, solve_pose
@@ -38,7 +38,8 @@ CALIBRATED = dict.fromkeys(
     (
         "camera_axes_sigma_rad",
         "camera_place_sigma_m",
-        "camera_scale_sigma",
+        "focal_scale_sigma",
+        "ring_diameter_sigma_m",
         "led_place_sigma_m",
         "led_place_walk_m_rts",
     ),
@@ -247,6 +248,14 @@ def test_before_the_first_message_the_drogue_has_swung_in_gusts_for_ever():
     np.testing.assert_allclose(after[kept] / size, P[kept] / size, atol=0.01)
     more = P[VELOCITY, VELOCITY].diagonal() - P[SWING_RATE, SWING_RATE].diagonal()
     np.testing.assert_allclose(more, SETTINGS.start_velocity_sigma_m_s**2, rtol=1e-12)
+
+
+@pytest.mark.parametrize("diameter_m", [0.25, 0.5, 0.8])
+def test_a_rings_size_is_known_to_as_many_millimetres_whatever_it_is(diameter_m):
+    """What of it is scale goes with one over the diameter; the lens's part does not."""
+    start = start_of(FusionSettings(), replace(sheets(5.0), ring=LedRing(diameter_m=diameter_m)))
+    scale = np.sqrt(start.P.diagonal()[CALIBRATION.stop - 1])  # the last of the seven
+    assert scale == pytest.approx(np.hypot(5e-4, 3e-4 / diameter_m))
 
 
 def test_turning_of_the_receiver_alone_leaves_the_drogue_where_it_is():
@@ -537,7 +546,7 @@ def test_without_doubt_it_would_not_come_back():
 def test_calibration_errors_that_frames_do_not_average_stay_in_the_covariance():
     """15 cameras turned, misplaced, with rings of another size, as the settings say: 0.8 s of frames, NEES honest."""
     axes, place, scale = 2e-3, 4e-3, 1e-3
-    settings = replace(SETTINGS, camera_axes_sigma_rad=axes, camera_place_sigma_m=place, camera_scale_sigma=scale)
+    settings = replace(SETTINGS, camera_axes_sigma_rad=axes, camera_place_sigma_m=place, focal_scale_sigma=scale)
     values, plain = [], []
     for seed in range(15):
         rng = np.random.default_rng((60, seed))
