@@ -25,6 +25,7 @@ from dockair.messages import Window
 from dockair.rotations import Array
 
 _PRINCIPAL_POINT_OFF = 0.25  # of width and height, in a sheet; a camera made by code may count pixels from anywhere
+_RAYS, _RAY_OFF_PX = 9, 1e-3  # a side of the pixels that are asked for their rays, and how far off they may come back
 _INVERSE_DISTORTION_ITERATIONS = 20  # fixed point; contracts by about 0.1 a step for lenses of this class
 
 
@@ -103,6 +104,17 @@ class Camera:
         _check_vector(self.principal_point_px, 2, bound, "camera.principal_point_px", "2 numbers [px]")
         if self.distortion is not None:
             _check_vector(self.distortion, 5, 10.0, "camera.distortion", "5 numbers k1, k2, p1, p2, k3")
+            self._check_rays()
+
+    def _check_rays(self) -> None:
+        """Each pixel's ray is found: a lens that distorts much folds the picture over, or the steps to it run away."""
+        u, v = np.meshgrid(np.linspace(0, self.width_px - 1, _RAYS), np.linspace(0, self.height_px - 1, _RAYS))
+        pixels = np.column_stack([u.ravel(), v.ravel()])
+        with np.errstate(all="ignore"):  # what runs away is not equal
+            again = self.pixels_from_points(self.rays_from_pixels(pixels))
+        if not np.allclose(again, pixels, rtol=0.0, atol=_RAY_OFF_PX):
+            expected = "a lens that distorts by less: of this one not every pixel's direction is found"
+            raise DockairError("camera.distortion", expected=expected, got=self.distortion)
 
     @classmethod
     def from_toml(cls, path: str | Path) -> Self:

@@ -87,6 +87,8 @@ def test_led_k_stands_at_k_eighths_from_left_to_up_in_the_plane_across_x():
         (lambda: Camera(pixel_pitch_m=float("nan")), "camera.pixel_pitch_m"),
         (lambda: Camera(distortion=(0.1, 0.2)), "camera.distortion"),  # type: ignore[arg-type]
         (lambda: Camera(distortion=(float("nan"), 0.0, 0.0, 0.0, 0.0)), "camera.distortion"),
+        (lambda: Camera(distortion=(-2.5, 0.0, 0.0, 0.0, 0.0)), "camera.distortion"),  # folds over within the sensor
+        (lambda: Camera(distortion=(5.0, 0.0, 0.0, 0.0, 0.0)), "camera.distortion"),  # the steps run away
         (lambda: Camera(principal_point_px=(1023.5, 1e6)), "camera.principal_point_px"),
         (lambda: Camera(focal_length_m=16.0), "camera.focal_length_m"),
         (lambda: Camera(width_px=2048.0), "camera.width_px"),  # type: ignore[arg-type]
