@@ -17,6 +17,7 @@ springs need two steps in their time constant, or MuJoCo makes them softer in si
 v_b of speed, and the drum's damping d act on all that the reel moves; Eq. (1) without a spring,
 
     (F_b/v_b + d) dt < 2 m,      m = drum + hose + drogue                                                (4)
+
 Not modelled: the damping of hinges, which is implicit, and that of the air, which is explicit but slower.
 Source: Hairer, Lubich & Wanner, Geometric Numerical Integration, ch. I; MuJoCo's documentation on solver parameters;
 Eqs. (2) and (3) derived from the chain's kinetic and potential energy in that motion.
