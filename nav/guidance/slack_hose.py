@@ -1,13 +1,15 @@
 """Whether the reel takes up the hose at contact, told by how the drogue turns on the probe.
 
 A hose that is taken up stays taut, and holds the drogue along itself. One that is not is slack within a tenth of a
-second: the drogue, on the probe, turns with every wave that the blow of contact sends up and down it, long before they
-tear it off. With the drogue's axis a in axes that do not turn with the receiver,
+second: it sags and lets the drogue's nose down, on the probe, and turns it with every wave that the blow of contact
+sends up and down it, long before they tear it off. With the drogue's axis a, forward, in axes that do not turn with the
+receiver, and its mean a' before contact,
 
-    tilt = median angle between a and its mean before contact                                             (1)
+    drop = median of (elevation of a' - elevation of a),     tilt = median angle between a and a'          (1)
 
-since the blow of contact, which turns the drogue on a taut hose, too, is over. It is asked for some time, for a slack
-hose may lie straight for a moment between two waves.
+since the blow of contact, which turns the drogue on a taut hose, too, is over. Gusts and the push of the probe turn it
+on a taut hose as well, but up or aside: so less of a drop than of a tilt tells a slack one. It is asked for some time,
+for a slack hose may lie straight for a moment between two waves.
 
 Nothing is said where the drogue has not been seen on the probe for half of that time.
 
@@ -36,7 +38,7 @@ class SlackHose:
         self._limits, self._step_s = limits, step_s
         self._before: deque[Array] = deque(maxlen=round(limits.slack_before_s / step_s))
         self._contact_s = -np.inf  # since contact; -inf before it
-        self._tilts_rad: list[float] = []  # since the blow was over, where it was seen on the probe
+        self._turns_rad: list[tuple[float, float]] = []  # since the blow was over, where it was seen on the probe
         self.is_slack = False  #: nothing takes up the hose
 
     def step(self, phase: Phase, coupling: Array, along: Array, *, seen: bool) -> None:
@@ -45,13 +47,13 @@ class SlackHose:
         Args:
             phase: that is flown; a receiver that is called back may still come to the coupling.
             coupling: (3,) from the probe's tip [m].
-            along: (3,) the drogue's axis, of any length. Both in axes that do not turn with the receiver.
+            along: (3,) the drogue's axis, forward, of any length. Both in axes that do not turn with the receiver.
             seen: whether that is known of frames that have not stopped.
         """
         self._contact_s += self._step_s
         if phase in _BEFORE:
             self._contact_s, self.is_slack = -np.inf, False
-            self._tilts_rad.clear()
+            self._turns_rad.clear()
             if seen:
                 self._before.append(along)
             return
@@ -61,11 +63,23 @@ class SlackHose:
         if self.is_slack or not limits.slack_from_s <= self._contact_s <= limits.slack_to_s:
             return
         if seen and self._before and not is_off_the_probe(limits, ahead_m, beside_m):
-            self._tilts_rad.append(_angle_rad(along, np.sum(self._before, axis=0)))
+            self._turns_rad.append(turn_rad(along, np.sum(self._before, axis=0)))
         looked = round((self._contact_s - limits.slack_from_s) / self._step_s) + 1
-        if looked >= round(limits.slack_over_s / self._step_s) and len(self._tilts_rad) >= 0.5 * looked:
-            self.is_slack = float(np.median(self._tilts_rad)) > limits.slack_tilt_rad
+        if looked >= round(limits.slack_over_s / self._step_s) and len(self._turns_rad) >= 0.5 * looked:
+            drop_rad, tilt_rad = np.median(self._turns_rad, axis=0)
+            self.is_slack = bool(drop_rad > limits.slack_drop_rad or tilt_rad > limits.slack_tilt_rad)
 
 
-def _angle_rad(a: Array, b: Array) -> float:
-    return float(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b))
+def turn_rad(along: Array, before: Array) -> tuple[float, float]:
+    """How far the axis has dropped and by what angle it has turned [rad], Eq. (1) but for the medians.
+
+    Args:
+        along: (3,) the axis, forward, of any length; z up.
+        before: (3,) the same before contact.
+    """
+    angle_rad = np.arctan2(np.linalg.norm(np.cross(along, before)), along @ before)
+    return _elevation_rad(before) - _elevation_rad(along), float(angle_rad)
+
+
+def _elevation_rad(a: Array) -> float:
+    return float(np.arctan2(a[2], np.hypot(a[0], a[1])))

@@ -1,4 +1,4 @@
-"""How far the drogue turns on the probe after contact: on hoses that the reel takes up, and on ones that it does not.
+"""How far the drogue drops and turns on the probe after contact, on hoses that the reel takes up and on slack ones.
 
 Each flight is flown on measured LEDs until little more than half a second after contact, and the navigation's own
 belief of the drogue's axis is held against its mean of the second before, as `nav.guidance.slack_hose` does; the
@@ -13,20 +13,21 @@ from typing import Any
 import numpy as np
 
 from dockair.nav.guidance.phases import PhaseLimits
+from dockair.nav.guidance.slack_hose import turn_rad
 from dockair.rotations import Array
 from dockair.scenarios.loop import Flight
 from dockair.scenarios.reproduce.reference import picture_name
 from dockair.scenarios.schema import load_scenario
 
 ID = "guidance/slack-hose"
-TITLE = "how far the drogue turns on the probe after contact, on hoses that are taken up and on slack ones"
+TITLE = "how far the drogue drops and turns on the probe after contact, on hoses that are taken up and on slack ones"
 _SOURCE = "none: the two kinds of hose beside each other"
 #: Scenario -> how many seeds; the first is a dead reel.
 FLOWN: Mapping[str, int] = {"dead_reel_unnoticed": 8, "default": 4, "moderate_gusts": 8, "slow_set": 4, "racetrack": 2}
 _FIRST_SEED = 25867
 _OVERRIDES = {"camera.sensing": "measurements"}
 _AFTER_S, _LONGEST_S = 0.6, 90.0
-_SIZE_IN, _DPI = (7.0, 4.2), 110
+_SIZE_IN, _DPI = (9.0, 4.2), 110
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -40,8 +41,8 @@ class Contact:
 
 
 def reproduce(out: Path | None) -> dict[str, Any]:
-    """Fly; the angle over time in `out`."""
-    turned: dict[str, list[tuple[Array, Array]]] = {}
+    """Fly; the angles over time in `out`."""
+    turned: dict[str, list[Array]] = {}
     rows = []
     for name, seeds in FLOWN.items():
         flown = [contact(name, seed) for seed in range(_FIRST_SEED, _FIRST_SEED + seeds)]
@@ -76,45 +77,51 @@ def contact(scenario: str, seed: int) -> Contact | None:
     return Contact(before=np.array(axes[first:start]), after=np.array(axes[start:]), step_s=step_s, told_slack=told)
 
 
-def turn_deg(found: Contact) -> tuple[Array, Array]:
-    """(m,) times since contact [s], and (m,) angles from the mean axis before it."""
+def turn_deg(found: Contact) -> Array:
+    """(m, 3) time since contact [s], drop and angle from the mean axis before it [deg]."""
     rest = found.before.mean(axis=0)
-    sine = np.linalg.norm(np.cross(found.after, rest), axis=1)
-    times = found.step_s * np.arange(len(found.after))
-    return times, np.degrees(np.arctan2(sine, found.after @ rest))
+    turned = np.degrees([turn_rad(axis, rest) for axis in found.after])
+    return np.column_stack([found.step_s * np.arange(len(turned)), turned])
 
 
-def tilt_deg(found: Contact) -> float:
-    """Eq. (1) of `nav.guidance.slack_hose`, the greatest."""
-    limits, (times, angles) = PhaseLimits(), turn_deg(found)
-    looked_at = angles[(times >= limits.slack_from_s) & (times <= limits.slack_to_s)]
+def medians_deg(found: Contact) -> Array:
+    """(2,) drop and tilt of Eq. (1) of `nav.guidance.slack_hose`, the greatest."""
+    limits, turned = PhaseLimits(), turn_deg(found)
+    looked_at = turned[(turned[:, 0] >= limits.slack_from_s) & (turned[:, 0] <= limits.slack_to_s), 1:]
     least = round(limits.slack_over_s / found.step_s)
-    return float(max(np.median(looked_at[:n]) for n in range(least, len(looked_at) + 1)))
+    medians: Array = np.array([np.median(looked_at[:n], axis=0) for n in range(least, len(looked_at) + 1)])
+    return medians.max(axis=0)
 
 
 def _figures(contacts: list[Contact]) -> dict[str, float]:
-    tilts = [tilt_deg(found) for found in contacts]
-    if not tilts:
+    if not contacts:
         return {"contacts": 0}
+    drop, tilt = np.transpose([medians_deg(found) for found in contacts])
     return {
         "contacts": len(contacts),
-        "least_deg": min(tilts),
-        "most_deg": max(tilts),
+        "least_drop_deg": drop.min(),
+        "most_drop_deg": drop.max(),
+        "least_tilt_deg": tilt.min(),
+        "most_tilt_deg": tilt.max(),
         "told_slack": sum(found.told_slack for found in contacts),
     }
 
 
-def _draw(turned: Mapping[str, list[tuple[Array, Array]]], path: Path) -> None:
+def _draw(turned: Mapping[str, list[Array]], path: Path) -> None:
     from matplotlib.figure import Figure
 
     limits = PhaseLimits()
     figure = Figure(figsize=_SIZE_IN, dpi=_DPI, layout="constrained")
-    panel = figure.subplots()
-    panel.axvspan(limits.slack_from_s, limits.slack_to_s, color="0.92", label="looked at")
-    panel.axhline(np.degrees(limits.slack_tilt_rad), color="black", ls="--", lw=1.0, label="told slack: median above")
-    for k, (name, flights) in enumerate(turned.items()):
-        for number, (times, angles) in enumerate(flights):
-            panel.plot(times, angles, color=f"C{(3, 0, 1, 2, 4)[k % 5]}", lw=0.9, label=name if number == 0 else None)
-    panel.set(xlabel="since contact [s]", ylabel="drogue turned on the probe [deg]", ylim=(0.0, None))
-    panel.legend(frameon=False, fontsize=8, loc="upper right")
+    panels = figure.subplots(1, 2)
+    drawn = (("nose dropped", limits.slack_drop_rad), ("turned", limits.slack_tilt_rad))
+    for column, (panel, (label, limit_rad)) in enumerate(zip(panels, drawn, strict=True), start=1):
+        panel.axvspan(limits.slack_from_s, limits.slack_to_s, color="0.92", label="looked at")
+        panel.axhline(np.degrees(limit_rad), color="black", ls="--", lw=1.0, label="told slack: median above")
+        for k, (name, flights) in enumerate(turned.items()):
+            for number, flown in enumerate(flights):
+                colour, first = f"C{(3, 0, 1, 2, 4)[k % 5]}", name if number == 0 else None
+                panel.plot(flown[:, 0], flown[:, column], color=colour, lw=0.9, label=first)
+        panel.set(xlabel="since contact [s]", ylabel=f"{label} on the probe [deg]")
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(handles, labels, frameon=False, fontsize=8, loc="outside upper center", ncols=7)
     figure.savefig(path)

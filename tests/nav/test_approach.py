@@ -394,9 +394,9 @@ def on_the_probe(phase):
 
 
 def turned(p_PD_B, degrees):
-    """Drogue seen at a place (3,), its axis turned aside."""
+    """Drogue seen at a place (3,), its nose turned down."""
     seen, angle = state(p_PD_B), np.radians(degrees)
-    return dataclasses.replace(seen, p_PK_B=seen.p_PD_B + DEPTH_M * np.array([np.cos(angle), np.sin(angle), 0.0]))
+    return dataclasses.replace(seen, p_PK_B=seen.p_PD_B + DEPTH_M * np.array([np.cos(angle), 0.0, -np.sin(angle)]))
 
 
 @pytest.mark.parametrize("red", [False, True])
