@@ -7,9 +7,9 @@ receiver, and its mean a' before contact,
 
     drop = median of (elevation of a' - elevation of a),     tilt = median angle between a and a'          (1)
 
-since the blow of contact, which turns the drogue on a taut hose, too, is over. Gusts and the push of the probe turn it
-on a taut hose as well, but up or aside: so less of a drop than of a tilt tells a slack one. It is asked for some time,
-for a slack hose may lie straight for a moment between two waves.
+since the blow of contact, which turns the drogue on a taut hose, too, is over. Gusts turn it there as well, up more
+than down: so a nose that is up has to be so by more. It is asked for some time, for a slack hose may lie straight for a
+moment between two waves.
 
 Nothing is said where the drogue has not been seen on the probe for half of that time.
 
@@ -67,7 +67,7 @@ class SlackHose:
         looked = round((self._contact_s - limits.slack_from_s) / self._step_s) + 1
         if looked >= round(limits.slack_over_s / self._step_s) and len(self._turns_rad) >= 0.5 * looked:
             drop_rad, tilt_rad = np.median(self._turns_rad, axis=0)
-            self.is_slack = bool(drop_rad > limits.slack_drop_rad or tilt_rad > limits.slack_tilt_rad)
+            self.is_slack = bool(tilt_rad > (limits.slack_tilt_rad if drop_rad > 0.0 else limits.slack_tilt_up_rad))
 
 
 def turn_rad(along: Array, before: Array) -> tuple[float, float]:

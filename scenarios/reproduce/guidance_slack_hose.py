@@ -89,8 +89,8 @@ def medians_deg(found: Contact) -> Array:
     limits, turned = PhaseLimits(), turn_deg(found)
     looked_at = turned[(turned[:, 0] >= limits.slack_from_s) & (turned[:, 0] <= limits.slack_to_s), 1:]
     least = round(limits.slack_over_s / found.step_s)
-    medians: Array = np.array([np.median(looked_at[:n], axis=0) for n in range(least, len(looked_at) + 1)])
-    return medians.max(axis=0)
+    greatest: Array = np.max([np.median(looked_at[:n], axis=0) for n in range(least, len(looked_at) + 1)], axis=0)
+    return greatest
 
 
 def _figures(contacts: list[Contact]) -> dict[str, float]:
@@ -113,15 +113,17 @@ def _draw(turned: Mapping[str, list[Array]], path: Path) -> None:
     limits = PhaseLimits()
     figure = Figure(figsize=_SIZE_IN, dpi=_DPI, layout="constrained")
     panels = figure.subplots(1, 2)
-    drawn = (("nose dropped", limits.slack_drop_rad), ("turned", limits.slack_tilt_rad))
-    for column, (panel, (label, limit_rad)) in enumerate(zip(panels, drawn, strict=True), start=1):
+    panels[0].axhline(0.0, color="black", lw=0.6)
+    for limit_rad, style, nose in ((limits.slack_tilt_rad, "--", "down"), (limits.slack_tilt_up_rad, ":", "up")):
+        told = f"told slack, nose {nose}: median above"
+        panels[1].axhline(np.degrees(limit_rad), color="black", ls=style, lw=1.0, label=told)
+    for column, (panel, label) in enumerate(zip(panels, ("nose dropped", "turned"), strict=True), start=1):
         panel.axvspan(limits.slack_from_s, limits.slack_to_s, color="0.92", label="looked at")
-        panel.axhline(np.degrees(limit_rad), color="black", ls="--", lw=1.0, label="told slack: median above")
         for k, (name, flights) in enumerate(turned.items()):
             for number, flown in enumerate(flights):
                 colour, first = f"C{(3, 0, 1, 2, 4)[k % 5]}", name if number == 0 else None
                 panel.plot(flown[:, 0], flown[:, column], color=colour, lw=0.9, label=first)
         panel.set(xlabel="since contact [s]", ylabel=f"{label} on the probe [deg]")
-    handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, frameon=False, fontsize=8, loc="outside upper center", ncols=7)
+    handles, labels = panels[1].get_legend_handles_labels()
+    figure.legend(handles, labels, frameon=False, fontsize=8, loc="outside upper center", ncols=4)
     figure.savefig(path)

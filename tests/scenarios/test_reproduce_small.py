@@ -192,13 +192,14 @@ def test_the_farther_ahead_the_less_of_the_drogue_is_foretold(less, tmp_path, mo
             assert 0.0 < near < far < 500.0, case
 
 
-def test_the_drogue_s_nose_drops_on_a_slack_hose_and_hardly_on_a_taut_one(less, tmp_path):
+def test_the_drogue_turns_its_nose_down_on_a_slack_hose_and_hardly_on_a_taut_one(less, tmp_path):
     less(guidance_slack_hose, FLOWN={"dead_reel_unnoticed": 1, "default": 1})
     rows = made("guidance/slack-hose", tmp_path)
     slack, taut = (rows[name]["ours"] for name in ("dead_reel_unnoticed", "default"))
-    limit_deg = np.degrees(PhaseLimits().slack_drop_rad)
+    limit_deg = np.degrees(PhaseLimits().slack_tilt_rad)
     assert slack["contacts"] == slack["told_slack"] == taut["contacts"] == 1 and taut["told_slack"] == 0
-    assert taut["most_drop_deg"] < 0.5 * limit_deg and slack["least_drop_deg"] > 1.1 * limit_deg
+    assert taut["most_tilt_deg"] < 0.5 * limit_deg and slack["least_tilt_deg"] > 1.1 * limit_deg
+    assert slack["least_drop_deg"] > 0.0
 
 
 def test_a_pair_of_pictures_shows_the_pixels_of_a_degree_that_the_lens_makes(anew, less, tmp_path):
