@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dockair.messages import STAMP_RESOLUTION_S
 from dockair.nav.belief_motion import Motion, propagated
 from dockair.nav.belief_sight import Belief
 from dockair.nav.imu_record import ImuRecord
@@ -19,8 +20,6 @@ from dockair.nav.pose.measurement import LinesOfSight
 from dockair.rotations import Array
 
 Frame = PoseEstimate | LinesOfSight
-
-_STAMP_S = 1e-6  # to which stamps are even
 
 
 @dataclass(slots=True, eq=False)
@@ -154,7 +153,7 @@ class BeliefBuffer:
         Returns:
             (8, 3) state, and the frame's age [s]; NaN where no frame so old is kept.
         """
-        index = bisect_right(self._nodes, time_s - horizon_s + _STAMP_S, key=_time)
+        index = bisect_right(self._nodes, time_s - horizon_s + STAMP_RESOLUTION_S, key=_time)
         for node in reversed(self._nodes[:index]):
             if node.frame is not None:
                 _, x, _ = self._propagated(node.beliefs[0], node.time_s, time_s, errors=False)

@@ -14,10 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dockair.messages import CameraFrame, LedObservation
+from dockair.messages import STAMP_RESOLUTION_S, CameraFrame, LedObservation
 
 _ROWS = 64  # every so many one is compared before the others
-_STAMP_S = 1e-6  # to which stamps are even
 
 
 class FrameChecks:
@@ -29,7 +28,7 @@ class FrameChecks:
     """
 
     def __init__(self, ahead_s: float, buffer_s: float) -> None:
-        self._ahead_s, self._buffer_s = ahead_s + _STAMP_S, buffer_s + _STAMP_S
+        self._ahead_s, self._buffer_s = ahead_s + STAMP_RESOLUTION_S, buffer_s + STAMP_RESOLUTION_S
         self._picture: NDArray[Any] = np.empty((0, 2))
 
     def refused(self, frame: CameraFrame | LedObservation, now_s: float) -> str | None:

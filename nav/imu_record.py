@@ -14,11 +14,10 @@ import numpy as np
 from numba import njit
 
 from dockair.calibration import GyroSheet, Mounting
-from dockair.messages import ImuSample
+from dockair.messages import STAMP_RESOLUTION_S, ImuSample
 from dockair.rotations import Array
 
 _FIRST_ROOM = 256  # samples; doubled when needed
-_STAMP_S = 1e-6  # to which stamps are even
 _LONGEST_LEAP_S = 60.0  # no drogue is foretold for as long: a flight whose IMU was away for it has to be begun anew
 
 
@@ -119,7 +118,9 @@ class ImuRecord:
             longest_gap_s: without a sample, before the first and after the last one included.
             forces: whether the specific force of every one has to be a number.
         """
-        return bool(_is_unbroken(self.times_s, self.forces_B, start_s, end_s, longest_gap_s + _STAMP_S, forces))
+        return bool(
+            _is_unbroken(self.times_s, self.forces_B, start_s, end_s, longest_gap_s + STAMP_RESOLUTION_S, forces)
+        )
 
     def _make_room(self) -> None:
         kept = self._end - self._first
@@ -170,8 +171,8 @@ def _mean(times: Array, values: Array, start_s: float, end_s: float) -> Array:
 
     A stamp that rounding puts beside a limit is on it: in 10 ms five samples at 500 Hz count, and not six.
     """
-    first = int(np.searchsorted(times, start_s + _STAMP_S, side="right"))
-    stop = int(np.searchsorted(times, end_s + _STAMP_S, side="right"))
+    first = int(np.searchsorted(times, start_s + STAMP_RESOLUTION_S, side="right"))
+    stop = int(np.searchsorted(times, end_s + STAMP_RESOLUTION_S, side="right"))
     if stop <= first:
         return np.full(3, np.nan)
     out = values[first].copy()

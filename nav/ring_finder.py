@@ -47,7 +47,7 @@ from dockair.rotations import Array
 _NONE: NDArray[np.int64] = np.empty(0, np.int64)
 #: Of the sheet's tolerance, by which LEDs may be off. Near the basket one that is off by four sigma is left out of its
 #: ring, and what makes it an outlier makes impostors of the others.
-_MISPLACED = 2.0
+_FARTHER_OFF = 2.0
 _NEIGHBOURHOOD_RADII, _UNSEEN = 1.6, 0.2  # of `chance`: where clutter is counted, and blobs more than were seen
 
 
@@ -87,7 +87,7 @@ class RingFinder:
         self._sheets, self._belief, self._detect_settings = sheets, belief, detect_settings
         self._turned_rad, self._few_settings, self._misplaced_m = turned_rad, few_settings or FewSettings(), misplaced_m
         self._by_sheet = IdentifySettings(ring_sigma=misplaced_m / (0.5 * sheets.ring.diameter_m))
-        self._misplaced = replace(self._by_sheet, ring_sigma=_MISPLACED * self._by_sheet.ring_sigma)
+        self._farther_off = replace(self._by_sheet, ring_sigma=_FARTHER_OFF * self._by_sheet.ring_sigma)
         self._code = code_of(sheets.ring, CodeSettings())
         self._few = False  #: whether the newest frame's LEDs were named one by one
         self._tracker = RingTracker(
@@ -193,7 +193,7 @@ class RingFinder:
         """The ring by LEDs in their places, or else, where that leaves doubt, by LEDs farther off them."""
         found = self._identified_by(self._by_sheet, blobs, **expected)
         doubt = found.status is IdentificationStatus.AMBIGUOUS
-        return self._identified_by(self._misplaced, blobs, **expected) if doubt else found
+        return self._identified_by(self._farther_off, blobs, **expected) if doubt else found
 
     def _identified_by(self, settings: IdentifySettings, blobs: Blobs, **expected: Any) -> Identification:
         return identify(

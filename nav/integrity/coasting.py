@@ -23,11 +23,11 @@ import numpy as np
 from scipy.stats import chi2
 
 from dockair.errors import DockairError
+from dockair.messages import STAMP_RESOLUTION_S
 from dockair.nav.integrity.levels import ProtectionLevels
 from dockair.rotations import Array
 
 _HIGHEST_RISK = 0.5
-_STAMP_S = 1e-6  # to which stamps are even
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,7 +70,7 @@ class CoastingError:
 
     def due(self, time_s: float) -> bool:
         """Whether the belief is to be asked again at a frame of this stamp."""
-        return time_s - self._asked_s >= self._settings.interval_s - _STAMP_S
+        return time_s - self._asked_s >= self._settings.interval_s - STAMP_RESOLUTION_S
 
     def take(self, error_C: Array, age_s: float, time_s: float) -> None:
         """Take where a frame shows the drogue less where it was foretold.

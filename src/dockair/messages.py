@@ -24,6 +24,8 @@ from numpy.typing import NDArray
 
 from dockair.rotations import Array
 
+STAMP_RESOLUTION_S = 1e-6  #: stamps that are nearer than this are of one moment
+
 
 @dataclass(frozen=True, slots=True)
 class Window:
