@@ -39,8 +39,9 @@ def refusal(error: ValidationError, model: type[BaseModel], place: Callable[[str
     where = place(_dotted(first["loc"]))
     also = [_dotted(other["loc"]) for other in others]
     if first["type"] == _UNKNOWN:
-        exists = sorted(_model_at(model, first["loc"][:-1]).model_fields)
-        return DockairError(where, expected="a known key", got=first["loc"][-1], exists=exists, also=also)
+        name = str(first["loc"][-1])
+        exists = [*sorted(_model_at(model, first["loc"][:-1]).model_fields), *_elsewhere(model, name)]
+        return DockairError(where, expected="a known key", got=name, exists=exists, also=also)
     field = _field_at(model, first["loc"])
     if first["type"] == "missing":
         return DockairError(where, expected=_expected(field), also=also)
@@ -65,6 +66,12 @@ def _model_at(model: type[BaseModel], location: Sequence[int | str]) -> type[Bas
             assert inner is not None
             model = inner
     return model
+
+
+def _elsewhere(model: type[BaseModel], name: str) -> list[str]:
+    """Return the dotted keys that end in the name: its table is easily left out, or another one's taken."""
+    inner = ((table, inner_model(field)) for table, field in model.model_fields.items())
+    return [f"{table}.{name}" for table, fields in inner if fields is not None and name in fields.model_fields]
 
 
 def inner_model(field: FieldInfo) -> type[BaseModel] | None:

@@ -42,7 +42,8 @@ class Hardware(Table):
     def _exist(self) -> Self:
         for key, path in (("camera", self.camera), ("ring", self.ring)):
             if path is not None and not os.path.isfile(path):  # False, too, where nobody may look
-                raise DockairError(f"hardware.{key}", expected="the path of a calibration sheet", got=path)
+                got = f"{path}, where no file is"
+                raise DockairError(f"hardware.{key}", expected="the path of a calibration sheet", got=got)
         return self
 
     def receiver_sheet(self, name: ReceiverSheet) -> str:

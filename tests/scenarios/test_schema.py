@@ -222,6 +222,20 @@ def test_model_none_switches_gusts_off_and_a_strength_alone_switches_them_on(sce
 
 
 @pytest.mark.parametrize(
+    ("key", "meant"),
+    [
+        ("sigma_m_s", "turbulence.sigma_m_s"),
+        ("flight.sigma_m_s", "turbulence.sigma_m_s"),
+        ("sensing", "camera.sensing"),
+        ("turbulence.airspeed_m_s", "flight.airspeed_m_s"),
+    ],
+)
+def test_of_a_key_without_its_table_or_in_another_s_the_whole_name_is_said(key, meant):
+    with pytest.raises(DockairError, match=f", {meant}; did you mean {meant}[?]$"):
+        load_scenario("default", {key: "1"})
+
+
+@pytest.mark.parametrize(
     ("key", "value", "where", "expected"),
     [
         ("flight.speed", "1", "flight.speed", "a known key, got 'speed'; exists: airspeed_m_s,"),
@@ -233,6 +247,7 @@ def test_model_none_switches_gusts_off_and_a_strength_alone_switches_them_on(sce
         ("parameters.reel.nothing", "1", "parameters.reel.nothing", "a parameter, got 'nothing'; exists:"),
         ("start.sigma_m", "[1, 2, -3]", "start.sigma_m[2]", f"{SIGMAS}, got -3"),
         ("seed", "1\nname = 'other'", "seed", SEED),
+        ("hardware.camera", "cam.toml", "hardware.camera", "the path of a calibration sheet, got 'cam.toml, where no"),
     ],
 )
 def test_a_wrong_setting_is_refused_as_a_setting(key, value, where, expected):
