@@ -110,7 +110,8 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     try:
         table: Any = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
-        raise DockairError(str(path), expected="the manifest of a campaign", got=error.strerror) from None
+        expected = "the manifest of a campaign, which `dockair campaign PLAN` makes"
+        raise DockairError(str(path), expected=expected, got=error.strerror) from None
     except ValueError as error:
         raise DockairError(str(path), expected="the manifest of a campaign", got=str(error)) from None
     plan = table.get("plan") if isinstance(table, dict) else None

@@ -103,7 +103,7 @@ def test_of_a_plan_s_name_a_report_says_where_its_campaign_is(campaign, tmp_path
     monkeypatch.chdir(tmp_path)
     with pytest.raises(DockairError, match=r"^levels: expected the folder .*; exists: out/campaigns/levels"):
         read_campaigns([Path("levels")])
-    with pytest.raises(DockairError, match="^level/manifest.json: expected the manifest of a campaign"):
+    with pytest.raises(DockairError, match="^level/manifest.json: .* which `dockair campaign PLAN` makes, got 'No "):
         read_campaigns([Path("level")])
 
 
