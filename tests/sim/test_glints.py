@@ -6,81 +6,32 @@ import mujoco
 import numpy as np
 import pytest
 
-from dockair.parameters import load_parameters
-from dockair.rotations import exp, quaternion_from_matrix
-from dockair.sim.camera.glints import Glints, find_glints
+from dockair.rotations import exp
+from dockair.sim.camera.glints import find_glints
 from dockair.sim.camera.meshes import Meshes
 from dockair.sim.camera.mirrors import GLASS, METAL, PAINT, RUBBER, Mirrors, material_of, rim_of
-from dockair.sim.camera.sheets import LightParameters, SurfaceParameters
 from dockair.sim.camera.solids import VISIBLE_GROUPS
-
-LIGHT = load_parameters("light", LightParameters)
-SHEET = load_parameters("surfaces", SurfaceParameters)
-#: Everything counts, and metal mirrors all light at every angle
-IDEAL = replace(
-    SHEET,
-    metal_reflectance=1.0,
-    metal_share=1.0,
-    grazing_rad=1.57,
-    faintest_glint_m2_sr=0.0,
-    faintest_radiance=0.0,
-    metal_roughness_rad=1e-5,
-)
-POINT_SUN = replace(LIGHT, sun_angular_radius_rad=1e-6)
-EYE = np.zeros(3)
-_G = mujoco.mjtGeom
-_METAL = "probe_under_test"
-
-
-def _unit(*v: float) -> np.ndarray:
-    return np.array(v) / np.linalg.norm(v)
-
-
-def _world(*geoms: dict) -> tuple[mujoco.MjModel, mujoco.MjData]:
-    spec = mujoco.MjSpec()
-    for geom in geoms:
-        spec.worldbody.add_geom(**geom)
-    model = spec.compile()
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
-    return model, data
-
-
-def _body(kind: mujoco.mjtGeom, at: np.ndarray, size: list[float], R: np.ndarray | None = None) -> dict:
-    quat = quaternion_from_matrix(np.eye(3) if R is None else R)
-    return {"name": _METAL, "type": kind, "pos": list(at), "size": size, "quat": quat}
-
-
-def _sphere(at: list[float], radius: float, **more: object) -> dict:
-    return {"name": _METAL, "type": _G.mjGEOM_SPHERE, "pos": at, "size": [radius, 0.0, 0.0], **more}
-
-
-def _glints(
-    world: tuple[mujoco.MjModel, mujoco.MjData],
-    sun: np.ndarray,
-    surfaces: SurfaceParameters = IDEAL,
-    light: LightParameters = POINT_SUN,
-    eye: np.ndarray = EYE,
-    ahead: np.ndarray | None = None,
-) -> Glints:
-    return find_glints(*world, Mirrors.of(world[0]), eye, sun, surfaces, light, ahead)
+from mirror_scenes import EYE, IDEAL, LIGHT, SHEET, glints_in, metal_body, metal_sphere, scene_of, unit
 
 
 def _mirror_error_rad(p: np.ndarray, n: np.ndarray, sun: np.ndarray, eye: np.ndarray = EYE) -> float:
     """Angle between the Sun and the mirror image of the line of sight: the law of reflection, independently."""
-    sight = _unit(*(p - eye))
+    sight = unit(*(p - eye))
     reflected = sight - 2.0 * (sight @ n) * n
     return float(2.0 * np.arcsin(min(0.5 * np.linalg.norm(reflected - sun), 1.0)))
+
+
+_G = mujoco.mjtGeom
 
 
 # ------------------------------------------------------------------------------------------- places and curvatures
 
 
-@pytest.mark.parametrize("sun", [_unit(-1, 0, 1), _unit(-0.8, 0.5, 0.2), _unit(0.3, -1, 0.4)])
+@pytest.mark.parametrize("sun", [unit(-1, 0, 1), unit(-0.8, 0.5, 0.2), unit(0.3, -1, 0.4)])
 @pytest.mark.parametrize("distance", [1.0, 8.0])
 def test_a_spheres_glint_obeys_the_law_of_reflection_near_and_far(sun: np.ndarray, distance: float) -> None:
     centre, radius = distance * np.array([1.0, 0.12, -0.06]), 0.6
-    glints = _glints(_world(_sphere(list(centre), radius)), sun)
+    glints = glints_in(scene_of(metal_sphere(list(centre), radius)), sun)
     assert glints.p_W.shape == (1, 3)
     n = (glints.p_W[0] - centre) / radius
     assert np.linalg.norm(n) == pytest.approx(1.0, abs=1e-6)
@@ -92,27 +43,27 @@ def test_an_ellipsoids_glint_obeys_the_law_of_reflection_however_near(axes: list
     rng = np.random.default_rng(3)
     found = 0
     for _ in range(30):
-        R, sun = exp(rng.normal(size=3)), _unit(*rng.normal(size=3))
-        centre = R @ (np.array(axes) * _unit(*rng.normal(size=3)) * rng.uniform(1.5, 6.0))
-        glints = _glints(_world(_body(_G.mjGEOM_ELLIPSOID, centre, axes, R)), sun)
+        R, sun = exp(rng.normal(size=3)), unit(*rng.normal(size=3))
+        centre = R @ (np.array(axes) * unit(*rng.normal(size=3)) * rng.uniform(1.5, 6.0))
+        glints = glints_in(scene_of(metal_body(_G.mjGEOM_ELLIPSOID, centre, axes, R)), sun)
         if len(glints.p_W) == 0:
             continue
         # pieces of one streak: their common middle is the mirror point to first order; of a smooth body all coincide
         local = (glints.p_W[0] - centre) @ R
         assert ((local / axes) ** 2).sum() == pytest.approx(1.0, abs=1e-6)
-        assert _mirror_error_rad(glints.p_W[0], R @ _unit(*(local / np.square(axes))), sun) < 1e-4
+        assert _mirror_error_rad(glints.p_W[0], R @ unit(*(local / np.square(axes))), sun) < 1e-4
         found += 1
     assert found > 10
 
 
 def test_far_away_an_ellipsoids_glint_is_its_gaussian_curvature() -> None:
     """From second differences of the depth under the tangent plane."""
-    axes, sun = np.array([2.0, 0.5, 0.8]), _unit(-0.6, 0.3, 0.7)
+    axes, sun = np.array([2.0, 0.5, 0.8]), unit(-0.6, 0.3, 0.7)
     centre = np.array([9e4, -1e4, 7e3])
-    glints = _glints(_world(_body(_G.mjGEOM_ELLIPSOID, centre, list(axes))), sun)
+    glints = glints_in(scene_of(metal_body(_G.mjGEOM_ELLIPSOID, centre, list(axes))), sun)
     local = glints.p_W[0] - centre
-    n = _unit(*(local / axes**2))
-    e1 = _unit(*np.cross(n, [0.0, 0.0, 1.0]))
+    n = unit(*(local / axes**2))
+    e1 = unit(*np.cross(n, [0.0, 0.0, 1.0]))
     e2 = np.cross(n, e1)
     h = 1e-3
 
@@ -130,8 +81,8 @@ def test_far_away_an_ellipsoids_glint_is_its_gaussian_curvature() -> None:
 def test_a_tubes_glint_obeys_the_law_of_reflection_and_lies_on_its_side() -> None:
     rng, found = np.random.default_rng(4), 0
     for _ in range(40):
-        R, centre, sun = exp(rng.normal(size=3)), rng.normal(size=3) * 4.0, _unit(*rng.normal(size=3))
-        glints = _glints(_world(_body(_G.mjGEOM_CYLINDER, centre, [0.3, 4.0, 0.0], R)), sun)
+        R, centre, sun = exp(rng.normal(size=3)), rng.normal(size=3) * 4.0, unit(*rng.normal(size=3))
+        glints = glints_in(scene_of(metal_body(_G.mjGEOM_CYLINDER, centre, [0.3, 4.0, 0.0], R)), sun)
         for p in glints.p_W:
             local = (p - centre) @ R
             if abs(local[2]) > 4.0 - 1e-3:  # an end, whose disc may glint
@@ -147,31 +98,31 @@ def test_a_tubes_glint_obeys_the_law_of_reflection_and_lies_on_its_side() -> Non
 
 
 def test_something_in_the_way_of_the_sun_or_of_the_camera_puts_a_glint_out() -> None:
-    sun = _unit(-0.2, 0.0, 1.0)
-    ball = _sphere([8.0, 0.0, 0.0], 0.5)
-    assert len(_glints(_world(ball), sun).p_W) == 1
+    sun = unit(-0.2, 0.0, 1.0)
+    ball = metal_sphere([8.0, 0.0, 0.0], 0.5)
+    assert len(glints_in(scene_of(ball), sun).p_W) == 1
     for at in ([7.0, 0.0, 4.0], [4.0, 0.0, 0.2]):
         box = {"type": _G.mjGEOM_ELLIPSOID, "pos": at, "size": [0.5, 1.0, 0.3], "name": "hose_dull"}
         dull = replace(IDEAL, rubber_share=0.0)
-        assert len(_glints(_world(ball, box), sun, dull).p_W) == 0
-        assert len(_glints(_world(ball, box | {"group": 3}), sun, dull).p_W) == 1
+        assert len(glints_in(scene_of(ball, box), sun, dull).p_W) == 0
+        assert len(glints_in(scene_of(ball, box | {"group": 3}), sun, dull).p_W) == 1
 
 
 def test_the_sun_behind_a_body_makes_no_glint() -> None:
-    assert len(_glints(_world(_sphere([8.0, 0.0, 0.0], 0.5)), _unit(1.0, 0.0, 0.01)).p_W) == 0
+    assert len(glints_in(scene_of(metal_sphere([8.0, 0.0, 0.0], 0.5)), unit(1.0, 0.0, 0.01)).p_W) == 0
 
 
 def test_what_is_not_drawn_does_not_glint() -> None:
-    sun, ball = _unit(-1, 0, 1), _sphere([8.0, 0.0, 0.0], 0.5)
-    assert len(_glints(_world(ball), sun).p_W) == 1
-    assert len(_glints(_world(ball | {"group": 3}), sun).p_W) == 0
-    assert len(_glints(_world(ball | {"rgba": [1.0, 1.0, 1.0, 0.0]}), sun).p_W) == 0
+    sun, ball = unit(-1, 0, 1), metal_sphere([8.0, 0.0, 0.0], 0.5)
+    assert len(glints_in(scene_of(ball), sun).p_W) == 1
+    assert len(glints_in(scene_of(ball | {"group": 3}), sun).p_W) == 0
+    assert len(glints_in(scene_of(ball | {"rgba": [1.0, 1.0, 1.0, 0.0]}), sun).p_W) == 0
 
 
 def test_what_lies_behind_the_lens_is_left_out_when_its_axis_is_given() -> None:
-    world, sun = _world(_sphere([8.0, 0.0, 0.0], 0.5)), _unit(-1, 0, 1)
-    assert len(_glints(world, sun, ahead=_unit(1, 0, 0)).p_W) == 1
-    assert len(_glints(world, sun, ahead=_unit(-1, 0, 0)).p_W) == 0
+    world, sun = scene_of(metal_sphere([8.0, 0.0, 0.0], 0.5)), unit(-1, 0, 1)
+    assert len(glints_in(world, sun, ahead=unit(1, 0, 0)).p_W) == 1
+    assert len(glints_in(world, sun, ahead=unit(-1, 0, 0)).p_W) == 0
 
 
 def test_materials_go_by_the_names_of_the_scene() -> None:
@@ -212,12 +163,12 @@ def test_the_rim_is_read_back_from_its_capsules() -> None:
     assert rim.tube_radius_m == pytest.approx(0.008)
     assert rim.centre_x_m == pytest.approx(0.01)
     assert rim.skin_m == pytest.approx(0.25 * (1.0 - np.cos(np.pi / 24)) + 1e-3)
-    assert rim_of(_world(_sphere([1.0, 0.0, 0.0], 0.1))[0]) is None
+    assert rim_of(scene_of(metal_sphere([1.0, 0.0, 0.0], 0.1))[0]) is None
 
 
-@pytest.mark.parametrize("sun", [_unit(-0.8, 0.1, 0.6), _unit(-0.5, -0.8, -0.3), _unit(-0.6, 0.6, 0.1)])
+@pytest.mark.parametrize("sun", [unit(-0.8, 0.1, 0.6), unit(-0.5, -0.8, -0.3), unit(-0.6, 0.6, 0.1)])
 def test_the_rims_two_glints_obey_the_law_of_reflection_on_a_torus(sun: np.ndarray) -> None:
-    glints = _glints(_rim_world(), sun)
+    glints = glints_in(_rim_world(), sun)
     assert len(glints.p_W) == 2
     centre, sides = np.array([6.01, 0.3, 0.2]), set()
     for p, area in zip(glints.p_W, glints.area_m2_sr, strict=True):
@@ -235,8 +186,8 @@ def test_the_rims_two_glints_obey_the_law_of_reflection_on_a_torus(sun: np.ndarr
 
 def test_far_away_the_rims_glints_have_the_toruss_gaussian_curvature() -> None:
     model, data = _rim_world()
-    eye, sun = np.array([-4e3, 500.0, 0.0]), _unit(-0.8, 0.1, 0.6)
-    glints = _glints((model, data), sun, eye=eye)
+    eye, sun = np.array([-4e3, 500.0, 0.0]), unit(-0.8, 0.1, 0.6)
+    glints = glints_in((model, data), sun, eye=eye)
     assert len(glints.p_W) == 2
     for p, area in zip(glints.p_W, glints.area_m2_sr, strict=True):
         q = p - [6.01, 0.3, 0.2]
@@ -248,7 +199,7 @@ def test_far_away_the_rims_glints_have_the_toruss_gaussian_curvature() -> None:
 def test_a_rim_lit_and_seen_along_its_axis_shows_two_arcs_of_two_radians() -> None:
     """Every point of the ring mirrors: A = arc tube/(4 sqrt(2 pi) slope) while the slopes reach over the arc."""
     rough = replace(IDEAL, metal_roughness_rad=0.1)
-    glints = _glints(_rim_world(), _unit(-1, 0, 0), rough, eye=np.array([0.0, 0.3, 0.2]))
+    glints = glints_in(_rim_world(), unit(-1, 0, 0), rough, eye=np.array([0.0, 0.3, 0.2]))
     arcs = 2.0 * (2.0 * 0.25)
     assert glints.area_m2_sr.sum() == pytest.approx(arcs * 0.008 / (4.0 * np.sqrt(2.0 * np.pi) * 0.1), rel=0.03)
 
@@ -260,11 +211,11 @@ def _suns(world, p_WC: np.ndarray, rng: np.random.Generator) -> list[np.ndarray]
         t = rng.integers(len(meshes.triangles))
         g = meshes.geoms[np.searchsorted(meshes.first_triangle, t, side="right") - 1]
         R, corners = world.data.geom_xmat[g].reshape(3, 3), meshes.triangles[t]
-        n = _unit(*(R @ meshes.normals[corners].mean(axis=0)))
-        sight = _unit(*(p_WC - world.data.geom_xpos[g] - R @ meshes.corners_m[corners].mean(axis=0)))
+        n = unit(*(R @ meshes.normals[corners].mean(axis=0)))
+        sight = unit(*(p_WC - world.data.geom_xpos[g] - R @ meshes.corners_m[corners].mean(axis=0)))
         if n @ sight > 0.05 and world.model.geom(int(g)).name.startswith("tanker"):
             toward.append(2.0 * (n @ sight) * n - sight)
-    return [_unit(*rng.normal(size=3)) for _ in range(100)] + toward
+    return [unit(*rng.normal(size=3)) for _ in range(100)] + toward
 
 
 def test_in_the_scene_the_surface_halves_the_angle_where_it_glints(make_world) -> None:
@@ -282,9 +233,9 @@ def test_in_the_scene_the_surface_halves_the_angle_where_it_glints(make_world) -
         normal, geom = np.zeros(3), np.zeros(1, dtype=np.int32)
         glints = find_glints(world.model, world.data, mirrors, p_WC, sun, surfaces, LIGHT)
         for p, area in zip(glints.p_W, glints.area_m2_sr, strict=True):
-            sight, d = _unit(*(p - p_WC)), np.linalg.norm(p - p_WC)
+            sight, d = unit(*(p - p_WC)), np.linalg.norm(p - p_WC)
             if mujoco.mj_ray(world.model, world.data, p_WC, sight, VISIBLE_GROUPS, 1, -1, geom, normal) >= 0.0:
-                half_way = np.arccos(np.clip(normal @ _unit(*(sun - sight)), -1.0, 1.0))
+                half_way = np.arccos(np.clip(normal @ unit(*(sun - sight)), -1.0, 1.0))
                 part = "_".join(world.model.geom(int(geom[0])).name.replace("skin_", "").split("_")[:2])
                 found.setdefault(part, []).append((half_way, area / d**2))
     parts = {part: np.array(rows).T for part, rows in found.items()}
@@ -297,7 +248,7 @@ def test_in_the_scene_the_surface_halves_the_angle_where_it_glints(make_world) -
 
 
 def test_the_same_world_gives_the_same_glints_to_the_bit(make_world) -> None:
-    world, sun = make_world(p_PD_B=(4.0, 0.0, 0.0)), _unit(0.5, -0.5, 0.7)
+    world, sun = make_world(p_PD_B=(4.0, 0.0, 0.0)), unit(0.5, -0.5, 0.7)
     p_WC = world.truth.p_WB + world.truth.R_WB @ world.parameters.mounting.p_BC
     args = (world.model, world.data, Mirrors.of(world.model), p_WC, sun, SHEET, LIGHT)
     first, second = find_glints(*args), find_glints(*args)
@@ -308,7 +259,7 @@ def test_the_same_world_gives_the_same_glints_to_the_bit(make_world) -> None:
 
 def test_with_the_sheets_a_glint_of_the_rim_is_of_an_leds_order() -> None:
     """0.015 W/sr against sunlight of 175 W/m^2 in the band."""
-    glints = _glints(_rim_world(0.02), _unit(-0.8, 0.1, 0.6), SHEET, LIGHT)
+    glints = glints_in(_rim_world(0.02), unit(-0.8, 0.1, 0.6), SHEET, LIGHT)
     assert len(glints.p_W) >= 2
     ratio = glints.area_m2_sr.sum() * 175.0 / 0.015
     assert 0.3 < ratio < 5.0, ratio

@@ -15,43 +15,11 @@ from dockair.messages import ReceiverCommand
 from dockair.parameters import load_parameters
 from dockair.rotations import exp
 from dockair.sim.faults import ImuFault
-from dockair.sim.imu import Imu, ImuParameters, ImuRecord
+from dockair.sim.imu import ImuParameters
+from quiet_imu import QUIET, RATE, SHEET, forces_of, imu_of, rates_of, still
 
-SHEET = load_parameters("imu_mti", ImuParameters)
-RATE = 500.0
 G = 9.80665
 IDENTITY = np.eye(3)
-#: No error at all but the filters and the ranges.
-QUIET = replace(
-    SHEET,
-    **{
-        f.name: 0.0
-        for f in fields(ImuParameters)
-        if f.name.endswith("_jitter_s") or any(w in f.name for w in ("noise", "instability", "walk", "sigma"))
-    },
-    gyro_quantum_rad_s=1e-12,
-    accelerometer_quantum_m_s2=1e-12,
-)
-
-
-def _imu(
-    parameters: ImuParameters, seed: int = 0, rate: float = RATE, R_BI: Any = IDENTITY, p_BI: Any = (0.0, 0.0, 0.0)
-) -> Imu:
-    gyro, accelerometer, clock = (np.random.default_rng((seed, i)) for i in range(3))
-    return Imu(parameters, rate, gyro, accelerometer, clock, R_BI, np.array(p_BI))
-
-
-def _rates(parameters: ImuParameters, w: np.ndarray, **more: Any) -> np.ndarray:
-    return _imu(parameters, **more).record(len(w), w_WB_B=w).angular_rate_rad_s
-
-
-def _forces(parameters: ImuParameters, f: np.ndarray, **more: Any) -> np.ndarray:
-    return _imu(parameters, **more).record(len(f), specific_force_B=f).specific_force_m_s2
-
-
-def _still(parameters: ImuParameters, n: int, **more: Any) -> ImuRecord:
-    """A record in free fall: nothing to measure."""
-    return _imu(parameters, **more).record(n, specific_force_B=np.zeros((n, 3)))
 
 
 # What an ideal IMU on the receiver feels
@@ -59,27 +27,27 @@ def _still(parameters: ImuParameters, n: int, **more: Any) -> ImuRecord:
 
 def test_a_steady_motion_is_measured_as_it_is_from_the_first_sample() -> None:
     w, f = np.tile([0.1, -0.2, 0.3], (50, 1)), np.tile([1.0, -2.0, 9.0], (50, 1))
-    record = _imu(QUIET).record(50, w, np.zeros((50, 3)), f)
+    record = imu_of(QUIET).record(50, w, np.zeros((50, 3)), f)
     assert np.allclose(record.angular_rate_rad_s, w, atol=1e-9)
     assert np.allclose(record.specific_force_m_s2, f, atol=1e-9)
 
 
 def test_standing_upright_the_accelerometers_read_gravity_upward() -> None:
-    assert _imu(QUIET).record(3).specific_force_m_s2[2] == pytest.approx([0.0, 0.0, G], abs=1e-9)
+    assert imu_of(QUIET).record(3).specific_force_m_s2[2] == pytest.approx([0.0, 0.0, G], abs=1e-9)
 
 
 def test_the_mounting_turns_body_axes_into_the_imus() -> None:
     """An IMU turned by 90 deg to the left: its x axis is the body's y."""
     R_BI = exp(np.array([0.0, 0.0, np.pi / 2]))
     motion = np.tile([0.1, 0.2, 0.3], (3, 1))
-    assert _rates(QUIET, motion, R_BI=R_BI)[0] == pytest.approx([0.2, -0.1, 0.3], abs=1e-9)
-    assert _forces(QUIET, motion, R_BI=R_BI)[0] == pytest.approx([0.2, -0.1, 0.3], abs=1e-9)
+    assert rates_of(QUIET, motion, R_BI=R_BI)[0] == pytest.approx([0.2, -0.1, 0.3], abs=1e-9)
+    assert forces_of(QUIET, motion, R_BI=R_BI)[0] == pytest.approx([0.2, -0.1, 0.3], abs=1e-9)
 
 
 def test_turning_about_the_vertical_pulls_the_imu_inward_and_speeding_up_pushes_it_along() -> None:
     """2 m ahead of the centre of gravity: -w^2 r along x; alpha r along y, to the left when the yaw rate grows."""
     w, alpha = np.tile([0.0, 0.0, 0.5], (3, 1)), np.tile([0.0, 0.0, 0.25], (3, 1))
-    imu = _imu(QUIET, p_BI=(2.0, 0.0, 0.0))
+    imu = imu_of(QUIET, p_BI=(2.0, 0.0, 0.0))
     felt = imu.record(3, w, alpha, np.zeros((3, 3))).specific_force_m_s2[0]
     assert felt == pytest.approx([-0.5, 0.5, 0.0], abs=1e-9)
 
@@ -88,7 +56,7 @@ def test_the_lever_arm_is_that_of_rigid_bodies_on_any_motion() -> None:
     w, alpha, f, r, turn = np.random.default_rng(1).normal(size=(5, 3))
     R_BI = exp(turn)
     expected = R_BI.T @ (f + np.cross(alpha, r) + np.cross(w, np.cross(w, r)))
-    felt = _imu(QUIET, R_BI=R_BI, p_BI=r).step(0.0, w, alpha, f)
+    felt = imu_of(QUIET, R_BI=R_BI, p_BI=r).step(0.0, w, alpha, f)
     assert felt is not None
     assert felt.specific_force_m_s2 == pytest.approx(expected, abs=1e-9)
     assert felt.angular_rate_rad_s == pytest.approx(R_BI.T @ w, abs=1e-9)
@@ -114,7 +82,7 @@ def test_in_the_world_the_imus_place_accelerates_as_the_truth_says(make_world: A
         before, at = truths[k - 1], truths[k]
         a_W = (place[k] - 2.0 * place[k - 1] + place[k - 2]) * 1e6
         expected = at.R_WB.T @ (a_W + [0.0, 0.0, G])
-        sample = _imu(QUIET, p_BI=p_BI).step(at.time_s, at.w_WB_B, at.alpha_WB_B, at.specific_force_B)
+        sample = imu_of(QUIET, p_BI=p_BI).step(at.time_s, at.w_WB_B, at.alpha_WB_B, at.specific_force_B)
         np.testing.assert_allclose(sample.specific_force_m_s2, expected, atol=0.05)
         assert np.linalg.norm(expected - at.specific_force_B) > 5.0  # the lever arm's share
         np.testing.assert_allclose(at.alpha_WB_B, (at.w_WB_B - before.w_WB_B) * 1e3, atol=5e-3)
@@ -123,7 +91,7 @@ def test_in_the_world_the_imus_place_accelerates_as_the_truth_says(make_world: A
 def test_a_bias_uses_up_range() -> None:
     """Clipping comes after everything that is added: a biased gyro saturates at its range, not beyond it."""
     sheet = replace(QUIET, gyro_turn_on_bias_sigma_rad_s=0.5)
-    imu = _imu(sheet)
+    imu = imu_of(sheet)
     bias = imu.gyro_bias_I
     out = imu.record(1, w_WB_B=np.sign(bias)[None] * (SHEET.gyro_range_rad_s - 1e-3)).angular_rate_rad_s[0]
     assert np.abs(bias).min() > 2e-3
@@ -135,7 +103,7 @@ def test_a_bias_uses_up_range() -> None:
 
 def test_time_stamps_jitter_by_their_standard_deviation_and_the_samples_do_not() -> None:
     n = 20000
-    jittery, exact = (_imu(replace(SHEET, time_stamp_jitter_s=s), 4).record(n, start_s=3.0) for s in (5e-5, 0.0))
+    jittery, exact = (imu_of(replace(SHEET, time_stamp_jitter_s=s), 4).record(n, start_s=3.0) for s in (5e-5, 0.0))
     assert np.allclose(exact.time_stamp_s, 3.0 + np.arange(n) / RATE, atol=1e-12)
     error = jittery.time_stamp_s - exact.time_stamp_s
     assert error.var() == pytest.approx(25e-10, rel=4.5 * np.sqrt(2.0 / n))
@@ -145,7 +113,7 @@ def test_time_stamps_jitter_by_their_standard_deviation_and_the_samples_do_not()
 
 
 def test_time_stamps_stay_in_order_however_bad_the_clock() -> None:
-    stamps = _imu(replace(SHEET, time_stamp_jitter_s=0.01)).record(20000).time_stamp_s
+    stamps = imu_of(replace(SHEET, time_stamp_jitter_s=0.01)).record(20000).time_stamp_s
     assert np.diff(stamps).min() > 0.0
     assert np.abs(stamps - np.arange(20000) / RATE).max() <= 0.49 / RATE + 1e-12
 
@@ -156,8 +124,8 @@ def test_time_stamps_stay_in_order_however_bad_the_clock() -> None:
 def test_a_record_is_what_so_many_steps_give_bit_for_bit() -> None:
     n = 9000  # more than a block of random numbers
     w, alpha, f = np.random.default_rng(6).normal(size=(3, n, 3))
-    stamps, rates, forces = _imu(SHEET, p_BI=(1.0, 0.2, -0.3)).record(n, w, alpha, f)
-    stepping = _imu(SHEET, p_BI=(1.0, 0.2, -0.3))
+    stamps, rates, forces = imu_of(SHEET, p_BI=(1.0, 0.2, -0.3)).record(n, w, alpha, f)
+    stepping = imu_of(SHEET, p_BI=(1.0, 0.2, -0.3))
     samples = [stepping.step(k / RATE, w[k], alpha[k], f[k]) for k in range(n)]
     assert np.array_equal([s.time_stamp_s for s in samples], stamps)
     assert np.array_equal([s.angular_rate_rad_s for s in samples], rates)
@@ -167,7 +135,7 @@ def test_a_record_is_what_so_many_steps_give_bit_for_bit() -> None:
 def test_steps_taken_together_are_those_taken_one_by_one_bit_for_bit() -> None:
     w, alpha, f = np.random.default_rng(8).normal(size=(3, 100, 3))
     times_s = [k / RATE for k in range(100)]
-    alone, together = (_imu(SHEET, p_BI=(1.0, 0.2, -0.3)) for _ in range(2))
+    alone, together = (imu_of(SHEET, p_BI=(1.0, 0.2, -0.3)) for _ in range(2))
     ones = [alone.step(times_s[k], w[k], alpha[k], f[k]) for k in range(100)]
     fives = [together.steps(times_s[k : k + 5], *(v[k : k + 5] for v in (w, alpha, f))) for k in range(0, 100, 5)]
     for one, other in zip(ones, (sample for five in fives for sample in five), strict=True):
@@ -179,33 +147,33 @@ def test_steps_taken_together_are_those_taken_one_by_one_bit_for_bit() -> None:
 
 def test_a_record_goes_on_where_the_last_one_ended() -> None:
     w = np.random.default_rng(7).normal(size=(600, 3))
-    whole = _imu(SHEET).record(600, w).angular_rate_rad_s
-    imu = _imu(SHEET)
+    whole = imu_of(SHEET).record(600, w).angular_rate_rad_s
+    imu = imu_of(SHEET)
     parts = [imu.record(10, w[:10]), imu.record(190, w[10:200]), imu.record(400, w[200:])]
     assert np.array_equal(np.concatenate([p.angular_rate_rad_s for p in parts]), whole)
 
 
 def test_the_same_streams_give_the_same_record_and_others_another() -> None:
-    assert all(np.array_equal(a, b) for a, b in zip(_still(SHEET, 20, seed=5), _still(SHEET, 20, seed=5), strict=True))
-    for a, b in zip(_still(SHEET, 20, seed=5), _still(SHEET, 20, seed=6), strict=True):
+    assert all(np.array_equal(a, b) for a, b in zip(still(SHEET, 20, seed=5), still(SHEET, 20, seed=5), strict=True))
+    for a, b in zip(still(SHEET, 20, seed=5), still(SHEET, 20, seed=6), strict=True):
         assert not np.array_equal(a, b)
 
 
 def test_switching_one_error_off_leaves_every_other_as_it_was() -> None:
     """Gyros without any error beside the same accelerometers and clock; a bias that goes leaves the noise."""
     gyroless = replace(SHEET, **{f.name: getattr(QUIET, f.name) for f in fields(SHEET) if f.name.startswith("gyro_")})
-    usual, less = _still(SHEET, 300), _still(gyroless, 300)
+    usual, less = still(SHEET, 300), still(gyroless, 300)
     assert np.array_equal(usual.specific_force_m_s2, less.specific_force_m_s2)
     assert np.array_equal(usual.time_stamp_s, less.time_stamp_s)
     fine = replace(SHEET, gyro_quantum_rad_s=1e-12)
-    biased, unbiased = (_still(replace(fine, gyro_turn_on_bias_sigma_rad_s=s), 300)[1] for s in (3.5e-3, 0.0))
+    biased, unbiased = (still(replace(fine, gyro_turn_on_bias_sigma_rad_s=s), 300)[1] for s in (3.5e-3, 0.0))
     assert np.ptp(biased - unbiased, axis=0).max() < 1e-11
     assert np.abs(biased - unbiased).min() > 1e-5
 
 
 def test_a_rate_that_is_not_positive_is_refused() -> None:
     with pytest.raises(DockairError, match=r"imu\.rate_hz"):
-        _imu(SHEET, rate=0.0)
+        imu_of(SHEET, rate=0.0)
 
 
 # Faults
@@ -214,7 +182,7 @@ def test_a_rate_that_is_not_positive_is_refused() -> None:
 def _pair(fault: ImuFault, parameters: ImuParameters = SHEET) -> tuple[list[Any], list[Any]]:
     """60 samples with a fault in the middle third, and without."""
     w, f = np.array([0.1, -0.2, 0.3]), np.array([0.0, 1.0, G])
-    healthy, ill = _imu(parameters, 9), _imu(parameters, 9)
+    healthy, ill = imu_of(parameters, 9), imu_of(parameters, 9)
     ill_at = [fault if 20 <= k < 40 else None for k in range(60)]
     return (
         [ill.step(k / RATE, w, w, f, ill_at[k]) for k in range(60)],
@@ -243,7 +211,7 @@ def test_a_saturated_gyro_sends_no_rate_beyond_the_shrunken_range() -> None:
 def test_a_shrunken_range_wider_than_the_sheets_changes_nothing() -> None:
     wide = ImuFault(range_rad_s=2.0 * SHEET.gyro_range_rad_s)
     fast = np.array([9.0, 0.0, 0.0])
-    sample = _imu(QUIET).step(0.0, fast, fast, fast, wide)
+    sample = imu_of(QUIET).step(0.0, fast, fast, fast, wide)
     assert sample is not None and sample.angular_rate_rad_s[0] == pytest.approx(SHEET.gyro_range_rad_s, abs=1e-9)
 
 
@@ -279,9 +247,9 @@ def test_every_key_of_the_sheet_changes_what_its_name_says_and_nothing_else() ->
     swing = np.sin(0.3 * np.arange(n))[:, None]
     motion = (swing * [9.0, 0.1, -0.2], np.zeros((n, 3)), swing * [250.0, 1.0, 2.0])  # x beyond the ranges
     fine = replace(SHEET, gyro_quantum_rad_s=1e-10)
-    usual = _imu(fine).record(n, *motion)
+    usual = imu_of(fine).record(n, *motion)
     for f in fields(ImuParameters):
-        other = _imu(replace(fine, **{f.name: 0.9 * getattr(fine, f.name)})).record(n, *motion)
+        other = imu_of(replace(fine, **{f.name: 0.9 * getattr(fine, f.name)})).record(n, *motion)
         changed = [not np.array_equal(a, b) for a, b in zip(usual, other, strict=True)]
         assert changed == [f.name.startswith(word) for word in ("time_stamp", "gyro", "accelerometer")], f.name
 

@@ -11,41 +11,10 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from dockair.parameters import load_parameters
-from dockair.sim.imu import Imu, ImuParameters, ImuRecord
+from dockair.sim.imu import ImuParameters
+from quiet_imu import QUIET, RATE, SHEET, forces_of, imu_of, rates_of, still
 
-SHEET = load_parameters("imu_mti", ImuParameters)
-RATE = 500.0
 SENSORS = ("gyro", "accelerometer")
-#: No error at all but the filters and the ranges.
-QUIET = replace(
-    SHEET,
-    **{
-        f.name: 0.0
-        for f in fields(ImuParameters)
-        if f.name.endswith("_jitter_s") or any(w in f.name for w in ("noise", "instability", "walk", "sigma"))
-    },
-    gyro_quantum_rad_s=1e-12,
-    accelerometer_quantum_m_s2=1e-12,
-)
-
-
-def _imu(parameters: ImuParameters, seed: int = 0, rate: float = RATE) -> Imu:
-    gyro, accelerometer, clock = (np.random.default_rng((seed, i)) for i in range(3))
-    return Imu(parameters, rate, gyro, accelerometer, clock, np.eye(3), np.zeros(3))
-
-
-def _rates(parameters: ImuParameters, w: np.ndarray, **more: Any) -> np.ndarray:
-    return _imu(parameters, **more).record(len(w), w_WB_B=w).angular_rate_rad_s
-
-
-def _forces(parameters: ImuParameters, f: np.ndarray, **more: Any) -> np.ndarray:
-    return _imu(parameters, **more).record(len(f), specific_force_B=f).specific_force_m_s2
-
-
-def _still(parameters: ImuParameters, n: int, **more: Any) -> ImuRecord:
-    """A record in free fall: nothing to measure."""
-    return _imu(parameters, **more).record(n, specific_force_B=np.zeros((n, 3)))
 
 
 # Filter
@@ -56,7 +25,7 @@ def test_the_filter_is_3_db_down_and_lags_by_90_degrees_at_its_bandwidth() -> No
     rate = 20000.0
     t = np.arange(int(rate * 0.2)) / rate
     sheet = replace(QUIET, accelerometer_bandwidth_hz=120.0)
-    for f, sensors in ((SHEET.gyro_bandwidth_hz, _rates), (120.0, _forces)):
+    for f, sensors in ((SHEET.gyro_bandwidth_hz, rates_of), (120.0, forces_of)):
         out = sensors(sheet, np.sin(2 * np.pi * f * t)[:, None] * [1.0, 0.0, 0.0], rate=rate)[:, 0]
         late = slice(len(t) // 2, None)
         response = 2j * (out[late] * np.exp(-2j * np.pi * f * t[late])).mean()
@@ -68,7 +37,7 @@ def test_the_filter_is_3_db_down_and_lags_by_90_degrees_at_its_bandwidth() -> No
 def test_at_the_imus_own_rate_the_gain_is_the_continuous_filters_on_the_linear_hold(f: float) -> None:
     """A sampled sine joined by straight lines has images at f + k f_s of size sinc^2; the filter weighs each."""
     t = np.arange(2000) / RATE
-    out = _rates(QUIET, np.sin(2 * np.pi * f * t)[:, None] * [0.0, 1.0, 0.0])[:, 1]
+    out = rates_of(QUIET, np.sin(2 * np.pi * f * t)[:, None] * [0.0, 1.0, 0.0])[:, 1]
     images = f + RATE * np.arange(-200, 201)
     wc = 2 * np.pi * SHEET.gyro_bandwidth_hz
     _, H = signal.freqs([wc**2], [1.0, 2 * SHEET.gyro_damping_ratio * wc, wc**2], 2 * np.pi * images)
@@ -85,14 +54,14 @@ def test_a_ramp_is_followed_by_the_exact_solution_of_the_filter() -> None:
     wc = 2 * np.pi * SHEET.accelerometer_bandwidth_hz
     system = signal.TransferFunction([wc**2], [1.0, 2 * SHEET.accelerometer_damping_ratio * wc, wc**2])
     _, exact, _ = signal.lsim(system, ramp, t)
-    assert np.allclose(_forces(QUIET, ramp[:, None] * [0.0, 0.0, 1.0])[:, 2], exact, atol=1e-9)
+    assert np.allclose(forces_of(QUIET, ramp[:, None] * [0.0, 0.0, 1.0])[:, 2], exact, atol=1e-9)
 
 
 def test_the_integral_of_the_measured_rate_is_the_angle_turned() -> None:
     """A turn from rest to rest: the filter has gain one at zero frequency, so the angle comes out whole."""
     t = np.arange(1000) / RATE
     rate = np.where((t > 0.2) & (t < 1.2), 0.4 * np.sin(np.pi * (t - 0.2)) ** 2, 0.0)
-    out = _rates(QUIET, rate[:, None] * [0.0, 0.0, 1.0])[:, 2]
+    out = rates_of(QUIET, rate[:, None] * [0.0, 0.0, 1.0])[:, 2]
     assert out.sum() / RATE == pytest.approx(rate.sum() / RATE, rel=1e-9)
     assert out.sum() / RATE == pytest.approx(0.2, rel=1e-6)
 
@@ -108,7 +77,7 @@ def _responses(parameters: ImuParameters, stimulus: str) -> tuple[np.ndarray, np
     held = 100  # samples: the filters settle to exp(-180)
     motion = {"w_WB_B": np.zeros((3 * held, 3)), "specific_force_B": np.zeros((3 * held, 3))}
     motion[stimulus][:] = np.repeat(np.eye(3), held, axis=0)
-    records = [_imu(parameters, seed).record(3 * held, **motion) for seed in range(UNITS)]
+    records = [imu_of(parameters, seed).record(3 * held, **motion) for seed in range(UNITS)]
     gyros = np.array([r.angular_rate_rad_s[held - 1 :: held].T for r in records])
     accelerometers = np.array([r.specific_force_m_s2[held - 1 :: held].T for r in records])
     return gyros, accelerometers
@@ -159,7 +128,7 @@ def test_turn_on_bias_is_drawn_once_a_unit_with_its_standard_deviation(sensors: 
     sigma = getattr(SHEET, name)
     biases = np.empty((UNITS, 3))
     for seed in range(UNITS):
-        samples = _still(replace(QUIET, **{name: sigma}), 3, seed=seed)[1 if sensors == "gyro" else 2]
+        samples = still(replace(QUIET, **{name: sigma}), 3, seed=seed)[1 if sensors == "gyro" else 2]
         assert np.ptp(samples, axis=0).max() == 0.0
         biases[seed] = samples[0]
     assert np.var(biases) == pytest.approx(sigma**2, rel=WITHIN)
@@ -178,7 +147,7 @@ def test_every_drawn_error_is_a_draw_of_its_own() -> None:
         accelerometer_misalignment_sigma_rad=0.01,
         accelerometer_turn_on_bias_sigma_m_s2=0.01,
     )
-    biases = [np.array([getattr(_imu(all_drawn, s), f"{n}_bias_I") for s in range(UNITS)]) for n in SENSORS]
+    biases = [np.array([getattr(imu_of(all_drawn, s), f"{n}_bias_I") for s in range(UNITS)]) for n in SENSORS]
     by_rate, by_force = _responses(all_drawn, "w_WB_B"), _responses(all_drawn, "specific_force_B")
     responses = [by_rate[0] - biases[0][:, :, None], by_force[0] - biases[0][:, :, None]]
     responses.append(by_force[1] - biases[1][:, :, None])
@@ -202,7 +171,7 @@ def test_white_noise_has_the_variance_of_its_density_over_the_sample_time_whatev
         gyro_bandwidth_hz=bandwidth_hz,
         accelerometer_bandwidth_hz=bandwidth_hz,
     )
-    _, rates, forces = _still(noisy, n)
+    _, rates, forces = still(noisy, n)
     densities = noisy.gyro_noise_density_rad_s_rthz, noisy.accelerometer_noise_density_m_s2_rthz
     for noise, density in zip((rates, forces), densities, strict=True):
         sigma = density * np.sqrt(RATE)
@@ -228,19 +197,19 @@ def test_bias_instability_forgets_itself_within_its_correlation_time_and_keeps_i
         accelerometer_bias_instability_m_s2=1e-3,
         accelerometer_bias_correlation_s=0.02,
     )
-    for drift in _still(drifting, 20000)[1:]:
+    for drift in still(drifting, 20000)[1:]:
         worth = drift.size * np.tanh(1.0 / (RATE * 0.02))
         assert drift.var() == pytest.approx(sigma**2, rel=4.5 * np.sqrt(2.0 / worth))
         correlation = (drift[10:] * drift[:-10]).mean() / (drift**2).mean()
         assert correlation == pytest.approx(np.exp(-1.0), abs=4.5 / np.sqrt(worth))
-    first = np.array([_still(drifting, 1, seed=seed).angular_rate_rad_s[0] for seed in range(UNITS)])
+    first = np.array([still(drifting, 1, seed=seed).angular_rate_rad_s[0] for seed in range(UNITS)])
     assert first.var() == pytest.approx(sigma**2, rel=WITHIN)
 
 
 def test_random_walk_starts_at_zero_and_its_variance_grows_by_k_squared_a_second() -> None:
     walking = replace(QUIET, gyro_rate_random_walk_rad_s_rts=1e-3, accelerometer_random_walk_m_s2_rts=2e-3)
     n, lag = 60000, 250  # 0.5 s: 240 steps a record and axis that do not overlap
-    for walk, K in zip(_still(walking, n)[1:], (1e-3, 2e-3), strict=True):
+    for walk, K in zip(still(walking, n)[1:], (1e-3, 2e-3), strict=True):
         assert np.abs(walk[0]).max() < 5.0 * K / np.sqrt(RATE)
         single = np.diff(walk, axis=0)
         assert single.var() == pytest.approx(K**2 / RATE, rel=4.5 * np.sqrt(2.0 / single.size))
@@ -257,7 +226,7 @@ def test_the_true_biases_are_what_the_samples_scatter_around() -> None:
         accelerometer_bias_instability_m_s2=0.0,
         gyro_g_sensitivity_sigma_rad_s_m=0.0,
     )
-    imu = _imu(sheet, 8)
+    imu = imu_of(sheet, 8)
     record = imu.record(20000, specific_force_B=np.zeros((20000, 3)))
     for samples, bias, N in (
         (record.angular_rate_rad_s, imu.gyro_bias_I, sheet.gyro_noise_density_rad_s_rthz),
@@ -269,7 +238,7 @@ def test_the_true_biases_are_what_the_samples_scatter_around() -> None:
 
 def test_the_true_biases_are_those_of_the_last_sample_drift_and_walk_included() -> None:
     noiseless = replace(QUIET, **{f.name: getattr(SHEET, f.name) for f in fields(SHEET) if "bias" in f.name})
-    imu = _imu(replace(noiseless, gyro_rate_random_walk_rad_s_rts=1e-3, accelerometer_random_walk_m_s2_rts=1e-3), 3)
+    imu = imu_of(replace(noiseless, gyro_rate_random_walk_rad_s_rts=1e-3, accelerometer_random_walk_m_s2_rts=1e-3), 3)
     for k in range(20):
         sample = imu.step(k / RATE, np.zeros(3), np.zeros(3), np.zeros(3))
         assert sample is not None
@@ -280,14 +249,14 @@ def test_the_true_biases_are_those_of_the_last_sample_drift_and_walk_included() 
 # Converter
 
 
-@pytest.mark.parametrize("sensors", [_rates, _forces])
+@pytest.mark.parametrize("sensors", [rates_of, forces_of])
 def test_the_range_clips_both_ways(sensors: Any) -> None:
-    limit = SHEET.gyro_range_rad_s if sensors is _rates else SHEET.accelerometer_range_m_s2
+    limit = SHEET.gyro_range_rad_s if sensors is rates_of else SHEET.accelerometer_range_m_s2
     out = sensors(QUIET, np.tile([1.1 * limit, -3.0 * limit, 0.9 * limit], (100, 1)))[-1]
     assert out == pytest.approx([limit, -limit, 0.9 * limit], abs=1e-9)
 
 
-@pytest.mark.parametrize("sensors", [_rates, _forces])
+@pytest.mark.parametrize("sensors", [rates_of, forces_of])
 def test_every_output_is_a_whole_number_of_quanta_and_the_nearest(sensors: Any) -> None:
     coarse = replace(QUIET, gyro_quantum_rad_s=0.01, accelerometer_quantum_m_s2=0.01)
     motion = np.random.default_rng(2).uniform(-1.0, 1.0, (200, 3))

@@ -13,38 +13,13 @@ from dockair.sim.camera.glints import find_glints
 from dockair.sim.camera.led_reflections import LedReflections, find_led_reflections
 from dockair.sim.camera.mirrors import Mirrors, finishes, vector
 from dockair.sim.camera.sheets import LightParameters, SurfaceParameters
+from mirror_scenes import EYE, SHEET, scene_of, unit
+from mirror_scenes import IDEAL as PERFECT
 
-SHEET = load_parameters("surfaces", SurfaceParameters)
 #: All light is mirrored, an LED shines alike to all sides, nothing is too faint
-IDEAL = replace(
-    SHEET,
-    metal_reflectance=1.0,
-    metal_share=1.0,
-    metal_roughness_rad=1e-5,
-    grazing_rad=1.57,
-    led_side_light=1.0,
-    led_seat_m=0.0,
-    faintest_reflection=0.0,
-    faintest_glint_m2_sr=0.0,
-    faintest_radiance=0.0,
-)
-EYE = np.zeros(3)
+IDEAL = replace(PERFECT, led_side_light=1.0, led_seat_m=0.0, faintest_reflection=0.0)
 AFT = np.array([-1.0, 0.0, 0.0])
 _G = mujoco.mjtGeom
-
-
-def _unit(*v: float) -> np.ndarray:
-    return np.array(v) / np.linalg.norm(v)
-
-
-def _world(*geoms: dict) -> tuple[mujoco.MjModel, mujoco.MjData]:
-    spec = mujoco.MjSpec()
-    for geom in geoms:
-        spec.worldbody.add_geom(**geom)
-    model = spec.compile()
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
-    return model, data
 
 
 def _sphere(at: np.ndarray, radius: float) -> dict:
@@ -80,9 +55,9 @@ def _bound(
 
 
 def _mirror_error_rad(p: np.ndarray, n: np.ndarray, led: np.ndarray) -> float:
-    sight = _unit(*(p - EYE))
+    sight = unit(*(p - EYE))
     reflected = sight - 2.0 * (sight @ n) * n
-    return float(np.linalg.norm(reflected - _unit(*(led - p))))
+    return float(np.linalg.norm(reflected - unit(*(led - p))))
 
 
 def _coddington(d1: float, d: float, cos_i: float, r_in: float, r_across: float) -> float:
@@ -97,7 +72,7 @@ def _coddington(d1: float, d: float, cos_i: float, r_in: float, r_across: float)
 def test_on_axis_a_ball_images_an_led_as_the_mirror_equation_says() -> None:
     """1/image = 1/object + 2/r; the image is nearer than the LED by s/d1, so I falls with its square."""
     r, d, d1 = 0.3, 5.0, 0.4
-    found = _find(_world(_sphere(np.array([d + r, 0.0, 0.0]), r)), np.array([d - d1, 1e-9, 0.0]))
+    found = _find(scene_of(_sphere(np.array([d + r, 0.0, 0.0]), r)), np.array([d - d1, 1e-9, 0.0]))
     s = 1.0 / (1.0 / d1 + 2.0 / r)
     assert len(found.p_W) == 1
     np.testing.assert_allclose(found.p_W[0], [d, 0.0, 0.0], atol=1e-6)
@@ -107,9 +82,9 @@ def test_on_axis_a_ball_images_an_led_as_the_mirror_equation_says() -> None:
 def test_a_balls_reflections_are_coddingtons_bundles_however_near_and_oblique() -> None:
     rng, radius, found_count = np.random.default_rng(1), 0.05, 0
     for _ in range(60):
-        centre = _unit(1.0, *rng.normal(size=2) * 0.3) * rng.uniform(0.2, 4.0)
-        led = centre + _unit(*rng.normal(size=3)) * radius * rng.uniform(1.05, 20.0)
-        found = _find(_world(_sphere(centre, radius)), led)
+        centre = unit(1.0, *rng.normal(size=2) * 0.3) * rng.uniform(0.2, 4.0)
+        led = centre + unit(*rng.normal(size=3)) * radius * rng.uniform(1.05, 20.0)
+        found = _find(scene_of(_sphere(centre, radius)), led)
         for p, intensity in zip(found.p_W, found.intensity_w_sr, strict=True):
             n = (p - centre) / radius
             assert np.linalg.norm(n) == pytest.approx(1.0, abs=1e-9)
@@ -127,7 +102,7 @@ def test_a_tubes_reflections_obey_the_law_and_are_coddingtons_in_the_two_princip
         (np.array([4.0, 0.0, 0.0]), np.array([3.5, 0.8, 0.0]), radius, np.inf),  # plane across the tube
         (np.array([4.0, 0.0, 0.0]), np.array([3.7, 0.0, 0.9]), np.inf, radius),  # plane along it
     ):
-        found = _find(_world(_tube(centre, radius, 2.0, R)), led)
+        found = _find(scene_of(_tube(centre, radius, 2.0, R)), led)
         assert len(found.p_W) == 1
         p = found.p_W[0]
         n = (p - centre) * [1, 1, 0] / radius
@@ -140,13 +115,13 @@ def test_a_tubes_reflections_obey_the_law_and_are_coddingtons_in_the_two_princip
 
 def test_from_far_away_an_led_is_mirrored_as_the_sun_is() -> None:
     """I/d1^2 is its irradiance: the A of both must agree on ball and tube."""
-    direction, far = _unit(-0.6, 0.5, 0.1), 1e5
+    direction, far = unit(-0.6, 0.5, 0.1), 1e5
     light = replace(load_parameters("light", LightParameters), sun_angular_radius_rad=1e-9)
     for geom in (
         _sphere(np.array([6.0, 0.5, 0.2]), 0.3),
         _tube(np.array([6.0, 0.0, 0.0]), 0.05, 3.0, exp(np.array([0.1, 0.1, 0.3]))),
     ):
-        world = _world(geom)
+        world = scene_of(geom)
         sun = find_glints(*world, Mirrors.of(world[0]), EYE, direction, replace(IDEAL, patch_step_rad=1.0), light)
         led = _find(world, far * direction)
         assert len(sun.p_W) == len(led.p_W) == 1
@@ -173,17 +148,17 @@ def _rim_world() -> tuple[mujoco.MjModel, mujoco.MjData]:
 
 def _bundle_intensity(led: np.ndarray, p: np.ndarray, gradient, height) -> float:
     """I_ref/I by four rays of a narrow bundle: from the LED, off the surface height(q) = 0, to the plane of the eye."""
-    main = _unit(*(p - led))
-    e1 = _unit(*np.cross(main, [0.3, 0.5, 0.8]))
+    main = unit(*(p - led))
+    e1 = unit(*np.cross(main, [0.3, 0.5, 0.8]))
     e2, landed, angle = np.cross(main, e1), [], 1e-6
-    to_eye = _unit(*(EYE - p))
+    to_eye = unit(*(EYE - p))
     for k1, k2 in ((1, 0), (-1, 0), (0, 1), (0, -1)):
-        ray = _unit(*(main + angle * (k1 * e1 + k2 * e2)))
+        ray = unit(*(main + angle * (k1 * e1 + k2 * e2)))
         t = float(np.linalg.norm(p - led))
         for _ in range(20):
             q = led + t * ray
             t -= height(q) / float(gradient(q) @ ray)
-        n = _unit(*gradient(led + t * ray))
+        n = unit(*gradient(led + t * ray))
         out = ray - 2.0 * (ray @ n) * n
         q = led + t * ray
         landed.append(q + out * ((EYE - q) @ to_eye) / (out @ to_eye))
@@ -203,7 +178,7 @@ def test_the_rims_reflections_obey_the_law_and_are_as_bright_as_a_bundle_of_rays
         return float(np.linalg.norm(q - ring_point(q)) - 0.02)
 
     def gradient(q: np.ndarray) -> np.ndarray:
-        return _unit(*(q - ring_point(q)))
+        return unit(*(q - ring_point(q)))
 
     for led in np.array([[3.97, 0.3, 0.45], [3.7, 0.5, 0.3], [3.0, 0.3, 0.9], [3.9, 0.1, -0.3]]):
         found = _find(world, led)
@@ -224,11 +199,11 @@ def test_an_oblique_tubes_reflection_is_as_bright_as_a_bundle_of_rays() -> None:
         def flat(q: np.ndarray, R: np.ndarray = R, centre: np.ndarray = centre) -> np.ndarray:
             return (q - centre) - ((q - centre) @ R[:, 2]) * R[:, 2]
 
-        led = centre + _unit(*rng.normal(size=3)) * 0.5
-        found = _find(_world(_tube(centre, radius, 5.0, R)), led)
+        led = centre + unit(*rng.normal(size=3)) * 0.5
+        found = _find(scene_of(_tube(centre, radius, 5.0, R)), led)
         for p, intensity in zip(found.p_W, found.intensity_w_sr, strict=True):
             expected = _bundle_intensity(
-                led, p, lambda q: _unit(*flat(q)), lambda q: float(np.linalg.norm(flat(q)) - 0.04)
+                led, p, lambda q: unit(*flat(q)), lambda q: float(np.linalg.norm(flat(q)) - 0.04)
             )
             assert intensity == pytest.approx(2.0 * expected, rel=2e-3)
             count += 1
@@ -243,7 +218,7 @@ def test_a_balls_reflected_light_over_all_directions_is_the_light_it_catches() -
     for c in cos:  # directions of the eye, round about the line from ball to LED
         centre = np.array([far, 0.0, 0.0])
         led = centre + b * np.array([-c, np.sqrt(1.0 - c * c), 0.0])
-        total += _find(_world(_sphere(centre, r)), led).intensity_w_sr.sum() / 2.0
+        total += _find(scene_of(_sphere(centre, r)), led).intensity_w_sr.sum() / 2.0
     caught = 0.5 * (1.0 - np.sqrt(1.0 - (r / b) ** 2))
     assert total * 2.0 * np.pi * (cos[1] - cos[0]) == pytest.approx(4.0 * np.pi * caught, rel=5e-3)
 
@@ -252,9 +227,9 @@ def test_a_balls_reflected_light_over_all_directions_is_the_light_it_catches() -
 
 
 def test_the_main_beam_and_the_side_light_follow_the_leds_pattern() -> None:
-    world, led = _world(_sphere(np.array([3.0, 0.0, 0.0]), 0.05)), np.array([2.8, 0.3, 0.0])
+    world, led = scene_of(_sphere(np.array([3.0, 0.0, 0.0]), 0.05)), np.array([2.8, 0.3, 0.0])
     all_around = _find(world, led).intensity_w_sr[0]
-    ray = _unit(*(_find(world, led).p_W[0] - led))
+    ray = unit(*(_find(world, led).p_W[0] - led))
     side = replace(IDEAL, led_side_light=0.01)
     tilted = exp(np.array([0.0, 0.0, 0.7])) @ ray
     assert _find(world, led, side, axis=tilted).intensity_w_sr[0] == pytest.approx(
@@ -265,18 +240,18 @@ def test_the_main_beam_and_the_side_light_follow_the_leds_pattern() -> None:
 
 def test_something_between_led_mirror_and_lens_puts_a_reflection_out() -> None:
     ball, led = _sphere(np.array([4.0, 0.0, 0.0]), 0.2), np.array([3.0, 1.5, 0.0])
-    assert len(_find(_world(ball), led).p_W) == 1
+    assert len(_find(scene_of(ball), led).p_W) == 1
     for at in ([3.4, 0.75, 0.0], [2.0, 0.0, 0.0]):
         box = {"type": _G.mjGEOM_BOX, "pos": at, "size": [0.15, 0.15, 0.15]}
-        assert len(_find(_world(ball, box), led).p_W) == 0
-        assert len(_find(_world(ball, box | {"group": 3}), led).p_W) == 1
+        assert len(_find(scene_of(ball, box), led).p_W) == 0
+        assert len(_find(scene_of(ball, box | {"group": 3}), led).p_W) == 1
 
 
 def test_an_leds_own_seat_does_not_hide_it_from_a_mirror() -> None:
     ball, led = _sphere(np.array([4.0, 0.0, 0.0]), 0.2), np.array([3.0, 1.5, 0.0])
     seat = {"type": _G.mjGEOM_SPHERE, "pos": list(led), "size": [0.02, 0.0, 0.0], "name": "hose_seat"}
-    assert len(_find(_world(ball, seat), led).p_W) == 0
-    assert len(_find(_world(ball, seat), led, replace(IDEAL, led_seat_m=0.03)).p_W) == 1
+    assert len(_find(scene_of(ball, seat), led).p_W) == 0
+    assert len(_find(scene_of(ball, seat), led, replace(IDEAL, led_seat_m=0.03)).p_W) == 1
 
 
 def _scene(make_world, ahead_m: float, surfaces: SurfaceParameters) -> LedReflections:
@@ -308,10 +283,10 @@ def test_the_bound_is_above_every_reflection_and_not_far_above_the_best() -> Non
     best = {"ball": 0.0, "tube": 0.0}
     for _ in range(150):
         centre, R = np.array([3.0, 0.2, -0.1]), exp(rng.normal(size=3))
-        led = centre + _unit(*rng.normal(size=3)) * rng.uniform(0.15, 1.0)
+        led = centre + unit(*rng.normal(size=3)) * rng.uniform(0.15, 1.0)
         for kind, geom in (("ball", _sphere(centre, 0.04)), ("tube", _tube(centre, 0.04, 2.0, R))):
-            world = _world(geom)
-            for axis in (_unit(*(centre - led)), _unit(*(led - centre))):
+            world = scene_of(geom)
+            for axis in (unit(*(centre - led)), unit(*(led - centre))):
                 found = _find(world, led, side, axis=axis, exponent=1e-6)
                 bound = _bound(world, led, axis, side)
                 for intensity in found.intensity_w_sr:
@@ -334,7 +309,7 @@ def test_polished_ribs_and_coupling_show_the_leds_and_dull_ones_do_not(make_worl
 
 
 def test_a_dark_led_reflects_nothing() -> None:
-    world = _world(_sphere(np.array([4.0, 0.0, 0.0]), 0.2))
+    world = scene_of(_sphere(np.array([4.0, 0.0, 0.0]), 0.2))
     led = np.array([[3.0, 1.5, 0.0]])
     found = find_led_reflections(*world, Mirrors.of(world[0]), EYE, led, AFT, np.zeros(1), 2.6, IDEAL)
     assert found.p_W.shape == (0, 3) and found.led.shape == (0,)

@@ -6,80 +6,27 @@ import mujoco
 import numpy as np
 import pytest
 
-from dockair.parameters import load_parameters
-from dockair.rotations import exp, quaternion_from_matrix
-from dockair.sim.camera.glints import Glints, find_glints
-from dockair.sim.camera.mirrors import Mirrors
-from dockair.sim.camera.sheets import LightParameters, SurfaceParameters
-
-LIGHT = load_parameters("light", LightParameters)
-SHEET = load_parameters("surfaces", SurfaceParameters)
-#: Everything counts, and metal mirrors all light at every angle
-IDEAL = replace(
-    SHEET,
-    metal_reflectance=1.0,
-    metal_share=1.0,
-    grazing_rad=1.57,
-    faintest_glint_m2_sr=0.0,
-    faintest_radiance=0.0,
-    metal_roughness_rad=1e-5,
-)
-POINT_SUN = replace(LIGHT, sun_angular_radius_rad=1e-6)
-EYE = np.zeros(3)
-_G = mujoco.mjtGeom
-_METAL = "probe_under_test"
-
-
-def _unit(*v: float) -> np.ndarray:
-    return np.array(v) / np.linalg.norm(v)
-
-
-def _world(*geoms: dict) -> tuple[mujoco.MjModel, mujoco.MjData]:
-    spec = mujoco.MjSpec()
-    for geom in geoms:
-        spec.worldbody.add_geom(**geom)
-    model = spec.compile()
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
-    return model, data
-
-
-def _body(kind: mujoco.mjtGeom, at: np.ndarray, size: list[float], R: np.ndarray | None = None) -> dict:
-    quat = quaternion_from_matrix(np.eye(3) if R is None else R)
-    return {"name": _METAL, "type": kind, "pos": list(at), "size": size, "quat": quat}
-
-
-def _sphere(at: list[float], radius: float, **more: object) -> dict:
-    return {"name": _METAL, "type": _G.mjGEOM_SPHERE, "pos": at, "size": [radius, 0.0, 0.0], **more}
-
-
-def _glints(
-    world: tuple[mujoco.MjModel, mujoco.MjData],
-    sun: np.ndarray,
-    surfaces: SurfaceParameters = IDEAL,
-    light: LightParameters = POINT_SUN,
-    eye: np.ndarray = EYE,
-    ahead: np.ndarray | None = None,
-) -> Glints:
-    return find_glints(*world, Mirrors.of(world[0]), eye, sun, surfaces, light, ahead)
-
+from dockair.rotations import exp
+from mirror_scenes import EYE, IDEAL, LIGHT, SHEET, glints_in, metal_body, metal_sphere, scene_of, unit
 
 # --------------------------------------------------------------------------------------------------- energy, rays
+
+_G = mujoco.mjtGeom
 
 
 def test_a_spheres_light_over_all_directions_is_the_light_it_catches() -> None:
     """Far away A = r^2/4 in every direction: over the sphere pi r^2, the light on its disc."""
     r, d = 0.3, 3e3
-    for sun in (_unit(-1, 0.1, 0), _unit(-0.2, 0.5, 1.0), _unit(0.6, 0, 0.8)):
-        area = _glints(_world(_sphere([d, 0.0, 0.0], r)), sun).area_m2_sr.sum()
+    for sun in (unit(-1, 0.1, 0), unit(-0.2, 0.5, 1.0), unit(0.6, 0, 0.8)):
+        area = glints_in(scene_of(metal_sphere([d, 0.0, 0.0], r)), sun).area_m2_sr.sum()
         assert 4.0 * np.pi * area == pytest.approx(np.pi * r**2, rel=1e-3)
 
 
 @pytest.mark.parametrize("roughness", [0.02, 0.08])
 def test_a_cylinders_light_over_all_directions_is_the_light_that_falls_on_its_side(roughness: float) -> None:
     """2 r L sin(angle between Sun and axis); with h half-way, d(directions seen) is 4 (h.s) d(directions of h)."""
-    radius, half, sun = 0.4, 1.5, _unit(0.0, 0.8, 0.6)
-    world = _world(_body(_G.mjGEOM_CYLINDER, EYE, [radius, half, 0.0]))
+    radius, half, sun = 0.4, 1.5, unit(0.0, 0.8, 0.6)
+    world = scene_of(metal_body(_G.mjGEOM_CYLINDER, EYE, [radius, half, 0.0]))
     surfaces = replace(IDEAL, metal_roughness_rad=roughness, patch_step_rad=1.0)
     azimuth = (np.arange(60) + 0.5) * np.pi / 60  # from -x over the lit side +y to +x
     out_of_plane = np.linspace(-4.5 * roughness, 4.5 * roughness, 25)
@@ -88,23 +35,23 @@ def test_a_cylinders_light_over_all_directions_is_the_light_that_falls_on_its_si
         for e in out_of_plane:
             h = np.array([np.cos(e) * np.cos(f), np.cos(e) * np.sin(f), np.sin(e)])
             v = 2.0 * (h @ sun) * h - sun
-            area = _glints(world, sun, surfaces, eye=2e3 * v).area_m2_sr.sum()
+            area = glints_in(world, sun, surfaces, eye=2e3 * v).area_m2_sr.sum()
             total += area * 4.0 * (h @ sun) * np.cos(e)
     total *= (azimuth[1] - azimuth[0]) * (out_of_plane[1] - out_of_plane[0])
     assert total == pytest.approx(2.0 * radius * 2.0 * half * np.hypot(sun[0], sun[1]), rel=0.01)
 
 
 def test_a_flat_faces_light_over_all_directions_is_the_light_that_falls_on_it() -> None:
-    half, sun, roughness = [0.02, 0.9, 0.6], _unit(-1.0, 0.4, 0.3), 0.05
-    world = _world(_body(_G.mjGEOM_BOX, EYE, half))
+    half, sun, roughness = [0.02, 0.9, 0.6], unit(-1.0, 0.4, 0.3), 0.05
+    world = scene_of(metal_body(_G.mjGEOM_BOX, EYE, half))
     surfaces = replace(IDEAL, metal_roughness_rad=roughness)
     steps = np.linspace(-4.5, 4.5, 21) * roughness
     total = 0.0
     for a in steps:
         for b in steps:
-            h = _unit(-1.0, a, b)
+            h = unit(-1.0, a, b)
             v = 2.0 * (h @ sun) * h - sun
-            total += _glints(world, sun, surfaces, eye=2e3 * v).area_m2_sr.sum() * 4.0 * (h @ sun) * abs(h[0]) ** 3
+            total += glints_in(world, sun, surfaces, eye=2e3 * v).area_m2_sr.sum() * 4.0 * (h @ sun) * abs(h[0]) ** 3
     total *= (steps[1] - steps[0]) ** 2
     assert total == pytest.approx(4.0 * half[1] * half[2] * abs(sun[0]), rel=0.01)
 
@@ -113,22 +60,22 @@ def test_a_flat_faces_light_over_all_directions_is_the_light_that_falls_on_it() 
 def test_a_small_rough_face_shows_beckmanns_share_of_facets(off: float) -> None:
     """Far away A = area/4 x exp(-tan^2/(2 s^2))/(2 pi s^2 cos^4) at the angle `off` of face and half-way direction."""
     half, s, h = [0.02, 0.15, 0.1], 0.1, np.array([-np.cos(off), 0.6 * np.sin(off), 0.8 * np.sin(off)])
-    sun = _unit(-0.9, 0.3, -0.2)
-    world = _world(_body(_G.mjGEOM_BOX, EYE, half))
+    sun = unit(-0.9, 0.3, -0.2)
+    world = scene_of(metal_body(_G.mjGEOM_BOX, EYE, half))
     v = 2.0 * (h @ sun) * h - sun
-    found = _glints(world, sun, replace(IDEAL, metal_roughness_rad=s), eye=1e3 * v).area_m2_sr.sum()
+    found = glints_in(world, sun, replace(IDEAL, metal_roughness_rad=s), eye=1e3 * v).area_m2_sr.sum()
     density = np.exp(-0.5 * (np.tan(off) / s) ** 2) / (2.0 * np.pi * s**2 * np.cos(off) ** 4)
     assert found == pytest.approx(0.25 * 4.0 * half[1] * half[2] * density, rel=2e-3)
 
 
 def test_a_large_plane_mirror_shows_the_whole_sun() -> None:
     """A = d^2: the mirror takes nothing away and adds nothing."""
-    d, n = 6.0, _unit(-1.0, 0.3, 0.2)
+    d, n = 6.0, unit(-1.0, 0.3, 0.2)
     R = exp(np.array([0.0, 0.4, 0.0]))
     n = -R[:, 0]
     sun = 2.0 * (n @ [-1.0, 0.0, 0.0]) * n + np.array([1.0, 0.0, 0.0])
-    world = _world(_body(_G.mjGEOM_BOX, np.array([d, 0.0, 0.0]) - 0.05 * n, [0.05, 1.0, 1.0], R))
-    glints = _glints(world, sun, light=LIGHT)
+    world = scene_of(metal_body(_G.mjGEOM_BOX, np.array([d, 0.0, 0.0]) - 0.05 * n, [0.05, 1.0, 1.0], R))
+    glints = glints_in(world, sun, light=LIGHT)
     assert glints.area_m2_sr.sum() == pytest.approx(d**2, rel=0.02)
     middle = (glints.area_m2_sr @ glints.p_W) / glints.area_m2_sr.sum()
     np.testing.assert_allclose(middle, [d, 0.0, 0.0], atol=2e-3)
@@ -143,8 +90,8 @@ def _points(
     """
     if kind == _G.mjGEOM_ELLIPSOID:
         cos, f = rng.uniform(np.cos(cap), 1.0, n), rng.uniform(0.0, 2.0 * np.pi, n)
-        e = _unit(*(size * toward))
-        e1 = _unit(*np.cross(e, [0.31, 0.52, 0.79]))
+        e = unit(*(size * toward))
+        e1 = unit(*np.cross(e, [0.31, 0.52, 0.79]))
         sin = np.sqrt(1.0 - cos**2)
         q = np.outer(cos, e) + np.outer(sin * np.cos(f), e1) + np.outer(sin * np.sin(f), np.cross(e, e1))
         gradient = np.linalg.norm(q / size, axis=1)
@@ -163,10 +110,10 @@ def _rays_into_a_disc(
 ) -> tuple[float, float]:
     """Irradiance at the eye over the Sun's, and its standard error: sunlight on random facets, rays that come by."""
     rng, radius = np.random.default_rng(8), 0.04 * float(np.linalg.norm(centre))
-    toward = _unit(*(sun - _unit(*centre))) @ R
+    toward = unit(*(sun - unit(*centre))) @ R
     p, n, area = _points(kind, np.array(size), toward, cap, 600_000, rng)
     p, n = p @ R.T + centre, n @ R.T
-    t1 = np.cross(n, _unit(0.31, 0.52, 0.79))
+    t1 = np.cross(n, unit(0.31, 0.52, 0.79))
     t1 /= np.linalg.norm(t1, axis=1, keepdims=True)
     slope = _ROUGH * rng.normal(size=(2, len(p), 1))
     facet = n + slope[0] * t1 + slope[1] * np.cross(n, t1)  # as long as the facet is larger than its shadow on n
@@ -196,11 +143,11 @@ def test_a_glints_light_is_that_of_rays_thrown_at_random_facets(name: str) -> No
     """4 standard errors of the count, and 3 % for the width of the eye's disc and the lobe's linear map."""
     kind, size, at, turn, cap, normal = _BRUTE[name]
     R, centre = exp(np.array(turn)), np.array(at)
-    n, v = R @ _unit(*normal), -_unit(*at)
+    n, v = R @ unit(*normal), -unit(*at)
     sun = 2.0 * (n @ v) * n - v
     expected, error = _rays_into_a_disc(kind, size, R, centre, sun, cap)
     surfaces = replace(IDEAL, metal_roughness_rad=_ROUGH)
-    glints = _glints(_world(_body(kind, centre, size, R)), sun, surfaces)
+    glints = glints_in(scene_of(metal_body(kind, centre, size, R)), sun, surfaces)
     found = (glints.area_m2_sr / (glints.p_W**2).sum(axis=1)).sum()
     assert 0.0 < error < 0.06 * expected
     assert found == pytest.approx(expected, abs=4.0 * error + 0.03 * expected)
@@ -213,8 +160,8 @@ def _painted_sphere_share(cos_incidence: float) -> float:
     """R from a far sphere's A = R r^2/4, the Sun at twice the incidence from the line of sight."""
     i = np.arccos(cos_incidence)
     sun = np.array([-np.cos(2.0 * i), np.sin(2.0 * i), 0.0])
-    world = _world(_sphere([5e3, 0.0, 0.0], 0.5, name="tanker_under_test"))
-    return float(_glints(world, sun, replace(IDEAL, paint_share=1.0)).area_m2_sr.sum() / (0.25 * 0.5**2))
+    world = scene_of(metal_sphere([5e3, 0.0, 0.0], 0.5, name="tanker_under_test"))
+    return float(glints_in(world, sun, replace(IDEAL, paint_share=1.0)).area_m2_sr.sum() / (0.25 * 0.5**2))
 
 
 def test_paint_mirrors_by_fresnels_law_of_a_dielectric() -> None:
@@ -236,31 +183,31 @@ def test_paint_mirrors_by_fresnels_law_of_a_dielectric() -> None:
     ],
 )
 def test_a_glint_is_as_bright_as_its_materials_share(geom: str, share: str) -> None:
-    world, sun = _world(_sphere([20.0, 0.0, 0.0], 0.5, name=geom)), _unit(-1, 0, 1)
-    bright, dim = (_glints(world, sun, replace(IDEAL, **{share: value})).area_m2_sr.sum() for value in (1.0, 0.25))
+    world, sun = scene_of(metal_sphere([20.0, 0.0, 0.0], 0.5, name=geom)), unit(-1, 0, 1)
+    bright, dim = (glints_in(world, sun, replace(IDEAL, **{share: value})).area_m2_sr.sum() for value in (1.0, 0.25))
     assert dim == pytest.approx(0.25 * bright, rel=1e-12)
 
 
 def test_the_suns_image_in_a_ball_is_its_angle_times_half_the_radius() -> None:
     """A disc of half-width a r/2, variance (a r/2)^2/4 a direction; a square of that variance has twelve times it."""
     r, a = 0.4, LIGHT.sun_angular_radius_rad
-    glints = _glints(_world(_sphere([4e3, 0.0, 0.0], r)), _unit(-1, 0.01, 0), light=LIGHT)
+    glints = glints_in(scene_of(metal_sphere([4e3, 0.0, 0.0], r)), unit(-1, 0.01, 0), light=LIGHT)
     assert glints.size_m[0] == pytest.approx(np.sqrt(12.0) * 0.25 * a * r, rel=1e-3)
 
 
 def test_roughness_widens_a_balls_glint_and_leaves_its_light() -> None:
-    world, sun = _world(_sphere([30.0, 0.0, 0.0], 0.5)), _unit(-1, 0, 1)
-    smooth, rough = (_glints(world, sun, replace(IDEAL, metal_roughness_rad=s)) for s in (1e-4, 0.02))
+    world, sun = scene_of(metal_sphere([30.0, 0.0, 0.0], 0.5)), unit(-1, 0, 1)
+    smooth, rough = (glints_in(world, sun, replace(IDEAL, metal_roughness_rad=s)) for s in (1e-4, 0.02))
     assert rough.area_m2_sr.sum() == pytest.approx(smooth.area_m2_sr.sum(), rel=1e-9)
     assert rough.size_m[0] == pytest.approx(np.sqrt(12.0) * 0.5 * 0.02, rel=0.05)
     assert smooth.size_m[0] < 0.01 * rough.size_m[0]
 
 
 def test_a_streak_on_a_tube_is_a_row_of_points_with_the_light_of_one() -> None:
-    world = _world(_body(_G.mjGEOM_CYLINDER, np.array([6.0, 0.0, 0.0]), [0.03, 0.6, 0.0]))
+    world = scene_of(metal_body(_G.mjGEOM_CYLINDER, np.array([6.0, 0.0, 0.0]), [0.03, 0.6, 0.0]))
     rough = replace(IDEAL, metal_roughness_rad=0.05)
-    sun = _unit(-1.0, 0.4, 0.02)
-    row, one = (_glints(world, sun, replace(rough, patch_step_rad=step)) for step in (1e-3, 1.0))
+    sun = unit(-1.0, 0.4, 0.02)
+    row, one = (glints_in(world, sun, replace(rough, patch_step_rad=step)) for step in (1e-3, 1.0))
     assert len(one.p_W) == 1 and len(row.p_W) == 48  # the most: the streak is as long as 200 steps
     assert row.area_m2_sr.sum() == pytest.approx(one.area_m2_sr[0], rel=1e-9)
     middle = row.area_m2_sr @ row.p_W / row.area_m2_sr.sum()
@@ -273,9 +220,9 @@ def test_a_streak_on_a_tube_is_a_row_of_points_with_the_light_of_one() -> None:
 
 def test_the_pieces_of_a_streak_lie_on_the_ellipsoid_they_are_of() -> None:
     axes, centre = np.array([10.4, 1.7, 1.5]), np.array([16.0, 2.0, 6.0])
-    n, v = _unit(-0.1, 0.2, -1.0), -_unit(*centre)
+    n, v = unit(-0.1, 0.2, -1.0), -unit(*centre)
     rough = replace(IDEAL, metal_roughness_rad=0.03)
-    glints = _glints(_world(_body(_G.mjGEOM_ELLIPSOID, centre, list(axes))), 2.0 * (n @ v) * n - v, rough)
+    glints = glints_in(scene_of(metal_body(_G.mjGEOM_ELLIPSOID, centre, list(axes))), 2.0 * (n @ v) * n - v, rough)
     assert len(glints.p_W) >= 8
     assert np.ptp(glints.p_W[:, 0]) > 2.0
     radius = np.sqrt((((glints.p_W - centre) / axes) ** 2).sum(axis=1))
@@ -284,13 +231,13 @@ def test_the_pieces_of_a_streak_lie_on_the_ellipsoid_they_are_of() -> None:
 
 def test_a_highlight_darker_than_the_limit_is_left_out() -> None:
     """A rough patch is R/(8 sigma^2 v.n) as bright as a white surface: 1/(8 x 0.05^2) = 50 at normal incidence."""
-    world, sun = _world(_sphere([30.0, 0.0, 0.0], 0.5)), _unit(-1, 0, 0.001)
+    world, sun = scene_of(metal_sphere([30.0, 0.0, 0.0], 0.5)), unit(-1, 0, 0.001)
     rough = replace(IDEAL, metal_roughness_rad=0.05)
-    assert len(_glints(world, sun, replace(rough, faintest_radiance=49.5)).p_W) == 1
-    assert len(_glints(world, sun, replace(rough, faintest_radiance=50.5)).p_W) == 0
+    assert len(glints_in(world, sun, replace(rough, faintest_radiance=49.5)).p_W) == 1
+    assert len(glints_in(world, sun, replace(rough, faintest_radiance=50.5)).p_W) == 0
 
 
 def test_a_glint_weaker_than_the_limit_is_left_out() -> None:
-    world, sun = _world(_sphere([3e3, 0.0, 0.0], 0.2)), _unit(-1, 0, 1)
-    assert len(_glints(world, sun, replace(IDEAL, faintest_glint_m2_sr=0.99 * 0.01)).p_W) == 1
-    assert len(_glints(world, sun, replace(IDEAL, faintest_glint_m2_sr=1.01 * 0.01)).p_W) == 0
+    world, sun = scene_of(metal_sphere([3e3, 0.0, 0.0], 0.2)), unit(-1, 0, 1)
+    assert len(glints_in(world, sun, replace(IDEAL, faintest_glint_m2_sr=0.99 * 0.01)).p_W) == 1
+    assert len(glints_in(world, sun, replace(IDEAL, faintest_glint_m2_sr=1.01 * 0.01)).p_W) == 0

@@ -14,24 +14,14 @@ from dockair.sim.camera.occlusion import (
     rays_are_clear,
 )
 from dockair.sim.camera.solids import VISIBLE_GROUPS
+from mirror_scenes import EYE, scene_of
 
-EYE = np.zeros(3)
 AHEAD = np.array([1.0, 0.0, 0.0])
 _G = mujoco.mjtGeom
 
 
-def _model(*geoms: dict) -> tuple[mujoco.MjModel, mujoco.MjData]:
-    spec = mujoco.MjSpec()
-    for geom in geoms:
-        spec.worldbody.add_geom(**geom)
-    model = spec.compile()
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
-    return model, data
-
-
 def _world(*geoms: dict) -> tuple[Obstacles, mujoco.MjData]:
-    model, data = _model(*geoms)
+    model, data = scene_of(*geoms)
     return Obstacles.of(model), data
 
 
@@ -49,7 +39,7 @@ def crowd() -> tuple[mujoco.MjModel, mujoco.MjData]:
     """Seventy geoms of all kinds around the eye, some in hidden groups, some transparent."""
     rng = np.random.default_rng(5)
     kinds = [_G.mjGEOM_SPHERE, _G.mjGEOM_BOX, _G.mjGEOM_CAPSULE, _G.mjGEOM_ELLIPSOID, _G.mjGEOM_CYLINDER]
-    return _model(
+    return scene_of(
         *(
             {
                 "type": kinds[i % 5],
@@ -126,7 +116,7 @@ def test_targets_are_hidden_where_mujocos_rays_end_before_them(crowd) -> None:
 
 
 def test_a_visible_geom_that_is_no_solid_is_refused_by_name() -> None:
-    model, _ = _model({"type": _G.mjGEOM_PLANE, "size": [1.0, 1.0, 1.0], "name": "floor"})
+    model, _ = scene_of({"type": _G.mjGEOM_PLANE, "size": [1.0, 1.0, 1.0], "name": "floor"})
     with pytest.raises(DockairError, match="geom floor"):
         Obstacles.of(model)
 
