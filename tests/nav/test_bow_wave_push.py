@@ -21,9 +21,13 @@ def test_the_drogue_of_a_probe_right_of_the_nose_goes_to_the_right_and_up_and_mo
     assert far[1] > 0.1 * near[1]
 
 
-def test_without_a_bow_wave_nothing_is_pushed_and_within_the_body_it_stays_finite():
+def test_without_a_bow_wave_nothing_is_pushed_and_within_the_body_it_falls_linearly_to_nothing():
+    """On the sphere of radius R/2 about the source u is V along r."""
     assert not BowWavePush().at(np.array([0.5, 0.0, 0.0])).any()
-    assert np.isfinite(PUSH.at(np.array(PUSH.source_from_tip_m))).all()
+    source, across = np.array(PUSH.source_from_tip_m), np.array([0.0, 0.6, 0.8])
+    for share, pushed in ((0.0, 0.0), (0.5, 0.5), (1.0, 1.0), (2.0, 0.25)):  # of R/2, and of c
+        expected = pushed * PUSH.side_acceleration_m_s2 * across
+        np.testing.assert_allclose(PUSH.at(source + share * 0.5 * PUSH.radius_m * across), expected, rtol=1e-12)
 
 
 def test_a_share_of_a_miss_is_learnt_and_never_more_than_the_bow_wave_could_do():

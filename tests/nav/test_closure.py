@@ -90,3 +90,21 @@ def test_an_airframe_that_brakes_half_as_well_is_called_back_short_of_the_ring_t
     path = _flown(lambda t, d: (0.5, 0.5), settings=settings, brakes=brakes)
     assert path[-1, 0] <= 0.0
     assert path[-1, 1] == pytest.approx(FULL_M_S, abs=0.1)
+
+
+def test_its_speed_changes_by_the_ramp_but_when_it_is_called_back_by_the_rate_for_that():
+    """Run up, hope lost far off, run up again, called back, and at the place to run up from run up once more."""
+    closure = Closure(SETTINGS, FULL_M_S, RAMP_M_S2, STEP_S)
+    for distance_m, miss, rate_m_s2, comes_to in (
+        (4.0, 0.5, RAMP_M_S2, SETTINGS.run_up_m_s),
+        (3.0, 9.0, -RAMP_M_S2, 0.0),
+        (3.0, 0.5, RAMP_M_S2, SETTINGS.run_up_m_s),
+        (1.9, 9.0, -SETTINGS.recall_m_s2, -SETTINGS.retreat_m_s),
+        (SETTINGS.wait_at_m, 0.5, RAMP_M_S2, SETTINGS.run_up_m_s),
+    ):
+        speeds = []
+        for _ in range(round(3.0 / STEP_S)):
+            closure.step(distance_m, closure.speed_m_s, known=True, miss=miss, unrest=0.5)
+            speeds.append(closure.speed_m_s)
+        assert speeds[1] - speeds[0] == pytest.approx(rate_m_s2 * STEP_S)
+        assert speeds[-1] == pytest.approx(comes_to)

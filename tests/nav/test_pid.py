@@ -70,3 +70,26 @@ def test_an_axis_is_integrated_while_its_own_error_is_small():
     np.testing.assert_allclose(held((4.1 + near_m, 0.1, 0.0), 4.0), 10.0 * k_i * np.array([0.0, 0.1, 0.0]))
     np.testing.assert_array_equal(held((4.1, 0.1, 0.1), None)[0], 0.0)  # closing
     np.testing.assert_array_equal(held((4.1, 0.1, 0.1), 4.0, seen=False), 0.0)
+
+
+FAR, MOST = 1.5 / SETTINGS.pid.proportional_1_s, SETTINGS.pid.error_max_m
+
+
+@pytest.mark.parametrize(
+    ("place_m", "distance_m", "error_m", "integrated_m", "closing_m_s"),
+    [
+        ((4.2, 0.1, -0.1), 4.0, (0.2, 0.12, -0.13), (0.2, 0.12, -0.13), 0.0),
+        ((30.0, -15.0, 9.0), 4.0, (FAR, -MOST, MOST), (0.0, 0.0, 0.0), 0.0),
+        ((2.0, 0.1, -0.1), None, (0.0, 0.12, -0.13), (0.0, 0.12, -0.13), 1.5),
+    ],
+    ids=["near", "far off", "closing"],
+)
+def test_what_it_asks_for_first_is_equation_1(place_m, distance_m, error_m, integrated_m, closing_m_s):
+    s, u, rate_m_s = SETTINGS.pid, np.array([0.3, -0.2, 0.1]), np.array([0.05, -0.1, 0.2])
+    pid = Pid(s, 0.01)
+    pid.observe(Sight(place_m=np.array(place_m), rate_m_s=rate_m_s, push_m_s2=np.zeros((1, 3))), NOT_FELT)
+    asked = pid.rate(u, Wanted(distance_m=distance_m, speed_m_s=1.5, aim_m=np.array([0.02, -0.03])))
+    closing = np.array([closing_m_s, 0.0, 0.0])
+    wanted = s.proportional_1_s * np.array(error_m) + s.integral_1_s2 * 0.01 * np.array(integrated_m)
+    wanted += closing + s.derivative * (rate_m_s + closing)
+    np.testing.assert_allclose(asked, s.smoothing_1_s * (wanted - u), rtol=1e-12)
