@@ -33,6 +33,22 @@ def test_roll_about_the_boresight_turns_the_image_the_other_way():
     assert (u, v, r, roll) == pytest.approx((*CAMERA.principal_point_px, 100.0, -0.02))
 
 
+@pytest.mark.parametrize("turn", [(0.0, 1e-3, 0.0), (0.0, 0.0, 1e-3), (5e-4, 1e-3, -7e-4)])
+def test_off_the_axis_the_image_rolls_by_half_the_curl_of_its_flow(turn):
+    """By central differences of the pinhole's pixels; what is left is of second order in the turn."""
+    at = np.array([300.0, 900.0])
+
+    def after(pixel):
+        return CAMERA.pixels_from_points(CAMERA.rays_from_pixels(pixel[None]) @ exp(np.array(turn)))[0]
+
+    along_u, along_v = (0.5 * (after(at + step) - after(at - step)) for step in np.eye(2))
+    state = np.array([*at, 100.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    optics = CAMERA.focal_length_px, CAMERA.principal_point_px, RADIUS_M
+    assert turned(state, np.array(turn), *optics, np.zeros(3))[3] == pytest.approx(
+        0.5 * (along_u[1] - along_v[0]), abs=2e-6
+    )
+
+
 def test_prediction_is_the_constant_velocity_model_written_out():
     rng, dt = np.random.default_rng(1), 0.02
     shape = rng.standard_normal((8, 8))

@@ -45,6 +45,20 @@ def test_expected_sizes_are_the_covariances_own(make_hand_made):
         assert entry.attitude_sigma_deg == pytest.approx(np.degrees(0.01 * np.sqrt(3.0)), rel=1e-9)
 
 
+def test_of_a_covariance_that_differs_by_direction_the_line_of_sight_has_its_own(make_hand_made):
+    """3 mm along it, 1 and 2 mm across; attitude 1, 2 and 2 mrad."""
+    flight = make_hand_made()
+    solutions, truths = _flown(flight, 60)
+    along = truths[-1].p_PD_B + flight.sheets.mounting.p_BP - flight.sheets.mounting.p_BC
+    axes = np.linalg.qr(np.column_stack([along, np.eye(3)[:, 1:]]))[0]
+    P = np.diag(np.square([1e-3, 2e-3, 2e-3, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0]))
+    P[3:6, 3:6] = axes @ np.diag(np.square([3e-3, 1e-3, 2e-3])) @ axes.T
+    (entry,) = navigation_by_range([replace(solutions[-1], covariance=P)], truths[-1:], flight.sheets.mounting)
+    assert entry.range_sigma_m == pytest.approx(3e-3, rel=1e-9)
+    assert entry.lateral_sigma_m == pytest.approx(np.sqrt(5.0) * 1e-3, rel=1e-9)
+    assert entry.attitude_sigma_deg == pytest.approx(np.degrees(3e-3), rel=1e-9)
+
+
 def test_every_new_frame_falls_into_one_bin(make_hand_made):
     flight = make_hand_made()
     solutions, truths = _flown(flight, 400)
