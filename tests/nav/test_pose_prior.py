@@ -52,8 +52,7 @@ def test_a_start_on_the_wrong_side_does_not_decide_against_the_prior(kind):
     pose = solve_pose(pixels, RING, CAMERA, initial=mirrored(R, p, RING), prior=prior)
     np.testing.assert_allclose(log(pose.R_CD @ R.T), 0.0, atol=1e-4)
     assert pose.cost < 1e-3
-    if pose.alternative is not None:
-        assert pose.alternative.cost > pose.cost + 5.0
+    assert pose.alternative is not None and pose.alternative.cost > pose.cost + 5.0
 
 
 @pytest.mark.parametrize("kind", range(4))

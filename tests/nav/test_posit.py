@@ -74,7 +74,9 @@ def test_axes_are_equally_long_and_perpendicular(ring_scene):
     rng = np.random.default_rng(13)
     scene = ring_scene(rng, range_m=(3.0, 4.0), sigma_px=0.0)
     for slots in combinations(range(5), 3):
-        for ring in rings_of(relative(scene.led_px)[list(slots)], slots)[0]:
+        rings = rings_of(relative(scene.led_px)[list(slots)], slots)[0]
+        assert len(rings) > 0
+        for ring in rings:
             a, b = ring[1:]
             assert a @ b == pytest.approx(0.0, abs=1e-9)
             assert a @ a == pytest.approx(b @ b, rel=1e-9)

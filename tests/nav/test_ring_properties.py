@@ -144,8 +144,8 @@ def test_twice_the_same_blob_is_one_led(ring_scene):
     scene = ring_scene(np.random.default_rng(84), clutter=3)
     result = identify(np.repeat(scene.points, 2, axis=0))
     check(result, np.repeat(scene.points, 2, axis=0))
-    if result.status is FOUND:
-        assert len(np.unique(result.members // 2)) == len(result.members)
+    assert result.status is FOUND
+    assert len(np.unique(result.members // 2)) == len(result.members)
 
 
 @pytest.mark.parametrize("flux", [np.ones(7), np.ones((8, 1)), np.ones(9)])

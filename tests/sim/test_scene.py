@@ -61,11 +61,13 @@ def test_nothing_of_the_receiver_but_its_probe_stands_in_the_camera_view(world):
     R_BC = matrix_from_yaw_pitch_roll(np.deg2rad(-3.0), 0.0, 0.0)
     rays = camera.rays_from_pixels(np.column_stack([u.ravel(), v.ravel()])) @ (world.truth.R_WB @ R_BC).T
     p_WC = world.truth.p_WB + world.truth.R_WB @ world.parameters.mounting.p_BC
-    receiver = world.model.body("receiver").id
+    receiver, seen = world.model.body("receiver").id, set()
     for ray in rays:
         name, _ = _first_hit(world, p_WC, ray)
+        seen.add(name.partition("_")[0])
         if name and not name.startswith("probe_"):
             assert world.model.geom(name).bodyid[0] != receiver, name
+    assert {"probe", "hose", "tanker"} <= seen
 
 
 def test_probe_ends_exactly_at_the_mounting_point(world):
