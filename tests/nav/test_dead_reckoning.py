@@ -1,5 +1,7 @@
 """Where a drogue that is out of view should be."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -158,3 +160,16 @@ def led_by_a_blind_camera(bearable, ticks):
         places.append(reckoning.place_m + own)
         drifts.append(reckoning.drift_m_s)
     return np.array(places), np.array(drifts)
+
+
+def test_in_a_tick_place_and_drift_go_their_shares_of_the_way_out_of_the_field():
+    """2/T and 1/T^2 of it: the place comes to the edge in T, and the drift with it."""
+    place, drift, u = np.array([5.0, 0.0, -0.9]), np.array([0.0, 0.0, 0.1]), np.array([0.1, 0.0, 0.05])
+    T = 2.0  # unlike a second, another power of it is another number
+    reckoning = DeadReckoning(replace(SETTINGS, unseen_correction_s=T), STEP_S, FIELD)
+    reckoning.see(place, place, drift, bearable=True)
+    out_m = FIELD.out_m(place, FIELD.nearest_edge(place))
+    assert out_m[2] < -0.05
+    reckoning.miss(u, LEVEL, not_shown=True)
+    np.testing.assert_allclose(reckoning.place_m - place, STEP_S * (drift - u + 2.0 * out_m / T), atol=1e-12)
+    np.testing.assert_allclose(reckoning.drift_m_s - drift, STEP_S * out_m / T**2, atol=1e-12)

@@ -100,6 +100,50 @@ def test_on_the_straight_drift_is_told_from_a_turn_and_is_learnt():
     assert vdr.correction_rad_s == pytest.approx(-BIAS_RAD_S, abs=0.02 * DEGREE)
 
 
+class Heuristic:
+    """Heuristic drift reduction whose correction is set by hand."""
+
+    def __init__(self, correction_rad_s):
+        self.correction_rad_s = correction_rad_s
+
+    def step(self, rate_rad_s):
+        return rate_rad_s
+
+
+@pytest.mark.parametrize(("vision_says_rad_s", "kept_rad_s"), [(0.002, 0.001), (0.008, 0.009)])
+def test_after_a_turn_the_correction_of_its_beginning_or_end_is_kept_that_vision_is_nearer_to(
+    vision_says_rad_s, kept_rad_s
+):
+    vdr = VisionDriftReduction(RATE_HZ, VisionDriftSettings(visual_share=1.0))
+    vdr._hdr = Heuristic(0.001)
+    vdr.step(-0.1, 0.0)
+    for k in range(1, 1001):
+        vdr.step(0.1, (0.1 + vision_says_rad_s) * k / RATE_HZ)
+        vdr._hdr.correction_rad_s = 0.009
+    assert vdr.is_turning
+    vdr.step(-0.1)
+    assert vdr.correction_rad_s == kept_rad_s
+
+
+@pytest.mark.parametrize("share", [0.1, 0.5, 1.0])
+def test_of_a_new_visual_heading_its_share_is_taken(share):
+    """0.4 rad farther in the middle of a turn, nothing between the two: what differs is the share of that."""
+    rates = np.append(-0.1, np.full(800, 0.1))
+    one, other = (
+        _fly(
+            rates,
+            {0: 0.0, 600: 0.6 + more},
+            turn_after_s=1.0,
+            visual_share=share,
+            correction_rate_rad_s=1e6,
+            oldest_visual_s=1e6,
+        )[0]
+        for more in (0.0, 0.4)
+    )
+    np.testing.assert_array_equal(one[:600], other[:600])
+    np.testing.assert_allclose((other - one)[600:], 0.4 * share, rtol=1e-9)
+
+
 def test_the_initial_heading_is_added_once():
     rates, true = oval_rates_rad_s(2, noise_deg_s=0.1)
     visual = _visual(true, 1.0, 0.3, 2)

@@ -71,6 +71,19 @@ def test_nees_of_gaussian_errors_is_chi_square():
     assert abs(mean - 9.0) < 4.5 * 0.095
 
 
+def test_a_navigations_range_is_from_the_camera(hand_made):
+    """Estimates 20 mm too far along the line of sight, which does not begin at the tip: all range, nothing across."""
+    mounting, truths, solutions = hand_made.sheets.mounting, [], []
+    for truth, _, _, solution in hand_made.ticks(60):
+        along = truth.p_PD_B + mounting.p_BP - mounting.p_BC
+        truths.append(truth)
+        solutions.append(replace(solution, p_PD_B=truth.p_PD_B + 0.02 * along / np.linalg.norm(along)))
+    figures = metrics.navigation_figures(solutions, truths, mounting)
+    assert figures.range_rmse_m == pytest.approx(0.02, rel=1e-9)
+    assert figures.range_max_m == pytest.approx(0.02, rel=1e-9)
+    assert figures.lateral_max_m < 1e-9
+
+
 @pytest.mark.parametrize("angle", [1e-9, 0.3, np.pi - 1e-6])
 def test_the_attitude_error_is_the_rotation_that_mends_the_estimate(hand_made, angle):
     truth, _, _, solution = hand_made.tick(2)
