@@ -4,11 +4,11 @@ The closure speed c is ramped up and down,
 
     dc/dt = +-a_c,   and +-a_r while it is called back                                                    (1)
 
-so that it is what the coupling wants whatever the drogue does. Until the last moment, when no more than the room to
-stop (`closing`) is left, the receiver runs up at less than that, as long as the moment is hopeful. At the last moment
-it must be good: the predicted miss inside the capture radius, and the drogue's swing so small that a gust on the rest
-of the way can be met. Then the receiver is committed and gains its full speed; else it is called back to where it runs
-up again.
+so that it is what the coupling wants whatever the drogue does; where it need fall back no farther, it stands at once.
+Until the last moment, when no more than the room to stop (`closing`) is left, the receiver runs up at less than that,
+as long as the moment is hopeful. At the last moment it must be good: the predicted miss inside the capture radius, and
+the drogue's swing so small that a gust on the rest of the way can be met. Then the receiver is committed and gains its
+full speed; else it is called back to where it runs up again.
 
 With q the larger of miss / radius and swing / calm swing: good is q <= 1, hopeful is q <= h, and of a standing receiver
 the swing is asked to be calm before it runs up at all.
