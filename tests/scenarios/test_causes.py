@@ -150,6 +150,42 @@ def towards_mirror_image(truth, share):
     return exp(share * 2.0 * np.arcsin(sine) * across / sine) @ R_BD
 
 
+def test_attitudes_within_four_degrees_of_their_mirror_image_are_no_ambiguity(flight):
+    """The ring faces the camera to within 2 degrees throughout the last second."""
+    facing = (0.0, -np.arctan2(0.15, 3.2), -np.arctan2(0.45, 3.2))
+    misled = flight(**MISLED, attitude=facing)
+    believed = [
+        replace(solution, R_BD=towards_mirror_image(truth, 1.0))
+        for truth, solution in zip(misled.truths, misled.solutions, strict=True)
+    ]
+    assert cause(replace(misled, solutions=believed)) == "navigation_error"
+
+
+def turned(flown, Q):
+    """Return the same flight in a world that is turned: nothing changes for who looks along the body's axes."""
+    truths = [
+        replace(
+            t, R_WB=Q @ t.R_WB, R_WD=Q @ t.R_WD, R_WT=Q @ t.R_WT, p_WD=Q @ t.p_WD, p_WP=Q @ t.p_WP, v_WD=Q @ t.v_WD,
+            gust_D_m_s=Q @ t.gust_D_m_s,
+        )
+        for t in flown.truths
+    ]  # fmt: skip
+    return replace(flown, truths=truths)
+
+
+def test_causes_are_seen_along_the_bodys_axes_whichever_way_these_stand_in_the_world(flight):
+    Q = exp(np.array([1.3, -0.3, 0.5]))
+    jump = flight(drogue=lambda t: (0.1 * kick(t)[1], kick(t)[1]))
+    expected = unforeseen_motion(400, jump, CauseRules())
+    assert expected[1] > 0.2
+    np.testing.assert_allclose(unforeseen_motion(400, turned(jump, Q), CauseRules()), expected, atol=1e-12)
+    away = -np.array([0.9, -0.65]) / np.hypot(0.9, 0.65)
+    wind = lambda t: tuple(away * (0.2 * np.sin(9.0 * t) + 3.0 * (t > END_S - 1.0)))  # noqa: E731
+    assert cause(turned(flight(tip=lambda t: tuple(-0.25 * away), wind=wind), Q)) == "bow_wave"
+    assert cause(turned(flight(**MISLED), Q)) == "navigation_error"
+    assert cause(turned(flight(**MISLED, turn=(np.radians(45.0), 0.0, 0.0)), Q)) == "ambiguity"
+
+
 @pytest.mark.parametrize(("lost_s", "expected"), [(0.49, "control_limit"), (0.51, "detection")])
 def test_half_of_the_last_second_without_a_solution_is_a_failure_to_detect(flight, lost_s, expected):
     flown = flight(**BEHIND, valid=lambda t: not END_S - 0.6 < t <= END_S - 0.6 + lost_s)
@@ -172,6 +208,25 @@ def test_a_miss_away_from_the_nose_with_the_air_blowing_that_way_is_the_bow_wave
     assert cause(flight(tip=lambda t: tuple(-0.25 * away), wind=lambda t: tuple(steady(t) * away))) == "control_limit"
     gusty = lambda t: 3.0 * np.sign(np.sin(9.0 * t)) + blown(t)  # noqa: E731  # as much as it varied by before
     assert cause(flight(tip=lambda t: tuple(-0.25 * away), wind=lambda t: tuple(gusty(t) * away))) == "control_limit"
+
+
+@pytest.mark.parametrize(("angle_deg", "expected"), [(44.0, "bow_wave"), (46.0, "control_limit")])
+def test_away_from_the_nose_is_within_45_degrees_of_the_line_from_it_to_the_drogue(flight, angle_deg, expected):
+    """The miss is the third side of the triangle of nose, tip and drogue: its sine law gives where the miss points."""
+    size, to_nose, angle = 0.25, np.hypot(0.9, 0.65), np.radians(angle_deg)
+    turn = np.arctan2(0.65, -0.9) + angle + np.arcsin(size / to_nose * np.sin(angle))
+    along = np.array([np.cos(turn), np.sin(turn)])
+    wind = lambda t: tuple(along * (0.2 * np.sin(9.0 * t) + 3.0 * (t > END_S - 1.0)))  # noqa: E731
+    assert cause(flight(tip=lambda t: tuple(-size * along), wind=wind)) == expected
+
+
+@pytest.mark.parametrize(("rise", "expected"), [(1.3, "control_limit"), (1.5, "bow_wave")])
+def test_the_air_has_come_to_blow_by_more_than_twice_its_deviation_in_the_two_seconds_before(flight, rise, expected):
+    """+-1 in one of the two seconds, calm in the other: deviation 1/sqrt(2), so that 1.41 is the limit."""
+    away = -np.array([0.9, -0.65]) / np.hypot(0.9, 0.65)
+    varied = lambda t: (-1.0) ** round(100.0 * t) * (1.005 < t < 2.005)  # noqa: E731
+    wind = lambda t: tuple(away * (varied(t) + rise * (t > END_S - 0.995)))  # noqa: E731
+    assert cause(flight(tip=lambda t: tuple(-0.25 * away), wind=wind)) == expected
 
 
 def test_a_tip_inside_the_basket_that_was_not_held_and_one_that_was_called_off_on_the_line(flight):

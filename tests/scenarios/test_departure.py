@@ -51,6 +51,7 @@ def test_a_tip_20_m_off_the_drogues_line_for_two_seconds_has_departed_one_that_c
     assert departed_s(across=lambda t: (0.0, -21.0 * (t > 3.0))) == pytest.approx(3.0, abs=2 * STEP_S)
     assert departed_s(across=lambda t: (15.0 * (t > 3.0), -15.0 * (t > 3.0))) is not None  # 21 m in all
     assert departed_s(across=lambda t: (21.0 * (3.0 < t < 4.9), 0.0)) is None
+    assert departed_s(across=lambda t: (21.0 * (3.0 < t < 5.1), 0.0)) == pytest.approx(3.0, abs=2 * STEP_S)
     assert departed_s(across=lambda t: (19.0, 0.0)) is None
 
 
