@@ -83,6 +83,16 @@ def test_motor_gives_no_pull_beyond_the_take_up_speed_and_brakes_beyond_the_pay_
     assert force == pytest.approx(reel.motor_force_n + REEL.brake_force_n - drag * too_fast_out)
 
 
+@pytest.mark.parametrize("share", [0.25, 0.5, 0.75])
+def test_motor_fades_and_brake_comes_in_over_the_speed_band_in_a_straight_line(share):
+    reel, drag = _reel(), REEL.drum_damping_n_s_m
+    fast_in = REEL.take_up_speed_m_s - share * REEL.speed_band_m_s
+    assert reel.step(STATIC, FREE_M, fast_in) == pytest.approx(share * reel.motor_force_n - drag * fast_in)
+    fast_out = -REEL.pay_out_speed_m_s - share * REEL.speed_band_m_s
+    expected = reel.motor_force_n + share * REEL.brake_force_n - drag * fast_out
+    assert reel.step(STATIC, FREE_M, fast_out) == pytest.approx(expected)
+
+
 def test_motor_never_pushes_the_hose_out():
     reel = _reel()
     for _ in range(5000):
@@ -109,6 +119,14 @@ def test_reel_that_comes_to_life_begins_with_the_pull_that_the_lock_held_and_goe
         force = reel.step(1500.0, FREE_M, 0.0)
     assert force == pytest.approx(reel.set_point_n + REEL.tension_gain * (reel.set_point_n - 1500.0))
     assert reel.step(1700.0, 2.0, 0.0, locked=True) == pytest.approx(1700.0)  # locked anew, it holds the new place
+
+
+def test_reel_that_comes_to_life_against_its_buffer_goes_on_with_the_lock_s_force_of_which_the_buffer_bears_its_part():
+    """One tick moves the motor by a share of tick over response time of what it lacks."""
+    reel = _reel()
+    reel.step(2500.0, -0.01, 0.0, locked=True)
+    assert _buffer_n(-0.01, 0.0) > 200.0
+    assert reel.step(STATIC, -0.01, 0.0) == pytest.approx(2500.0, rel=1e-2)
 
 
 @pytest.mark.parametrize(
@@ -383,3 +401,30 @@ def test_joint_in_the_pod_is_pressed_to_the_axis_and_its_motion_damped():
     carried = [0.0, 0.0, HOSE.link_mass_kg * 9.80665]
     np.testing.assert_allclose(wrench[0, :3], force + carried, rtol=1e-9)
     np.testing.assert_allclose(wrench[0, 3:], np.cross([-0.5 * length, 0.0, 0.0], force), rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("share", [0.2, 0.5])
+def test_turning_of_a_half_drawn_in_link_is_damped_by_the_sheets_ratio_of_a_rod_about_its_end(share):
+    """c = 2 zeta sqrt(k_t I), with k_t of Eq. (4) and I = m l^2/3."""
+    length, zero, w = HOSE.link_length_m, np.zeros((1, 3)), np.array([[0.3, 0.4, -0.5]])
+    still, turning = (guide_loads(zero, np.eye(3)[None], zero, of, share * length, GUIDE)[0] for of in (zero, w))
+    stiffness, inertia = STATIC * length * share / (1.0 - share), HOSE.link_mass_kg * length**2 / 3.0
+    damping = 2.0 * REEL.guide_damping_ratio * np.sqrt(stiffness * inertia)
+    np.testing.assert_allclose(turning - still, [0.0, 0.0, 0.0, 0.0, -0.4 * damping, 0.5 * damping], rtol=1e-9)
+
+
+def test_link_wholly_in_the_pod_is_turned_to_the_axis_as_stiffly_as_the_tube_holds_its_end():
+    """At an angle a its end is l a off the axis: l (k l) a about its joint, k l the tube's stiffness."""
+    angle, length = 1e-4, HOSE.link_length_m
+    moment = _guide_on_one_link(np.array([1.0, 0.0, -angle]), 1.0)[4]
+    assert moment == pytest.approx(-REEL.guide_stiffness_n_m2 * length**3 * angle, rel=1e-9)
+
+
+def test_link_that_turns_about_its_rear_joint_leaves_the_tube_there_alone():
+    length = HOSE.link_length_m
+    arm, w = np.array([-0.5 * length, 0.0, 0.0]), np.array([0.0, 0.4, -0.5])
+    v = np.array([-np.cross(w, arm), np.zeros(3)])
+    wrench = guide_loads(
+        np.zeros((2, 3)), np.array([np.eye(3)] * 2), v, np.array([w, np.zeros(3)]), 1.5 * length, GUIDE
+    )
+    np.testing.assert_allclose(wrench[0, :3], [0.0, 0.0, HOSE.link_mass_kg * 9.80665], rtol=1e-12, atol=1e-12)
