@@ -7,6 +7,7 @@ import pytest
 
 from dockair.messages import ReceiverCommand
 from dockair.parameters import load_parameters
+from dockair.rotations import exp
 from dockair.sim.air.atmosphere import standard_atmosphere
 from dockair.sim.aircraft.aerodynamics import AirframeParameters
 from dockair.sim.aircraft.flight_control import FlightControl, FlightControlParameters
@@ -18,6 +19,7 @@ PARAMETERS = load_parameters("flight_control", FlightControlParameters)
 
 PROBE_B = np.array([6.0, -0.9, 0.6])
 AIR = standard_atmosphere(6000.0)
+ZERO, AHEAD = np.zeros(3), np.array([180.0, 0.0, 0.0])
 
 
 def control(step_s: float = 1e-3) -> FlightControl:
@@ -25,17 +27,32 @@ def control(step_s: float = 1e-3) -> FlightControl:
     return FlightControl(PARAMETERS, AIRFRAME, trim=trim, air=AIR, probe_B=PROBE_B, step_s=step_s)
 
 
-def commands(design: FlightControl, velocity_W: np.ndarray, **said: object) -> np.ndarray:
-    """(4,) of one tick at the attitude of trim in still air."""
+def force_of(velocity_W: np.ndarray, R_WB: np.ndarray, w_WB_B: np.ndarray) -> np.ndarray:
+    """(3,) specific force on the aircraft in still air, surfaces and thrust of trim, body axes."""
     trim = level_trim(AIRFRAME, 180.0, AIR)
-    force_B, _ = trim.aerodynamics.force_and_moment(trim.R_WB.T @ velocity_W, np.zeros(3), trim.surfaces_rad)
-    force_B[0] += trim.thrust_n
+    force_B, _ = trim.aerodynamics.force_and_moment(R_WB.T @ velocity_W, w_WB_B, trim.surfaces_rad)
+    return np.asarray((force_B + [trim.thrust_n, 0.0, 0.0]) / AIRFRAME.mass_kg)
+
+
+def commands(
+    design: FlightControl,
+    velocity_W: np.ndarray,
+    *,
+    gust_W: np.ndarray = ZERO,
+    turn: np.ndarray = ZERO,
+    w_WB_B: np.ndarray = ZERO,
+    felt_B: np.ndarray | None = None,
+    **said: object,
+) -> np.ndarray:
+    """(4,) of one tick, in still air unless there is a gust, at the attitude of trim unless that is turned."""
+    trim = level_trim(AIRFRAME, 180.0, AIR)
+    R_WB, air_W = exp(turn) @ trim.R_WB, velocity_W - gust_W
     surfaces_rad, thrust_n = design.step(
-        R_WB=trim.R_WB,
-        w_WB_B=np.zeros(3),
+        R_WB=R_WB,
+        w_WB_B=w_WB_B,
         velocity_W=velocity_W,
-        airspeed_m_s=float(np.linalg.norm(velocity_W)),
-        specific_force_B=force_B / AIRFRAME.mass_kg,
+        airspeed_m_s=float(np.linalg.norm(air_W)),
+        specific_force_B=force_of(air_W, R_WB, w_WB_B) if felt_B is None else felt_B,
         surfaces_rad=trim.surfaces_rad,
         thrust_n=trim.thrust_n,
         command=ReceiverCommand(**said),  # type: ignore[arg-type]
@@ -45,23 +62,75 @@ def commands(design: FlightControl, velocity_W: np.ndarray, **said: object) -> n
 
 def test_control_finds_the_gust_that_explains_airspeed_and_accelerometers() -> None:
     """The plant flown through a small gust at trim; at engagement the estimate is the measurement, unfiltered."""
-    trim, gust_W = level_trim(AIRFRAME, 180.0, AIR), np.array([0.05, -0.04, 0.03])
-    design = control()
-    velocity_W = np.array([180.0, 0.0, 0.0])
-    v_air_B = trim.R_WB.T @ (velocity_W - gust_W)
-    force_B, _ = trim.aerodynamics.force_and_moment(v_air_B, np.zeros(3), trim.surfaces_rad)
-    force_B[0] += trim.thrust_n
-    design.step(
-        R_WB=trim.R_WB,
-        w_WB_B=np.zeros(3),
-        velocity_W=velocity_W,
-        airspeed_m_s=float(np.linalg.norm(v_air_B)),
-        specific_force_B=force_B / AIRFRAME.mass_kg,
-        surfaces_rad=trim.surfaces_rad,
-        thrust_n=trim.thrust_n,
-        command=ReceiverCommand(),
-    )
+    design, gust_W = control(), np.array([0.05, -0.04, 0.03])
+    commands(design, AHEAD, gust_W=gust_W)
     np.testing.assert_allclose(design.gust_W, gust_W, atol=1e-3)
+
+
+def test_gust_that_sets_in_in_flight_is_believed_through_the_sheets_low_pass() -> None:
+    design, at_once, gust_W = control(), control(), np.array([0.05, -0.04, 0.03])
+    commands(at_once, AHEAD, gust_W=gust_W)
+    commands(design, AHEAD)
+    for _ in range(40):
+        commands(design, AHEAD, gust_W=gust_W)
+    share = 1.0 - np.exp(-0.040 * PARAMETERS.gust_bandwidth_rad_s)
+    assert 0.1 < share < 0.9
+    np.testing.assert_allclose(design.gust_W, share * at_once.gust_W, rtol=1e-9, atol=1e-12)
+
+
+def test_force_that_the_accelerometers_feel_late_is_no_gust() -> None:
+    """The aircraft is set across the path at once; what is felt comes to that with the sensors' lag."""
+    design, beside = control(), AHEAD + [0.0, 0.4, -0.3]
+    commands(design, AHEAD)
+    before, after = (force_of(velocity, level_trim(AIRFRAME, 180.0, AIR).R_WB, ZERO) for velocity in (AHEAD, beside))
+    for k in range(1, 30):
+        felt_B = after + (before - after) * np.exp(-1e-3 * k / PARAMETERS.inertial_lag_s)
+        commands(design, beside, felt_B=felt_B)
+        np.testing.assert_allclose(design.gust_W, 0.0, atol=1e-9)
+
+
+def test_attitude_is_carried_on_over_the_sensors_lag() -> None:
+    """R exp(w lag); what is left is of third order, 2e-5, in an angle of 0.05."""
+    design, turn, w = control(), np.array([0.3, -0.1, 0.2]), np.array([2.0, -1.5, 1.0])
+    commands(design, AHEAD, turn=turn, w_WB_B=w)
+    R_WB = exp(turn) @ level_trim(AIRFRAME, 180.0, AIR).R_WB
+    now = R_WB @ exp(w * PARAMETERS.inertial_lag_s)
+    assert np.abs(now - R_WB).max() > 0.02
+    np.testing.assert_allclose(design._memory["R_now"], now, atol=4e-5)
+
+
+def test_state_has_the_tips_velocity_however_far_the_body_is_turned_from_trim() -> None:
+    """C x against the velocity of a point of a rigid body; level path along W's x, attitude of now."""
+    design, w, velocity_W = control(), np.array([0.4, -0.2, 0.3]), np.array([179.0, 1.0, -2.0])
+    commands(design, velocity_W, turn=np.array([0.5, 0.0, 0.0]), w_WB_B=w)
+    tip_W = velocity_W + design._memory["R_now"] @ np.cross(w, PROBE_B)
+    np.testing.assert_allclose(design.schedule.at(0.0).C @ design._memory["x"], tip_W - AHEAD, atol=1e-9)
+
+
+def test_models_rates_are_as_late_as_the_measured_ones() -> None:
+    """The sum of all rates so far, each with the weight that the lag's exponential leaves it."""
+    design, rates, late = control(), [], []
+    for _ in range(60):
+        commands(design, AHEAD, velocity_m_s=np.array([0.0, 1.0, 1.0]), acceleration_m_s2=np.array([0.0, 2.0, 2.0]))
+        rates.append(design._memory["x_m"][6:9].copy())
+        late.append(design._memory["w_m"].copy())
+    keep = np.exp(-1e-3 / PARAMETERS.inertial_lag_s)
+    weights = (1.0 - keep) * keep ** np.arange(60)[::-1]
+    assert np.abs(rates[-1]).max() > 1e-3
+    np.testing.assert_allclose(late[-1], weights @ np.array(rates), rtol=1e-9, atol=1e-15)
+
+
+def test_busy_surfaces_get_the_gains_for_busy_surfaces() -> None:
+    """From one state, with b of `rate_relief` at 1 and at 0: the commands differ by (K - K_busy) times the error."""
+    design = control()
+    commands(design, AHEAD)
+    busy, row, m = copy.deepcopy(design), design.schedule.at(0.0), design._memory
+    busy._relief.memory["busy"] = 1.0
+    beside, scale = AHEAD + [0.02, 0.03, -0.02], np.array([1.0, 1.0, 1.0, AIRFRAME.mass_kg])
+    calm_u, busy_u = (commands(each, beside) / scale for each in (design, busy))
+    error = np.concatenate([m["x"] - m["x_m"][: len(m["x"])], ZERO, m["gust"]])
+    assert np.abs(busy_u - calm_u).max() > 1e-4
+    np.testing.assert_allclose(busy_u - calm_u, (row.K - row.K_busy) @ error, rtol=1e-6, atol=1e-9)
 
 
 def test_control_engages_without_a_bump() -> None:
