@@ -177,3 +177,12 @@ def test_frames_after_a_drop_out_arrive_as_late_as_without_one(make_camera: Call
     sound, dropped = latencies_s(()), latencies_s((gap,))
     assert dropped[2:4] == [None, None]
     assert dropped[:2] == sound[:2] and dropped[4] == sound[4]
+
+
+def test_no_two_sources_of_a_cameras_noise_share_their_numbers() -> None:
+    """Nor two seeds."""
+    drawn = []
+    for noise in (CameraNoise.of(SEED), CameraNoise.of(SEED + 1)):
+        drawn += [noise.image, noise.fixed_pattern, noise.hot_pixels, noise.clouds]
+        drawn += [int(stream.integers(2**62)) for stream in (noise.transfer, noise.dirt)]
+    assert len(set(drawn)) == 12

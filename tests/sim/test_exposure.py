@@ -179,6 +179,20 @@ def test_a_gain_that_leaves_the_full_well_below_full_scale_is_still_seen_to_clip
     assert control.step(full_well, 200e-6) == pytest.approx(200e-6 * EXPOSURE.clipped_factor)
 
 
+@pytest.mark.parametrize("gain_dn_e", [SENSOR.conversion_gain_dn_e, 0.0375])
+def test_the_next_exposure_brings_the_metered_level_to_the_target_counted_from_black_to_full_scale(
+    gain_dn_e: float,
+) -> None:
+    """Light is in proportion to the exposure; full scale is level 255, or the full well where that is darker."""
+    sensor = replace(SENSOR, conversion_gain_dn_e=gain_dn_e, black_level_dn=16.0 * SENSOR.black_level_dn)
+    black, full = output_black(sensor), min(output_black(sensor) + sensor.full_well_e * gain_dn_e / 4.0, 255.0)
+    level = round(black + 0.4 * (full - black))
+    wanted_s = 40e-6 * EXPOSURE.target_level * (full - black) / (level - black)
+    control = ExposureControl(replace(EXPOSURE, exposure_s=40e-6), sensor)
+    assert black > 10.0 and abs(wanted_s / 40e-6 - 1.0) > EXPOSURE.dead_band
+    assert control.step(np.full(SHAPE, level, dtype=np.uint8), 40e-6) == pytest.approx(wanted_s, rel=1e-12)
+
+
 def test_exposures_and_limits_that_exclude_each_other_are_refused() -> None:
     with pytest.raises(DockairError, match="exposure.shortest_s.*0.0005"):
         replace(EXPOSURE, shortest_s=0.0005)

@@ -77,6 +77,19 @@ def test_nothing_is_taken_away_pixel_by_pixel() -> None:
     assert not image[r > HALO.near_px + 0.1].any()
 
 
+def test_the_grid_carries_the_parabola_that_continues_the_law_with_its_slope() -> None:
+    """Its slope by a difference quotient of the law; nodes within r_b only."""
+    b, step = HALO.near_px, 1e-3
+    low, at_b, high = EACH @ HALO.densities(np.array([b - step, b, b + step]))
+    grid = _grid(Window(0, 1088, 0, 2048))
+    v, u = 8.0 * (np.indices(grid.values.shape) + np.reshape(grid.first, (2, 1, 1)))
+    r = np.hypot(u - CENTRE[0], v - CENTRE[1])
+    near = r < b - 2.0
+    parabola = at_b + (high - low) / (2.0 * step) * (r[near] ** 2 - b**2) / (2.0 * b)
+    assert near.sum() > 300
+    np.testing.assert_allclose(grid.values[near], parabola, rtol=1e-4)
+
+
 def test_far_out_each_part_falls_by_its_own_power() -> None:
     near, far = HALO.densities(np.array([3000.0, 6000.0])).T
     assert np.log2(near / far) == pytest.approx(2.0 * EXPONENTS, abs=2e-3)
