@@ -141,6 +141,30 @@ def test_control_engages_without_a_bump() -> None:
     assert abs(first[3] - trim.thrust_n) < 0.2 * trim.thrust_n
 
 
+def test_started_in_air_that_sinks_it_commands_that_trim_as_nearly_as_three_integrals_allow() -> None:
+    """Least squares leave a remainder across what the integrals can do, in radians over limits and m/s^2 over g."""
+    sink, per = steady_trim(AIRFRAME, 180.0, AIR, downwash_m_s=4.0), [*AIRFRAME.surface_limits_rad, 9.80665]
+    wanted = np.append(sink.surfaces_rad, sink.thrust_n / AIRFRAME.mass_kg)
+    missed = []
+    for design in (control(), control()):
+        if missed:
+            design.start_in(sink)
+        surfaces_rad, thrust_n = design.step(
+            R_WB=sink.R_WB,
+            w_WB_B=sink.w_WB_B,
+            velocity_W=sink.velocity_W,
+            airspeed_m_s=float(np.linalg.norm(sink.velocity_W - sink.air_velocity_W)),
+            specific_force_B=sink.R_WB[2] * 9.80665,
+            surfaces_rad=sink.surfaces_rad,
+            thrust_n=sink.thrust_n,
+            command=ReceiverCommand(),
+        )
+        by_integrals = design.schedule.at(0.0).K[:, 13:16] / np.reshape(per, (4, 1))
+        missed.append(by_integrals.T @ ((np.append(surfaces_rad, thrust_n / AIRFRAME.mass_kg) - wanted) / per))
+    assert np.linalg.norm(missed[0]) > 1e-4
+    np.testing.assert_allclose(missed[1], 0.0, atol=1e-6 * np.linalg.norm(missed[0]))
+
+
 @pytest.mark.parametrize("axis", range(3), ids=["forward", "left", "up"])
 def test_commands_go_the_right_way(axis: int) -> None:
     """After 0.3 s: more thrust to speed up; left aileron and rudder to go left; trailing edge up to climb."""
