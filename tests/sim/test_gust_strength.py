@@ -19,3 +19,13 @@ def test_strengths_at_20000_feet_are_those_of_the_specification() -> None:
     ours = [gust_sigma(intensity, 6096.0) for intensity in ("light", "moderate", "severe")]
     assert ours == pytest.approx([1.11, 2.23, 6.42], abs=0.005)
     assert gust_sigma("light", 7500.0 * 0.3048) == pytest.approx(6.7 * 0.3048, rel=1e-12)
+
+
+def test_severe_gusts_are_stronger_than_moderate_and_these_than_light_and_all_fade_above_7500_feet() -> None:
+    """As the specification's curves: a wrong figure in the table would stand out from its neighbours."""
+    columns = [500.0 * 0.3048 * k for k in range(4, 161)]
+    light, moderate, severe = ([gust_sigma(name, h) for h in columns] for name in ("light", "moderate", "severe"))
+    for weak, strong in ((light, moderate), (moderate, severe)):
+        assert all(a < b or a == b == 0.0 for a, b in zip(weak, strong, strict=True))
+    for curve in (light, moderate, severe):
+        assert curve[11:] == sorted(curve[11:], reverse=True)

@@ -8,7 +8,7 @@ import pytest
 from dockair.parameters import load_parameters
 from dockair.rotations import exp
 from dockair.sim.hose.chain import DrogueParameters, HoseParameters
-from dockair.sim.hose.loads import drogue_force, hose_load_per_length, load_coefficients, tow_loads
+from dockair.sim.hose.loads import drogue_force, hose_load_per_length, load_coefficients, tow_loads, write_tow_loads
 
 HOSE = load_parameters("hose", HoseParameters)
 DROGUE = load_parameters("drogue", DrogueParameters)
@@ -92,6 +92,18 @@ def test_loads_depend_on_the_relative_velocity_only():
         rtol=1e-9,
         atol=1e-9,
     )
+
+
+def test_loads_of_what_mujoco_knows_are_those_of_the_bodies_velocities_in_wind_and_gusts():
+    """Velocities given at a far point: v = v_0 + w x (x - x_0). What the arrays held before does not matter."""
+    rng = np.random.default_rng(10)
+    R, v, w, _ = _tow(rng)
+    position, reference, wind = 9.0 * rng.normal(size=(4, 3)), np.array([3.0, -4.0, 5.0]), np.array([-180.0, 3.0, -2.0])
+    gusts, rates, wrench = rng.normal(size=(4, 3)), np.full((3, 4, 3), 7.0), np.full((4, 6), 7.0)
+    spatial = np.hstack([w, v - np.cross(w, position - reference)])
+    write_tow_loads(position, R, spatial, reference, wind, gusts, 0.4, K, rates, wrench)
+    np.testing.assert_allclose(rates, [v, w, wind + gusts], rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(wrench, tow_loads(R, v, w, wind + gusts, 0.4, K), rtol=1e-9, atol=1e-9)
 
 
 def test_loads_turn_with_the_scene():

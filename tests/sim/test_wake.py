@@ -115,6 +115,16 @@ def test_the_bound_vortex_keeps_its_young_core() -> None:
     assert at(ALONE, (0.0, 0.0, z))[0, 0] == pytest.approx(-bound, rel=1e-9)  # against the stream above
 
 
+def test_the_tailplanes_core_is_in_proportion_to_its_own_span() -> None:
+    """Its legs stand pi/4 of its span apart, as the wing's do."""
+    z, half, x, height = 0.2, 0.5 * SHEET.tail_vortex_span_m, SHEET.tail_bound_m[0], SHEET.tail_bound_m[2]
+    core = 0.035 * SHEET.tail_vortex_span_m * 4.0 / np.pi
+    strength = SHEET.tail_circulation_fraction * gamma(SHEET) / (2.0 * np.pi)
+    bound = strength * z / (z * z + core * core) * half / np.hypot(half, z)
+    tail = wake_velocity(np.array([[x, 0.0, height + z]]), table(SHEET)[-1:])
+    assert tail[0, 0] == pytest.approx(-bound, rel=1e-9)
+
+
 def _biot_savart(point: np.ndarray, half: float) -> np.ndarray:
     """Velocity of a singular horseshoe of circulation 1 by quadrature: in along the left leg, out along the right."""
 
