@@ -198,6 +198,21 @@ def test_integral_is_held_while_an_actuator_is_at_its_limit() -> None:
     np.testing.assert_array_equal(design._memory["z"], 0.0)
 
 
+def test_models_integral_adds_up_its_velocity_less_the_reference_and_is_held_while_its_command_is_at_a_limit() -> None:
+    """Eq. (1); the second control has no thrust beyond that of trim."""
+    free, held, step_s, expected = control(1e-2), control(1e-2), 1e-2, np.zeros(3)
+    held._memory["limits"][1, 3] = level_trim(AIRFRAME, 180.0, AIR).thrust_n / AIRFRAME.mass_kg
+    for _ in range(30):
+        for design in (free, held):
+            commands(design, AHEAD, velocity_m_s=np.array([0.4, 0.3, 0.2]))
+        x_m, c = free._memory["x_m"], free.reference.memory["chain"][0]
+        expected += step_s * (free.schedule.at(0.0).C @ x_m[:13] - c)
+        assert held._memory["commands_m"][3] == held._memory["limits"][1, 3]
+    assert np.abs(expected).min() > 1e-5
+    np.testing.assert_allclose(free._memory["x_m"][13:], expected, rtol=1e-9)
+    np.testing.assert_array_equal(held._memory["x_m"][13:], 0.0)
+
+
 def test_a_copy_goes_on_as_the_original_would_have_and_leaves_it_alone() -> None:
     one, off_path = control(1e-2), np.array([180.3, 0.2, -0.1])
     for _ in range(20):
