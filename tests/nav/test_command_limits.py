@@ -63,3 +63,11 @@ def test_far_from_the_limit_of_the_velocity_an_acceleration_is_what_was_asked_fo
     asked = 0.5 * np.sin(np.arange(500) / 50.0)[:, np.newaxis] * ACCELERATION
     _, u_dot = commanded(asked, 0.01, np.zeros(500, bool))
     np.testing.assert_array_equal(u_dot[1:], asked)
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_however_coarse_the_ticks_the_limit_of_the_velocity_is_come_to_and_not_passed(axis):
+    """But for what the jerk gives in a part of a tick; half a tick of the acceleration is 0.019 m/s or more."""
+    u, _ = commanded(np.tile(100.0 * np.eye(3)[axis], (400, 1)), 0.05, np.zeros(400, bool))
+    assert u[-1, axis] == pytest.approx(FASTEST_M_S, abs=2e-3)
+    assert u.max() < FASTEST_M_S + 2e-3
