@@ -47,6 +47,14 @@ def test_errors_of_another_age_do_not_make_it_smaller_than_it_is(power, ratio):
     assert (at_age >= 0.999 * asked(np.full(3, 0.02)).sigma_m(HORIZON_S)).all()
 
 
+@pytest.mark.parametrize(("ratio", "power"), [(0.5, 5), (2.0, 3)])
+def test_an_error_of_another_age_is_brought_to_the_horizon_by_the_larger_variance_of_the_two_powers(ratio, power):
+    at_horizon, other = asked(np.full(3, 0.02)), asked(np.full(3, 0.02), age_s=ratio * HORIZON_S)
+    prior = np.exp(-59.8 / CoastingSettings().memory_s)  # what is assumed before anything is measured has faded to that
+    share = other.sigma_m(HORIZON_S) ** 2 / at_horizon.sigma_m(HORIZON_S) ** 2
+    np.testing.assert_allclose(share, ratio**-power, rtol=30.0 * prior)
+
+
 def test_stronger_gusts_are_known_within_the_memory():
     coasting = asked(np.full(3, 0.01), seconds=30.0)
     calm = coasting.sigma_m(HORIZON_S).max()
@@ -96,6 +104,7 @@ def test_only_a_belief_that_was_asked_lately_is_like_those_that_were():
     assert not CoastingError().is_of(0.0)
     coasting = asked(np.full(3, 0.02), seconds=10.0)
     assert coasting.is_of(10.1) and not coasting.is_of(11.0)
+    assert not coasting.due(9.95) and coasting.due(10.0)  # 9.9 s was the last
 
 
 def test_what_was_measured_fades_also_while_nothing_is():
