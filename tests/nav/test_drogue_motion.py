@@ -100,6 +100,11 @@ def test_a_push_that_is_known_is_part_of_the_prediction():
     np.testing.assert_allclose(place, LEAD_S**2 * (1.0 / 3.0 + 0.5), rtol=1e-12)
     np.testing.assert_allclose(velocity, 2.0 * LEAD_S, rtol=1e-12)
     np.testing.assert_allclose(acceleration, 3.0, rtol=1e-12)
+    node_s = 1e-6  # the path begins there
+    pushes = np.repeat([1.0, 3.0, 3.0, 3.0], 3).reshape(-1, 3)
+    path = DrogueMotion(SwingSettings(), STEP_S, LEAD_S, node_s).path(pushes)
+    np.testing.assert_allclose(path[0], place, rtol=1e-4)
+    np.testing.assert_allclose((path[1] - path[0]) / node_s, velocity, rtol=1e-4)
 
 
 def test_a_steady_push_bends_the_swing_by_its_own_stiffness():
@@ -198,7 +203,9 @@ def test_unseen_it_goes_on_by_the_model():
     motion._x[:, 0], motion._x[:, 1] = 1.0, 0.1
     for _ in range(100):
         motion.step(None, CALM, STILL)
-    np.testing.assert_allclose(motion.ahead(CALM, CALM)[0], 1.0 + 0.1 * (1.0 + LEAD_S), atol=1e-9)
+    for place, velocity, _ in (motion.ahead(CALM, CALM), motion.mean_ahead()):
+        np.testing.assert_allclose(place, 1.0 + 0.1 * (1.0 + LEAD_S), atol=1e-9)
+        np.testing.assert_allclose(velocity, 0.1, atol=1e-9)
 
 
 def test_the_path_goes_on_from_the_prediction_by_the_swing_s_own_equation():
