@@ -269,6 +269,22 @@ def test_no_attitude_is_promised_where_its_level_reaches_the_frontal_attitude():
     assert near.levels.attitude_rad < np.deg2rad(5.0) and np.isinf(frontal.levels.attitude_rad)
 
 
+def test_an_attitude_is_promised_up_to_the_frontal_one_half_way_to_the_mirror_image():
+    """Level from its slopes, tilt as it is: on the boresight the mirror image is tilted by as much."""
+    test, promised = fault_test(10, IntegritySettings()), []
+    for tilt_deg in np.arange(1.0, 8.0, 0.25):
+        result = checked(pixels_at(*pose_at(5.0, tilt_deg)))
+        pose = result.pose
+        found = sensitivity(pose.measurement, pose.R_CD, pose.p_CD, pose.covariance)
+        level = found.slopes[:, ATTITUDE].max() * test.least_fault + test.error_sigmas[2] * found.sigmas[ATTITUDE]
+        assert result.mirror_ruled_out
+        share = level / np.deg2rad(tilt_deg)
+        if abs(share - 1.0) > 0.05:
+            assert np.isfinite(result.levels.attitude_rad) == (share < 1.0)
+        promised.append(share)
+    assert min(promised) < 0.9 and any(1.05 < share < 1.9 for share in promised)
+
+
 def test_an_attitude_prior_rules_the_mirror_image_out_and_lessens_the_levels():
     R, p = pose_at(20.0, 10.0)
     pixels = pixels_at(R, p, seed=6)
@@ -353,13 +369,34 @@ def test_every_exclusion_that_passes_is_within_the_level():
     rests = [np.arange(5) != led for led in range(5)]
     ends = [solve_pose(pixels[rest], points[rest], CAMERA, sigma_px=SIGMA_PX) for rest in rests]
     passed = [end for end in ends if end.chi2 <= test.threshold]
-    k = test.error_sigmas[0]
-    reach = [abs(end.p_CD[0] - result.pose.p_CD[0]) + k * np.sqrt(end.covariance[3, 3]) for end in passed]
+    mirrors = [end.alternative for end in passed if end.alternative and end.alternative.chi2 <= test.threshold]
+    k, offsets = np.array(test.error_sigmas), [end.p_CD - result.pose.p_CD for end in passed + mirrors]
+    sigmas = [worst_sigmas(end.covariance) for end in passed + mirrors]
+    reach = [abs(x) + k[0] * sigma[RANGE] for (x, *_), sigma in zip(offsets, sigmas, strict=True)]
+    across = [np.hypot(y, z) + k[1] * sigma[LATERAL] for (_, y, z), sigma in zip(offsets, sigmas, strict=True)]
     assert result.status is IntegrityStatus.EXCLUDED and len(passed) == 4
     assert result.led == np.argmin([end.chi2 for end in ends])
     assert result.pose.alternative is None or np.isnan(result.pose.alternative.led_chi2[result.led])
-    assert result.levels.range_m >= max(reach) - 1e-9
-    assert max(reach) > 2.0 * k * np.sqrt(result.pose.covariance[3, 3])
+    assert result.levels.range_m == pytest.approx(max(reach), rel=1e-5)
+    assert result.levels.lateral_m == pytest.approx(max(across), rel=1e-5)
+    assert max(reach) > 2.0 * k[0] * np.sqrt(result.pose.covariance[3, 3])
+
+
+def test_an_exclusion_passes_by_the_threshold_of_two_degrees_of_freedom_less():
+    """Two wrong LEDs of five, by more and more: the best exclusion's cost crosses T of 2, and not T of 3."""
+    R, p = pose_at(5.0, 20.0)
+    points, (two, three) = RING[:5], (fault_test(freedom, IntegritySettings()).threshold for freedom in (2, 3))
+    between = 0
+    for size_px in np.linspace(0.5, 3.0, 51):
+        pixels = faulted(pixels_at(R, p, points=points), 0, (size_px, 0.0))
+        pixels = faulted(pixels, 2, (0.0, size_px))
+        rests = [np.arange(5) != led for led in range(5)]
+        least = min(solve_pose(pixels[rest], points[rest], CAMERA, sigma_px=SIGMA_PX).chi2 for rest in rests)
+        result = check_integrity(solve_pose(pixels, points, CAMERA, sigma_px=SIGMA_PX))
+        if result.status is not IntegrityStatus.CONSISTENT:
+            assert (result.status is IntegrityStatus.EXCLUDED) == (least <= two)
+            between += two < least <= three
+    assert between > 0
 
 
 @settings(max_examples=60, deadline=None)
@@ -406,6 +443,15 @@ def test_a_frame_of_another_age_than_recent_is_a_doubt(age_s):
 def test_a_frame_that_did_not_pass_is_a_doubt_whatever_its_levels(status, doubt):
     near = checked(pixels_at(*pose_at(2.0, 5.0), seed=9))
     assert usable_for_contact(replace(near, status=status), 0.0).doubts == (doubt,)
+
+
+def test_the_basket_holds_the_tip_sideways_but_not_along():
+    near = checked(pixels_at(*pose_at(2.0, 5.0), seed=9))
+    for levels, doubts in (
+        (ProtectionLevels(range_m=0.01, lateral_m=1.0), ((Doubt.LATERAL,), ())),
+        (ProtectionLevels(range_m=1.0, lateral_m=0.01), ((Doubt.RANGE,), (Doubt.RANGE,))),
+    ):
+        assert tuple(usable_for_contact(near, 0.1, levels=levels, in_basket=i).doubts for i in (False, True)) == doubts
 
 
 def test_a_newer_frame_that_contradicts_is_a_doubt_but_in_the_basket():
