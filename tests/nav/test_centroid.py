@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy import ndimage
@@ -40,6 +42,33 @@ def test_two_unequal_pixels_have_their_centre_between_them():
     np.testing.assert_allclose(blob.centroids_px, [[10.0 + 1.0 / 3.0, 4.0]], atol=1e-12)
     variance = 0.02 * ((1 / 3) ** 2 * 100 + (2 / 3) ** 2 * 50) / 150.0**2
     assert blob.sigma_px[0] == pytest.approx(np.sqrt(variance), rel=1e-12)
+
+
+def test_the_background_s_own_uncertainty_moves_a_blob_that_is_not_in_the_middle_of_its_pixels():
+    """Of 44 even pixels, each of variance s2 = g 10 + s_n^2: s2/44 times the square of the sum of u_i - u."""
+    image = np.full((9, 21), 10, np.uint8)
+    image[4, 10], image[4, 11] = 110, 60
+    noise = NoiseModel(gain_dn_per_electron=0.02, noise_dn=4.0, saturation_dn=255, floor_px=0.0, clipped_floor_px=0.0)
+    blob = measure_blobs(image, foreground_runs(image, 20), 20, noise, background_dn=0.0)
+    rows, columns = np.mgrid[3:6, 9:13]  # the blob and what touches it; 7 x 8 pixels less these are background
+    off, flux = columns - (10.0 + 1.0 / 3.0), 150.0
+    own = (off**2 * (0.02 * image[3:6, 9:13] + 16.0)).sum()
+    variance = (own + (0.02 * 10.0 + 16.0) / (7 * 8 - off.size) * off.sum() ** 2) / flux**2
+    np.testing.assert_allclose(blob.centroids_px, [[10.0 + 1.0 / 3.0, 4.0]], atol=1e-12)
+    assert blob.sigma_px[0] == pytest.approx(np.sqrt(variance), rel=1e-9)
+
+
+@pytest.mark.parametrize("clipped", [1, 2, 3, 4, 9])
+def test_the_floor_of_a_clipped_blob_grows_with_the_root_of_its_clipped_pixels_up_to_four(clipped):
+    image = np.full((12, 24), 10, np.uint8)
+    image[5:8, 8:14] = 200
+    image[(5 + np.arange(clipped) // 3, 10 + np.arange(clipped) % 3)] = 255
+    with_floor, without = (
+        measure_blobs(image, foreground_runs(image, 50), 50, replace(NOISE, clipped_floor_px=floor), background_dn=10.0)
+        for floor in (0.05, 0.0)
+    )
+    floor2 = with_floor.sigma_px**2 - without.sigma_px**2
+    np.testing.assert_allclose(floor2, 0.05**2 * min(clipped, 4), rtol=1e-6)
 
 
 def test_the_windowed_centre_solves_its_equation():
