@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
+from scipy.stats import multivariate_normal
 
 from dockair.calibration import Camera, LedRing
 from dockair.nav.belief_fit import _exp, _log, distance2, fitted, image_of
@@ -22,6 +23,8 @@ def test_log_is_the_inverse_of_exp_up_to_half_a_turn(angle_rad):
         np.testing.assert_allclose(_log(exp(phi)), phi, atol=1e-15 + 1e-9 * angle_rad)
         np.testing.assert_allclose(_log(exp(phi)), log(exp(phi)), atol=1e-15 + 1e-9 * angle_rad)
         np.testing.assert_allclose(_exp(phi)[0], exp(phi), atol=1e-15)
+        turned = [log(exp(phi + step) @ exp(phi).T) for step in 1e-6 * np.eye(3)]  # exp(J step), J the left Jacobian
+        np.testing.assert_allclose(_exp(phi)[1], np.transpose(turned) / 1e-6, atol=2e-6)
 
 
 def sight(d, noise_px=0.3, seed=1):
@@ -63,7 +66,7 @@ def test_the_fit_ends_where_scipy_s_least_squares_does():
     C = np.diag([0.03] * 3 + [0.1] * 3 + [3e-4] * 16) @ shape @ shape.T @ np.diag([0.03] * 3 + [0.1] * 3 + [3e-4] * 16)
     lines = sight(3e-4 * rng.standard_normal(16))
     ab, whiten = image_of(lines.rays, lines.weights)
-    settled, H, nu, y, cost, evidence, after, *_ = fitted(R_0, P_0, LEDS, C, ab, whiten, R_0, P_0)
+    settled, H, nu, y, cost, evidence, after, *first = fitted(R_0, P_0, LEDS, C, ab, whiten, R_0, P_0)
     L_inverse = np.linalg.inv(np.linalg.cholesky(C))
     theirs = least_squares(residuals, np.zeros(22), args=(ab, whiten, L_inverse), xtol=1e-15, ftol=1e-15, gtol=1e-12)
     assert settled == 1
@@ -78,6 +81,15 @@ def test_the_fit_ends_where_scipy_s_least_squares_does():
     assert evidence == pytest.approx(-0.5 * (cost + log_det), abs=1e-9 * abs(log_det))
     r = residuals(y, ab, whiten, L_inverse)[:16]
     np.testing.assert_allclose(nu, r + H @ y, atol=1e-9 * np.abs(nu).max())
+    # the first step is the textbook's of a linear problem, from residuals at the belief
+    H, nu, y, cost, evidence, after = first
+    np.testing.assert_allclose(nu, residuals(np.zeros(22), ab, whiten, L_inverse)[:16], rtol=1e-9)
+    S = H @ C @ H.T + np.eye(16)
+    np.testing.assert_allclose(y / sigma, C @ H.T @ np.linalg.solve(S, nu) / sigma, atol=1e-9)
+    assert cost == pytest.approx(nu @ np.linalg.solve(S, nu), rel=1e-9)
+    likelihood = multivariate_normal.logpdf(nu, cov=S) + 8.0 * np.log(2.0 * np.pi)
+    assert evidence == pytest.approx(likelihood, rel=1e-9)
+    np.testing.assert_allclose(after, (C - C @ H.T @ np.linalg.solve(S, H @ C))[:6, :6], atol=1e-9 * after.max())
 
 
 def test_nearly_frontal_far_away_the_fit_ends_from_both_sides():
