@@ -64,6 +64,22 @@ def pixels_of(R_CD: Array, p_CD: Array, points_D: Array = LEDS) -> Array:
     return CAMERA.pixels_from_points(points_D @ R_CD.T + p_CD)
 
 
+def pixels_off(b: Belief, e: Array) -> Array:
+    """(8, 2) of the LEDs, seen where the belief has these errors (50,)."""
+    axes, place, scale = np.split(e[CALIBRATION], [3, 6])
+    ring = LEDS.copy()
+    ring[:, 1:] += e[RING].reshape(-1, 2)
+    R_BC, p_BC = exp(axes) @ MOUNTING.R_BC, MOUNTING.p_BC + place
+    p_CD = R_BC.T @ (b.p_ID + e[3:6] + MOUNTING.p_BI - p_BC)
+    return pixels_of(R_BC.T @ exp(e[:3]) @ b.R_BD, p_CD - scale * p_CD, ring)
+
+
+def pixels_per_error(b: Belief, step: float = 1e-6) -> Array:
+    """(8, 2, 50) their derivatives, by differences."""
+    u = step * np.eye(ERRORS)
+    return np.stack([(pixels_off(b, e) - pixels_off(b, -e)) / (2.0 * step) for e in u], axis=-1)
+
+
 @pytest.mark.parametrize("k", range(ERRORS))
 def test_a_camera_and_ring_that_are_off_show_what_the_model_says(k):
     """Each error by itself: true LEDs seen by the true camera, solved with the nominal ones, against Eqs (1), (2)."""
@@ -195,20 +211,11 @@ def test_a_tight_update_is_the_textbook_s_on_pixels_where_the_problem_is_linear(
     root[RING] *= 0.1
     b = belief(root @ root.T, MOUNTING.R_BC @ matrix_from_yaw_pitch_roll(0.1, 0.3, 0.0))
     b.x[0] = MOUNTING.p_BC - MOUNTING.p_BI + MOUNTING.R_BC @ [4.0, 0.1, 0.1]
-    chosen, sigma_px, step = np.array([1, 4, 6]), 0.1, 1e-6
-
-    def pixels(e: Array) -> Array:
-        axes, place, scale = np.split(e[CALIBRATION], [3, 6])
-        ring = LEDS.copy()
-        ring[:, 1:] += e[RING].reshape(-1, 2)
-        R_BC, p_BC = exp(axes) @ MOUNTING.R_BC, MOUNTING.p_BC + place
-        p_CD = R_BC.T @ (b.p_ID + e[3:6] + MOUNTING.p_BI - p_BC)
-        return pixels_of(R_BC.T @ exp(e[:3]) @ b.R_BD, p_CD - scale * p_CD, ring[chosen]).ravel()
-
-    H = np.column_stack([(pixels(step * u) - pixels(-step * u)) / (2.0 * step) for u in np.eye(ERRORS)])
+    chosen, sigma_px = np.array([1, 4, 6]), 0.1
+    H = pixels_per_error(b)[chosen].reshape(-1, ERRORS)
     y = 1e-5 * rng.normal(size=6)  # small, so that the fit ends where it began
     sight = lines_of_sight_from_pixels(
-        (pixels(np.zeros(ERRORS)) + y).reshape(-1, 2), LEDS[chosen], CAMERA, np.full(3, sigma_px)
+        pixels_off(b, np.zeros(ERRORS))[chosen] + y.reshape(-1, 2), LEDS[chosen], CAMERA, np.full(3, sigma_px)
     )
     (after,) = (found := corrected([b], sight, SIGHT, OPEN, Taking())).beliefs
     S = H @ b.P @ H.T + sigma_px**2 * np.eye(6)
@@ -302,6 +309,16 @@ def test_leds_are_expected_where_they_are_believed_to_be_on_the_ring():
     pixels, sigma_px = SIGHT.led_pixels(b, SIGHT.apparent(b), CAMERA)
     np.testing.assert_allclose(pixels, pixels_of(seen.R_CD, seen.p_CD, ring), atol=1e-9)
     np.testing.assert_allclose(sigma_px, 0.0, atol=1e-9)
+
+
+def test_leds_are_expected_as_uncertainly_as_all_that_is_believed_makes_them():
+    """Near, tilted, with a belief in which everything correlates: the larger root of each pixel's covariance."""
+    root = 1e-3 * np.random.default_rng(12).normal(size=(ERRORS, ERRORS))
+    b = belief(root @ root.T, MOUNTING.R_BC @ matrix_from_yaw_pitch_roll(0.1, 0.3, 0.0))
+    b.x[0] = MOUNTING.p_BC - MOUNTING.p_BI + MOUNTING.R_BC @ [3.0, 0.4, -0.3]
+    H = pixels_per_error(b)
+    worst = np.linalg.eigvalsh(H @ b.P @ H.transpose(0, 2, 1))[:, -1]
+    np.testing.assert_allclose(SIGHT.led_pixels(b, SIGHT.apparent(b), CAMERA)[1], np.sqrt(worst), rtol=1e-6)
 
 
 @pytest.mark.parametrize("count", [1, 2, 3])
