@@ -211,3 +211,69 @@ def test_many_samples_at_once_are_the_same_one_by_one_to_the_last_bit():
         step = propagated(*step, times[k], times[k + 1], times, w, f, noisy.flat())
     for a, b in zip(at_once, step, strict=True):
         np.testing.assert_array_equal(a, b)
+
+
+def test_of_a_gap_no_rate_is_less_certain_than_one_that_is_not_known():
+    """Samples 2 s apart: by Eq. (5) 0.005 rad^2/s, four times the ceiling."""
+    held = SILENT._replace(held_turn2=0.04, held_most2=1.25e-3)
+    given = np.array([0.0, 2.0]), np.zeros((2, 3)), np.zeros((2, 3))
+    P = propagated(R0, np.zeros((8, 3)), ZERO, 0.0, 2.0, *given, held.flat())[2]
+    np.testing.assert_allclose(np.diag(P)[:3], 2.0 * 1.25e-3, rtol=1e-9)
+
+
+def test_without_samples_rate_and_acceleration_are_not_known_at_all():
+    nothing = SILENT._replace(held_turn2=0.04, held_most2=1.25e-3, receiver2=0.2, accelerometer2=1e-6)
+    given = np.empty(0), np.empty((0, 3)), np.empty((0, 3))
+    R, x, P = propagated(R0, np.zeros((8, 3)), ZERO, 0.0, 0.5, *given, nothing.flat())
+    np.testing.assert_array_equal(x, 0.0)
+    np.testing.assert_allclose(R, R0, atol=1e-15)
+    np.testing.assert_allclose(np.diag(P)[:9], np.repeat([0.5 * 1.25e-3, 0.2 * 0.5**3 / 3.0, 0.5 * 0.2], 3), rtol=1e-3)
+
+
+def test_before_the_first_sample_that_one_is_held():
+    """The belief is older than the samples: as after the last, the angle's variance is A^2 t^4 / 4."""
+    w, f = np.array([[0.3, -0.2, 0.5], [-0.4, 0.1, 0.2]]), np.array([[5.0, 0.0, 0.0], [0.0, 7.0, 0.0]])
+    held = SILENT._replace(held_turn2=0.04, held_most2=1.25e-3)
+    R, x, P = propagated(R0, np.zeros((8, 3)), ZERO, -0.08, 0.0, np.array([0.0, 0.004]), w, f, held.flat())
+    np.testing.assert_allclose(R, expm(-skew(w[0]) * 0.08) @ R0, atol=1e-12)
+    np.testing.assert_allclose(x[1], -0.08 * f[0], atol=0.03)  # but for the body's turn
+    np.testing.assert_allclose(np.diag(P)[:3], 0.04 * 0.08**4 / 4.0, rtol=1e-9)
+
+
+def test_an_acceleration_is_held_no_longer_than_samples_may_be_apart():
+    """5 m/s^2 at the only sample: felt in the nine steps of 0.01 s that end within 0.095 s of it."""
+    brief = SILENT._replace(longest_gap_s=0.095)
+    given = np.zeros(1), np.zeros((1, 3)), np.array([[5.0, 0.0, 0.0]])
+    x = propagated(R0, np.zeros((8, 3)), ZERO, 0.0, 0.3, *given, brief.flat())[1]
+    np.testing.assert_allclose(x[1], [-0.45, 0.0, 0.0], atol=1e-12)
+
+
+def test_a_gyro_s_scale_factor_is_noise_by_the_squared_rate():
+    w, turning = np.array([0.3, -0.2, 0.5]), SILENT._replace(scale2=1e-4)
+    P = propagated(R0, np.zeros((8, 3)), ZERO, 0.0, 0.5, *samples(w, np.zeros(3), 0.5), turning.flat())[2]
+    np.testing.assert_allclose(P[:3, :3], 1e-4 * (w @ w) * 0.5 * np.eye(3), atol=1e-15)
+
+
+def test_a_gust_s_noise_enters_velocity_and_swing_within_the_step():
+    """To second order in dt, Lyapunov's equation for g' = white, v' = m' = g: half the square of it in common."""
+    gust2, dt = np.array([0.4, 0.6, 0.9]), 0.01
+    given = samples(np.zeros(3), np.zeros(3), dt, 100.0)
+    P = propagated(R0, np.zeros((8, 3)), ZERO, 0.0, dt, *given, SILENT._replace(gust2=gust2).flat())[2]
+    expected = np.zeros((ERRORS, ERRORS))
+    for axis in range(3):
+        expected[24 + axis, 24 + axis] = gust2[axis] * dt
+        for row in (6 + axis, 12 + axis)[: 1 + int(SWINGS[axis])]:
+            expected[24 + axis, row] = expected[row, 24 + axis] = 0.5 * gust2[axis] * dt**2
+    np.testing.assert_allclose(P, expected, atol=1e-15)
+
+
+def test_errors_of_all_but_gyro_and_rest_move_to_the_last_digits_as_the_state_does():
+    """Where the body does not turn Eq. (2) is linear in them: differences of the state, of any size, are the errors."""
+    given, free = samples(X0[4], np.array([0.2, 0.4, 9.5]), 0.1), np.r_[3 : BIAS.start, BIAS.stop : REST.start, 24:27]
+    x0 = X0 * np.array([1, 1, 1, 1, 1, 1, 0, 1])[:, np.newaxis]
+    after = propagated(R0, x0, ZERO, 0.0, 0.1, *given, SILENT.flat())[:2]
+    for k in free:
+        e = np.eye(ERRORS)[k]
+        moved = difference(propagated(*off(x0, R0, e), ZERO, 0.0, 0.1, *given, SILENT.flat())[:2], after)
+        P = propagated(R0, x0, np.outer(e, e), 0.0, 0.1, *given, SILENT.flat())[2]
+        np.testing.assert_allclose(P, np.outer(moved, moved), atol=1e-12)
