@@ -113,3 +113,20 @@ def test_after_a_gap_in_the_samples_nothing_false_is_said(gap_ticks, again_s):
     error = (felt - flown)[np.isfinite(said).all(axis=1)]
     second = error[: len(error) // 100 * 100].reshape(-1, 100, 3).sum(axis=1)
     assert np.abs(second).max() < 0.25  # m/s within a second; a jump of gravity by 1.4 degrees
+
+
+def test_a_bias_that_is_learnt_at_once_is_no_jerk_of_the_lever():
+    """Standing still for 12 s, then the gyro's 0.001 rad/s are known: times 6 m they would be 6 mm/s within a tick."""
+    bias, motion = np.array([0.0, 0.001, 0.0]), TipMotion(P_IP, 60.0)
+    for _ in range(1200):
+        motion.change_m_s(-GRAVITY, bias, CALIBRATED, STEP_S)
+    np.testing.assert_allclose(motion.change_m_s(-GRAVITY, CALIBRATED, bias, STEP_S), 0.0, atol=2e-5)
+
+
+def test_through_a_short_gap_gravity_is_carried_for_all_of_its_time():
+    """Turning steadily about an accelerometer that falls no way: of the tip's velocity there is the whirl alone."""
+    w, motion, nothing = np.array([0.1, -0.3, 0.2]), TipMotion(P_IP, 60.0), np.full(3, np.nan)
+    for k in range(1210):
+        force = nothing if 1200 <= k < 1206 else -exp(-w * k * STEP_S) @ GRAVITY
+        change = motion.change_m_s(force, w, CALIBRATED, STEP_S)
+    np.testing.assert_allclose(change, np.cross(w, np.cross(w, P_IP)) * STEP_S, atol=1e-9)
