@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy import ndimage
 from scipy.special import erf
 
-from dockair.nav.image.spot_kernels import ARC, CUT_PX, REACHES_PX, SPARE, ring_steps
+from dockair.nav.image.spot_kernels import ARC, CUT_PX, REACHES_PX, SPARE, _middle, ring_steps
 from dockair.nav.image.spots import SpotLimits, Spots, find_spots
 
 LIMITS = SpotLimits(
@@ -152,6 +152,31 @@ def test_clipped_discs_of_every_size_up_to_ten_pixels_are_found_whole(radius):
         spots = find_spots(np.where(disc, 255, 5).astype(np.uint8), LIMITS)
         assert spots.runs.count == 1
         assert spots.runs.area_px.tolist() == [disc.sum()]
+
+
+def test_the_middle_is_come_nearer_to_by_column_and_row_twice():
+    """Ellipse at 45 degrees, 2 : 1: a chord's middle is off by 0.6 of the chord's own offset, 0.6^4 of it is left."""
+    down, right = np.indices((121, 121)) - 60
+    ellipse = np.hypot((down + right) / 2.0, down - right) <= 40.0 * 2**0.5 / 2.0
+    i, j = _middle(np.where(ellipse, 255, 5).astype(np.uint8), 75, 85, 128, 40)
+    assert i - 60 == pytest.approx(25.0 * 0.6**3, abs=1.2)
+    assert j - 60 == pytest.approx(25.0 * 0.6**4, abs=1.2)
+
+
+@pytest.mark.parametrize(("tail", "rise"), [(0.05, 0.0), (0.15, 0.125), (0.27, 0.25), (0.45, 0.5), (0.6, None)])
+def test_a_spot_is_cut_off_from_a_thin_tail_by_the_lowest_threshold_that_does_it(tail, rise):
+    """Eq. (3): b + 0.1 (P - b), and from there by its rises towards P; a tail above the highest keeps it from being."""
+    rows, columns = np.indices((80, 90))
+    disc = np.hypot(rows - 40, columns - 45) <= 6.0
+    image = np.where(disc, 205, np.where((rows == 40) & (columns > 45), round(5 + 200 * tail), 5)).astype(np.uint8)
+    spots = find_spots(image, LIMITS)
+    if rise is None:
+        assert spots.runs.count == 0
+        return
+    assert spots.runs.area_px.tolist() == [disc.sum()]
+    b = spots.background_dn[0]
+    assert b == pytest.approx(5.0, abs=0.1)  # the tail is one of the pixels that are spared
+    assert spots.threshold_dn[0] == int(b + (0.1 + 0.9 * rise) * (205.0 - b))
 
 
 def test_a_disc_wider_than_the_widest_ring_is_no_spot():
