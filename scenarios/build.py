@@ -175,11 +175,14 @@ def build(scenario: Scenario, seed: int) -> Parts:
 
 
 def guidance_settings(scenario: Scenario) -> GuidanceSettings:
-    """Return the guidance that the scenario asks for, with what the nominal sheets say of the receiver."""
+    """Return the guidance that the scenario asks for, with what the nominal sheets say of the receiver.
+
+    Where the probe is mounted is measured on the ground, and goes in as the scenario sets it (`nominal_sheets`).
+    """
     g, duration_s, nominal = scenario.guidance, scenario.flight.duration_s, GuidanceSettings()
     density = standard_atmosphere(scenario.flight.altitude_m).density_kg_m3
     pressure_pa = 0.5 * density * scenario.flight.airspeed_m_s**2
-    mounting = load_parameters(scenario.hardware.receiver_sheet("mounting"), MountingParameters)
+    mounting = _sheet(scenario, scenario.hardware.receiver_sheet("mounting"), MountingParameters)
     bow_wave = load_parameters(scenario.hardware.receiver_sheet("bow_wave"), BowWaveParameters)
     source_B = bow_wave_coefficients(bow_wave, mounting.probe_tip_m, scenario.flight.airspeed_m_s)[:3]
     x, y, z = (float(value) for value in source_B - mounting.probe_tip_m)

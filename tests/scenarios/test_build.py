@@ -92,6 +92,14 @@ def test_guidance_knows_the_rim_of_the_ring_that_is_flown(tmp_path):
     assert guidance_settings(load_scenario("default", {"hardware.ring": str(ring)})).limits.rim_m == 0.3
 
 
+def test_guidance_expects_the_bow_waves_push_where_the_probe_is_mounted():
+    """On the other side of the nose the drogue is pushed to the other side, as far as the nose is from the tip."""
+    other_side = {"parameters.mounting.probe_tip_m": [6.0, 0.9, 0.6]}
+    right, left = (guidance_settings(load_scenario("default", own)).bow_wave for own in ({}, other_side))
+    np.testing.assert_allclose(right.source_from_tip_m, [-1.2 - 0.375, 0.9, -0.65], atol=1e-12)
+    np.testing.assert_allclose(left.at(np.zeros(3)), right.at(np.zeros(3)) * [1.0, -1.0, 1.0], atol=1e-12)
+
+
 @pytest.mark.parametrize(("camera_hz", "stop_s"), [(50, 0.1), (25, 0.1), (10, 0.25), (5, 0.5)])
 def test_a_slow_cameras_frames_have_not_stopped_between_two_of_them(camera_hz, stop_s):
     limits = guidance_settings(load_scenario("default", {"rates.camera_hz": camera_hz})).limits
