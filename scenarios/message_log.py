@@ -6,7 +6,7 @@
 |                    | what the tanker announced, what the pod's light began to show                      |
 | estimates.parquet  | every field of `NavSolution`; all numbers as 64-bit floats                         |
 | navigator.json     | the navigator's class, its calibration sheets and settings, floats to the last bit,      |
-|                    | and a digest of the navigation's sources                                                 |
+|                    | and a digest of its sources, of `nav` and of the leaves                                  |
 
 Frames are encoded in a thread of their own: OpenCV releases the interpreter lock meanwhile, so that the control loop
 waits only when the encoder is more than `QUEUE_TICKS` behind. No truth enters these files.
@@ -15,13 +15,13 @@ waits only when the encoder is more than `QUEUE_TICKS` behind. No truth enters t
 import json
 import platform
 import queue
+import sys
 import threading
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, fields, is_dataclass
 from hashlib import blake2b
 from importlib.metadata import version
-from importlib.resources import as_file, files
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -32,6 +32,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
+import dockair
 from dockair.calibration import NavigationSheets
 from dockair.errors import DockairError, MachineError
 from dockair.messages import CameraFrame, ImuSample, Navigates, NavSolution, PodSignal, TankerAnnouncement, Window
@@ -86,7 +87,7 @@ class NavigatorRecipe:
         """Write `navigator.json`."""
         table = {
             "navigator": self.class_name,
-            "code": code_fingerprint(),
+            "code": code_fingerprint(self.class_name),
             "sheets": encode(self.sheets),
             "settings": encode(self.settings),
         }
@@ -105,13 +106,20 @@ class NavigatorRecipe:
             raise DockairError(str(path), expected="a navigator as a flight records it", got=got) from None
 
 
-def code_fingerprint() -> str:
-    """Return a digest of the navigation's sources, and of Python's and its libraries' versions."""
-    package = files("dockair.nav")
+def code_fingerprint(class_name: str) -> str:
+    """Return a digest of a navigator's sources, and of Python's and its libraries' versions.
+
+    The sources are those of `nav`, of the leaves that it stands on, and the file of the navigator's own module.
+
+    Args:
+        class_name: "module:Class", which has been imported.
+    """
+    package, module = Path(dockair.__file__).parent, class_name.partition(":")[0]
     digest = blake2b(digest_size=16)
-    with as_file(package) as folder:
-        for path in sorted(folder.rglob("*.py")):
-            digest.update(path.relative_to(folder).as_posix().encode() + path.read_bytes())
+    for path in sorted([*package.glob("*.py"), *package.joinpath("nav").rglob("*.py")]):
+        digest.update(path.relative_to(package).as_posix().encode() + path.read_bytes())
+    own = getattr(sys.modules.get(module), "__file__", None)
+    digest.update(module.encode() + (Path(own).read_bytes() if own else b""))
     for library in ("numpy", "scipy", "numba", "opencv-python-headless", "filterpy"):
         digest.update(f"{library} {version(library)}".encode())
     digest.update(platform.python_version().encode())

@@ -58,7 +58,7 @@ class ReplayReport:
     ticks: int
     frames: int
     first_difference: Difference | None
-    same_code: bool = True  #: the navigation's sources and its libraries are those of the flight
+    same_code: bool = True  #: the navigator's sources and its libraries are those of the flight
     forbidden_modules: tuple[str, ...] = FORBIDDEN
 
     def to_json(self) -> str:
@@ -101,8 +101,9 @@ def replay_in_this_process(out_dir: str | Path) -> ReplayReport:
         DockairError: nothing recorded there, or the navigator cannot be made without the simulator.
     """
     folder = Path(out_dir)
-    navigator = NavigatorRecipe.read(folder).build()
-    same_code = recorded_code(folder) == code_fingerprint()
+    recipe = NavigatorRecipe.read(folder)
+    navigator = recipe.build()
+    same_code = recorded_code(folder) == code_fingerprint(recipe.class_name)
     ticks = frames = 0
     for messages, recorded in itertools.zip_longest(read_messages(folder), read_estimates(folder)):
         if messages is None or recorded is None:

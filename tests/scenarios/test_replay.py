@@ -2,17 +2,27 @@
 
 import json
 import re
+import shutil
 import subprocess
 import sys
 import textwrap
+from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+import dockair
 from dockair.errors import DockairError
-from dockair.scenarios.message_log import ESTIMATES, MESSAGES, NAVIGATOR, MessageLog, NavigatorRecipe
+from dockair.scenarios.message_log import (
+    ESTIMATES,
+    MESSAGES,
+    NAVIGATOR,
+    MessageLog,
+    NavigatorRecipe,
+    code_fingerprint,
+)
 from dockair.scenarios.replay import FORBIDDEN, replay, replay_in_this_process, same_bits
 
 SUMS = '''
@@ -117,6 +127,26 @@ def test_a_difference_says_whether_the_code_is_still_the_flights(record):
     recipe = json.loads((out / NAVIGATOR).read_text())
     (out / NAVIGATOR).write_text(json.dumps(recipe | {"code": "another"}))
     assert "have changed since the flight" in str(replay(out))
+
+
+def test_a_navigator_of_ones_own_that_has_changed_since_the_flight_is_said_to_have(record, tmp_path):
+    out = record()
+    (module,) = tmp_path.glob("users_navigator_*.py")
+    module.write_text(module.read_text().replace("0.9", "0.8"))
+    assert "have changed since the flight" in str(replay(out))
+
+
+@pytest.mark.parametrize("name", ["rotations.py", "nav/navigator.py"])
+def test_sources_below_the_navigation_are_its_code_too(tmp_path, monkeypatch, name):
+    source, copy = Path(dockair.__file__).parent, tmp_path / "dockair"
+    shutil.copytree(source / "nav", copy / "nav", ignore=shutil.ignore_patterns("__pycache__"))
+    for leaf in source.glob("*.py"):
+        shutil.copy(leaf, copy)
+    before = code_fingerprint("dockair.nav.navigator:Navigator")
+    monkeypatch.setattr(dockair, "__file__", str(copy / "__init__.py"))
+    assert code_fingerprint("dockair.nav.navigator:Navigator") == before
+    (copy / name).write_text((copy / name).read_text() + "# changed\n")
+    assert code_fingerprint("dockair.nav.navigator:Navigator") != before
 
 
 def test_a_recording_that_was_cut_off_is_refused(record):
