@@ -6,6 +6,9 @@ from the camera and of the camera seen from the drogue, LEDs beyond the sensor's
 minimum of a flat or nearly flat ring costs in chi^2 (`nav.pose.planar`), which says how soon a frame alone is trusted.
 
     gain of a ring = exp mean over nodes and quantities ln(sigma of the default ring / its sigma)         (1)
+    P(noise makes the second minimum the cheaper) = Phi(-chi/2)                                           (2)
+
+(2) is of noise along the difference of the two images, which is chi long; that both minima move with it is left out.
 
 Rings have `rim` LEDs on the rim, evenly spaced or with one displaced so that the image tells its numbering, and `inner`
 ones ahead of or behind the rim's plane: ahead, on the ribs that narrow to the coupling's mouth; behind, on stalks.
@@ -36,7 +39,7 @@ SPACINGS = ("equal", "coded")
 _CODE_SHIFT = 4.0 / 15.0  # of the spacing, 12 deg of 45: far enough off its place to be told from it
 _DIRECTIONS = 5  # of the tilt; no ring's symmetry but of five LEDs repeats itself in them
 _SECOND_MINIMUM = 0.25  # of the tilt; a descent that ends nearer to the true attitude has found the same minimum
-_SURE_CHI2 = 16.0  # a second minimum that costs more is taken in error once in 10^4 frames
+_SURE_CHI2 = 55.0  # a second minimum that costs so much is taken in error once in 10^4 frames, Eq. (2)
 _MOST_RINGS = 400  # some ten seconds
 
 #: What is bounded, in the order of the columns: name, property of the bound.

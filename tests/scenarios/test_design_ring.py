@@ -7,16 +7,22 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
+from scipy.special import ndtr
 
 from dockair.calibration import Camera, LedRing
 from dockair.errors import DockairError
 from dockair.nav.dop import pose_bound
+from dockair.nav.pose.levenberg_marquardt import levenberg_marquardt
+from dockair.nav.pose.measurement import lines_of_sight_from_pixels
+from dockair.nav.pose.planar import mirrored
 from dockair.rotations import exp
 from dockair.scenarios import cli
 from dockair.scenarios.design_ring import (
+    _SURE_CHI2,
     RANKINGS,
     Corridor,
     RingDesign,
+    _mirror_chi2,
     bound_at,
     designs,
     inner_radius,
@@ -120,6 +126,26 @@ def test_only_flat_rings_can_be_taken_for_their_mirror_image(flat, deep):
     assert flat.mirror_chi2[2, 0] < 1.0 < 1e4 < flat.mirror_chi2[0, 1] and flat.mirror_chi2[0, 0] == np.inf
     assert flat.ambiguous == pytest.approx(2.0 / 6.0) and deep.ambiguous == 0.0
     assert (np.diff(flat.mirror_chi2, axis=0) < 0.0).all() and (np.diff(flat.mirror_chi2[1:], axis=1) > 0.0).all()
+
+
+def test_a_frame_is_taken_for_its_mirror_image_as_often_as_the_second_minimums_cost_says():
+    """P = Phi(-chi/2): 15.9 % where it costs 4, and once in 10^4 frames at the cost from which on it is not."""
+    R_CD, p_CD = CORRIDOR.attitudes(np.deg2rad(20.0))[0], np.array([4.0, 0.0, 0.0])
+    at_a_pixel = replace(CORRIDOR, sigma_px=1.0)
+    noisy = replace(CORRIDOR, sigma_px=0.5 * np.sqrt(_mirror_chi2(FLAT.points_D, R_CD, p_CD, at_a_pixel)))
+    chi2 = _mirror_chi2(FLAT.points_D, R_CD, p_CD, noisy)
+    assert chi2 == pytest.approx(4.0, rel=1e-3)
+    rng, sigma, frames = np.random.default_rng(7), np.full(FLAT.rim, noisy.sigma_px), 300
+    true = noisy.camera.pixels_from_points(FLAT.points_D @ R_CD.T + p_CD)
+    wrong = 0
+    for _ in range(frames):
+        pixels = true + noisy.sigma_px * rng.standard_normal(true.shape)
+        sight = lines_of_sight_from_pixels(pixels, FLAT.points_D, noisy.camera, sigma)
+        first = levenberg_marquardt(sight, R_CD, p_CD)
+        wrong += levenberg_marquardt(sight, *mirrored(R_CD, p_CD, FLAT.points_D)).cost < first.cost - 1e-6
+    share = ndtr(-0.5 * np.sqrt(chi2))
+    assert abs(wrong / frames - share) < 3.0 * np.sqrt(share * (1.0 - share) / frames)
+    assert ndtr(-0.5 * np.sqrt(_SURE_CHI2)) == pytest.approx(1e-4, rel=0.1)
 
 
 def test_gain_is_the_geometric_mean_of_the_sigmas_ratios(flat, deep):
