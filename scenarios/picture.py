@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from dockair.errors import DockairError
 from dockair.rotations import Array
 from dockair.scenarios import flight_log, message_log
+from dockair.scenarios.attempts import RefereeLimits
 from dockair.scenarios.picture_columns import contact, fresh, not_valid, values, vectors
 from dockair.scenarios.picture_paths import draw_along_axis, draw_side_view
 from dockair.scenarios.recording_frames import shown_pixels
@@ -32,8 +33,12 @@ _PHASE_COLOURS = {
 }
 
 
-def picture_of_flight(out_dir: str | Path) -> Path:
+def picture_of_flight(out_dir: str | Path, limits: RefereeLimits | None = None) -> Path:
     """Draw `flight.png` into a flight's folder and return its path.
+
+    Args:
+        out_dir: the folder.
+        limits: of the flight's referee, whose rim and good docking are drawn; the built-in ring's by default.
 
     Raises:
         DockairError: there is no flight in the folder.
@@ -52,8 +57,9 @@ def picture_of_flight(out_dir: str | Path) -> Path:
     FigureCanvasAgg(figure)
     rows = figure.add_gridspec(2, 1, height_ratios=[0.8, 1.0])
     above = rows[0].subgridspec(1, 2, width_ratios=[2.2, 1.0])
-    draw_side_view(figure.add_subplot(above[0]), flight)
-    draw_along_axis(figure, figure.add_subplot(above[1]), flight)
+    limits = limits or RefereeLimits()
+    draw_side_view(figure.add_subplot(above[0]), flight, limits)
+    draw_along_axis(figure, figure.add_subplot(above[1]), flight, limits)
     widths = [1.0] if frame is None else [0.8, 2.0]
     below = rows[1].subgridspec(4, len(widths), width_ratios=widths, height_ratios=[2.4, 1.0, 1.0, 1.0])
     if frame is not None:

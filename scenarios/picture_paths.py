@@ -15,11 +15,11 @@ from dockair.scenarios.picture_columns import attitude, contact, level_axes, val
 TIP, HOSE, GREY, PROBE = "#1f77b4", "#3a3a3a", "#9a9a9a", "#c0392b"
 _FROM_M = 3.0  # the last metres before the ring are shown as the receiver sees them
 _PROBE_M = 1.0
-_LEAST_HALF_M = 0.3  # of the view along the drogue's axis: rim and a little more
+_HALF_OF_RIM = 1.2  # least half of the view along the drogue's axis: rim and a little more
 
 
-def draw_side_view(axes: Any, flight: Any) -> None:
-    """Draw hose, drogue and probe at contact, and the paths of drogue and tip."""
+def draw_side_view(axes: Any, flight: Any, limits: RefereeLimits) -> None:
+    """Draw hose, drogue with its rim and probe at contact, and the paths of drogue and tip."""
     R_EW, p_WE = level_axes(flight)
     held, moment = contact(flight)
     tip, drogue = (R_EW.apply(vectors(flight, name) - p_WE) for name in ("truth_p_WP", "truth_p_WD"))
@@ -27,7 +27,7 @@ def draw_side_view(axes: Any, flight: Any) -> None:
     ahead = max(drogue[:, 0].max(), hose[-1, 0])
     hose = hose[hose[:, 0] < ahead + 0.3 * (ahead - tip[:, 0].min())]  # what is on to the pod would make the rest small
     R_ED, R_EB = (R_EW[moment] * attitude(flight, name)[moment] for name in ("truth_q_WD", "truth_q_WB"))
-    rim = RefereeLimits().rim_radius_m * R_ED.apply([0.0, 0.0, 1.0])
+    rim = limits.rim_radius_m * R_ED.apply([0.0, 0.0, 1.0])
     basket = np.array([drogue[moment] + rim, hose[-1], drogue[moment] - rim])
     probe = tip[moment] + np.outer([0.0, -_PROBE_M], R_EB.apply([1.0, 0.0, 0.0]))
 
@@ -49,13 +49,13 @@ def draw_side_view(axes: Any, flight: Any) -> None:
     axes.tick_params(labelsize=8)
 
 
-def draw_along_axis(figure: Any, axes: Any, flight: Any) -> None:
+def draw_along_axis(figure: Any, axes: Any, flight: Any, limits: RefereeLimits) -> None:
     """Draw the tip's last metres before the ring as the receiver sees them, with the basket's rim and the limit."""
     _, moment = contact(flight)
     p_DP = tip_in_drogue_axes(flight)[: moment + 1]
     begin = approach_begin(p_DP[:, 0])
     path = p_DP[begin:]
-    limits, angle = RefereeLimits(), np.linspace(0.0, 2.0 * np.pi, 97)
+    angle = np.linspace(0.0, 2.0 * np.pi, 97)
     for radius, style, label in ((limits.rim_radius_m, "-", "rim"), (limits.radial_offset_m, "--", "good docking")):
         axes.plot(radius * np.cos(angle), radius * np.sin(angle), color=HOSE, lw=1.2, ls=style)
         axes.text(0.0, radius, f"{label}, {radius:.2f} m", fontsize=7, ha="center", va="bottom")
@@ -64,7 +64,7 @@ def draw_along_axis(figure: Any, axes: Any, flight: Any) -> None:
     crossing = ring_crossing(path[:, 0])
     end, where = (path[-1], "nearest") if crossing is None else (path[crossing], "in the ring's plane")
     axes.plot(end[1], end[2], marker="x", ms=9, mew=2.2, color=PROBE, ls="none", zorder=4)
-    half = max(_LEAST_HALF_M, 1.1 * float(np.abs(path[:, 1:]).max()))
+    half = max(_HALF_OF_RIM * limits.rim_radius_m, 1.1 * float(np.abs(path[:, 1:]).max()))
     axes.set(xlim=(half, -half), ylim=(-half, half), xlabel="left [m]", ylabel="up [m]")
     axes.set_aspect("equal")
     axes.set_title(f"From behind, along the drogue's axis ($\\times$: {where})", fontsize=9)
@@ -87,9 +87,9 @@ def approach_begin(forward_m: Array) -> int:
 
 
 def ring_crossing(forward_m: Array) -> int | None:
-    """Return the tick at which the tip was first in the ring's plane or beyond; None if it never was."""
-    beyond = np.flatnonzero(forward_m >= 0.0)
-    return int(beyond[0]) if len(beyond) else None
+    """Return the tick at which the tip last came into the ring's plane or beyond, from behind; None if it never did."""
+    came = np.flatnonzero((forward_m[:-1] < 0.0) & (forward_m[1:] >= 0.0))
+    return int(came[-1]) + 1 if len(came) else None
 
 
 def _moment_words(flight: Any, held: bool, moment: int) -> str:

@@ -120,7 +120,7 @@ class Recorder:
                 messages=read_messages(folder, pixels=False) if self._messages is not None else (),
                 summary=summary_of(result),
             )
-        picture_of_flight(folder)
+        picture_of_flight(folder, flight.referee.limits)
 
 
 def summary_of(result: Result) -> str:

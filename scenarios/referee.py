@@ -54,7 +54,7 @@ class Referee:
     """
 
     def __init__(self, limits: RefereeLimits | None = None) -> None:
-        self._limits = limits or RefereeLimits()
+        self.limits = limits or RefereeLimits()  #: beyond which a touch is unsafe
         self._previous_x: float | None = None
         self._phase, self._usable = "", True
         self._over: list[Attempt] = []
@@ -127,7 +127,7 @@ class Referee:
     def unsafe(self) -> tuple[str, ...]:
         """What was unsafe; empty when all was safe."""
         unsafe, departed_s = list(self._unsafe), self._departure.time_s
-        if self._fastest_m_s > self._limits.closure_speed_m_s:
+        if self._fastest_m_s > self.limits.closure_speed_m_s:
             unsafe.append(f"touch at {self._fastest_m_s:.2f} m/s")
         if self._outside_m > 0.0:
             unsafe.append(f"touch outside the rim, {self._outside_m:.2f} m off the axis")
@@ -156,7 +156,7 @@ class Referee:
     def _enter(self, truth: Truth) -> None:
         now = passing(truth)
         trying = self._open is not None and not self._open.is_over
-        if not trying and now.radial_offset_m > self._limits.aside_m:
+        if not trying and now.radial_offset_m > self.limits.aside_m:
             return
         attempt = self._attempt(truth)
         if attempt.latched is None:  # a probe that has been let go may swing to and fro
@@ -169,7 +169,7 @@ class Referee:
         attempt, now = self._attempt(truth), passing(truth)
         attempt.touched = attempt.touched or attempt.latched is None  # one that was held is no rim strike afterwards
         self._fastest_m_s = max(self._fastest_m_s, now.closure_speed_m_s)
-        if now.radial_offset_m > self._limits.rim_radius_m:
+        if now.radial_offset_m > self.limits.rim_radius_m:
             self._outside_m = max(self._outside_m, now.radial_offset_m)
 
     def _latch(self, truth: Truth) -> None:

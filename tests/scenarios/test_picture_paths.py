@@ -5,11 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from matplotlib.figure import Figure
 
 from dockair.rotations import matrix_from_yaw_pitch_roll
+from dockair.scenarios.attempts import RefereeLimits
 from dockair.scenarios.flight_log import FlightLog
 from dockair.scenarios.picture_columns import contact, level_axes, vectors
-from dockair.scenarios.picture_paths import approach_begin, ring_crossing, tip_in_drogue_axes
+from dockair.scenarios.picture_paths import (
+    approach_begin,
+    draw_along_axis,
+    draw_side_view,
+    ring_crossing,
+    tip_in_drogue_axes,
+)
 
 
 def _flight(folder, ticks):
@@ -32,9 +40,23 @@ def test_of_several_approaches_the_last_is_drawn():
     assert approach_begin(np.array([-5.0, -4.0])) == 0
 
 
-def test_the_cross_stands_where_the_tip_first_is_in_the_rings_plane():
+def test_the_cross_stands_where_the_tip_last_comes_into_the_rings_plane_from_behind():
+    """There the referee takes the offset of a contact: a tip that was thrown back comes to it a second time."""
     assert ring_crossing(np.array([-2.0, -0.1, 0.02, 0.2])) == 2
+    assert ring_crossing(np.array([-2.0, -0.1, 0.02, -0.05, -0.01, 0.0, 0.2])) == 5
     assert ring_crossing(np.array([-2.0, -0.1])) is None
+
+
+def test_the_rim_is_that_of_the_ring_that_was_flown(hand_made, tmp_path):
+    flight = _flight(tmp_path, hand_made.ticks(40))
+    figure = Figure()
+    for rim_m in (0.25, 0.3):
+        along, side = figure.add_subplot(), figure.add_subplot()
+        limits = RefereeLimits(rim_radius_m=rim_m)
+        draw_along_axis(figure, along, flight, limits)
+        draw_side_view(side, flight, limits)
+        assert np.hypot(*along.lines[0].get_data()).max() == pytest.approx(rim_m)
+        assert np.ptp(side.lines[4].get_ydata()) == pytest.approx(2.0 * rim_m, rel=0.02)  # the basket, nearly upright
 
 
 @pytest.mark.parametrize("heading_deg", [0.0, 70.0])
