@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from itertools import takewhile
 from operator import attrgetter
 
+import numpy as np
+
 from dockair.sim.truth import Truth
 
 
@@ -24,8 +26,13 @@ class Disconnect:
     time_s: float
 
 
-def hold_of(truths: Sequence[Truth]) -> tuple[Hold | None, Disconnect | None]:
-    """Return what happened while the probe was held, and how it came free (None: it did not)."""
+def hold_of(truths: Sequence[Truth], pull_max_n: float = -np.inf) -> tuple[Hold | None, Disconnect | None]:
+    """Return what happened while the probe was held, and how it came free (None: it did not).
+
+    Args:
+        truths: one a control tick.
+        pull_max_n: largest pull that the referee saw: that which opens the coupling lasts for one physics tick.
+    """
     first = next((k for k, truth in enumerate(truths) if truth.latched), None)
     if first is None:
         return None, None
@@ -35,6 +42,6 @@ def hold_of(truths: Sequence[Truth]) -> tuple[Hold | None, Disconnect | None]:
     hold = Hold(
         duration_s=truths[last].time_s - truths[first].time_s,
         take_in_max_m=max(truth.reel_position_m for truth in during),
-        coupling_force_max_n=max(truth.coupling_force_n for truth in (*during, *released)),
+        coupling_force_max_n=max(pull_max_n, *(truth.coupling_force_n for truth in (*during, *released))),
     )
     return hold, Disconnect(time_s=released[0].time_s) if released else None

@@ -15,6 +15,7 @@ the coupling has let go), a contact while the navigation itself marked its solut
 basket or as it was held), any collision, and a receiver that departs from controlled flight (`departure`).
 """
 
+import math
 from dataclasses import dataclass
 from enum import Enum
 
@@ -65,6 +66,8 @@ class Referee:
         self._unsafe: list[str] = []
         self._departure = Departure()
         self.contact: Contact | None = None
+        self.pull_max_n = -math.inf  #: largest in the coupling's first hold, the tick at which it let go included
+        self._held = self._let_go = False
         self.collided_with = ""
 
     def watch(self, truth: Truth) -> None:
@@ -79,6 +82,9 @@ class Referee:
         if truth.receiver_touches and not self.collided_with:
             self.collided_with = truth.receiver_touches
             self._unsafe.append(f"collision with {self.collided_with}")
+        if not self._let_go and (truth.latched or self._held):
+            self.pull_max_n = max(self.pull_max_n, truth.coupling_force_n)
+            self._held, self._let_go = truth.latched, not truth.latched
         if truth.latched and self._attempt(truth).latched is None:
             self._latch(truth)
         elif self._open is not None:

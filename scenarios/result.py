@@ -135,7 +135,7 @@ def summarise(
         out_dir: where the flight was written.
     """
     truths = flown.truths
-    hold, disconnect = hold_of(truths)
+    hold, disconnect = hold_of(truths, referee.pull_max_n)
     duration_s = truths[-1].time_s if truths else 0.0
     log = referee.attempt_log(duration_s, Outcome(outcome))
     attempts = tuple(with_cause(attempt, flown) for attempt in log)

@@ -123,6 +123,14 @@ def test_the_pull_that_opened_the_coupling_is_the_largest(hand_made):
     assert hold is not None and hold.coupling_force_max_n == 1913.0
 
 
+def test_the_pull_that_opened_the_coupling_between_two_control_ticks_counts_too(hand_made):
+    """It lasts for one physics tick, of which the log has one in ten; the referee sees them all."""
+    log, referee = _refereed(hand_made, 900)
+    referee.pull_max_n = 1913.0
+    hold = _summary(hand_made, log, referee=referee).hold
+    assert hold is not None and hold.coupling_force_max_n == 1913.0
+
+
 def test_of_two_holds_the_first_counts(hand_made):
     """Of the second everything is larger, and its time is later."""
     once = [hand_made.truth(10 * k) for k in range(1, 900)]

@@ -47,6 +47,13 @@ def test_contact_reports_offset_and_speed_at_the_ring_and_the_angle_at_the_latch
     assert referee.contact.time_s == 5.0
 
 
+def test_the_largest_pull_is_that_of_the_first_hold_the_tick_at_which_it_let_go_included():
+    referee = Referee()
+    for k, (held, pull_n) in enumerate([(False, 9e3), (True, -50.0), (True, 700.0), (False, 1913.0), (True, 4e3)]):
+        referee.watch(dataclasses.replace(truth_at(0.001 * k, (0.3, 0, 0), latched=held), coupling_force_n=pull_n))
+    assert referee.pull_max_n == 1913.0
+
+
 def judged(referee, truth, phase="approach"):
     return referee.judge(truth, phase, 60.0)
 
