@@ -24,6 +24,7 @@ from dockair.nav.guidance.field_of_view import FieldOfView
 from dockair.nav.guidance.phases import Phase
 from dockair.nav.heading.own_heading import OwnHeading, OwnHeadingSettings
 from dockair.nav.identify.code import CodeSettings, code_of
+from dockair.nav.identify.hypotheses import IdentifySettings
 from dockair.nav.identify.perspective import SLOTS
 from dockair.nav.image.detect import DetectSettings
 from dockair.nav.integrity.coasting import CoastingSettings
@@ -40,6 +41,7 @@ from dockair.rotations import Array
 from dockair.vectors import is_finite, largest_sigma
 
 _EVEN_LEDS = 5  # four are seldom more than an accident
+_ROUNDING_RAD = 1e-9  # of a sheet's angles
 _POSE_LEDS = 4  # fewer are no pose without a belief ...
 _LONGEST_TICKS = 1.5  # between two stamps, for what is felt at the second to stand for all of the time
 _LEAST_POSE_LEDS = 3  # ... and these are one with its attitude
@@ -76,13 +78,14 @@ class Navigator:
     """The navigation that Dockair flies; see `messages.Navigates` for what any other must offer.
 
     Raises:
-        DockairError: a ring that cannot be identified, or numbered by the code it has; a horizon of coasting that the
-            filter's buffer does not hold; fewer than no tolerances of a learnt place.
+        DockairError: a ring that cannot be identified, having fewer than five LEDs within four as-built tolerances of
+            their even places, or numbered by the code it has; a horizon of coasting that the filter's buffer does not
+            hold; fewer than no tolerances of a learnt place.
     """
 
     def __init__(self, sheets: NavigationSheets, settings: NavigatorSettings | None = None) -> None:
-        _check_ring(sheets.ring)
         self._sheets, self._settings = sheets, settings or NavigatorSettings()
+        _check_ring(sheets.ring, self._settings.led_position_sigma_m)
         learnt_sigmas = self._settings.learnt_place_sigmas
         if not learnt_sigmas >= 0.0:
             raise DockairError("navigator.learnt_place_sigmas", expected="a number, 0 or more", got=learnt_sigmas)
@@ -365,12 +368,16 @@ class Navigator:
         return exposure_s, self._heading.heading_rad, self._heading.sigma_rad
 
 
-def _check_ring(ring: LedRing) -> None:
+def _check_ring(ring: LedRing, led_position_sigma_m: float) -> None:
     if ring.count != SLOTS:
         raise DockairError("ring.count", expected=f"{SLOTS} LEDs, the ring that can be identified", got=ring.count)
     code = code_of(ring, CodeSettings())
-    if SLOTS - len(code.displaced) < _EVEN_LEDS:
-        expected = f"at least {_EVEN_LEDS} LEDs in their even places, by which the ring is found"
+    off_rad = np.abs(ring.angles_rad - 2.0 * np.pi / SLOTS * np.arange(SLOTS))
+    within_rad = IdentifySettings().tolerance_sigmas * led_position_sigma_m / (0.5 * ring.diameter_m)
+    even = (code.offset_rad == 0.0) & (off_rad <= within_rad + _ROUNDING_RAD)
+    if even.sum() < _EVEN_LEDS:
+        within = f"within {np.degrees(within_rad):.2g} degrees, by which the ring is found"
+        expected = f"at least {_EVEN_LEDS} LEDs in their even places, {within}"
         raise DockairError("ring.angles_deg", expected=expected, got=ring.angles_deg)
     if code.says_something and code.is_the_same_turned:
         got = {"angles_deg": ring.angles_deg, "brightness": ring.brightness}

@@ -11,6 +11,7 @@ from dockair.calibration import Camera, GyroSheet, LedRing, Mounting, Navigation
 from dockair.errors import DockairError
 from dockair.messages import CameraFrame, ImuSample, LedObservation, Window
 from dockair.nav.fusion_settings import FusionSettings
+from dockair.nav.identify.ring import IdentificationStatus, identify
 from dockair.nav.integrity.coasting import CoastingSettings
 from dockair.nav.integrity.contact import ContactLimits, Doubt
 from dockair.nav.navigator import Navigator, NavigatorSettings
@@ -853,6 +854,23 @@ def test_a_ring_with_too_few_leds_in_their_places_is_refused_before_the_first_fr
     Navigator(sheets(LedRing(angles_deg=off)))
     with pytest.raises(DockairError, match="ring.angles_deg: expected at least 5 LEDs in their even places"):
         Navigator(sheets(LedRing(angles_deg=(0.0, 45.0, 90.0, 135.0, 190.0, *off[5:]))))
+
+
+def test_a_ring_off_its_places_by_less_than_a_code_and_more_than_identification_takes_is_refused():
+    """0.4 degrees are 1.7 mm, six tolerances as built: of LEDs that alternate so no five are on one even ring."""
+
+    def alternating(off_deg):
+        ring = LedRing(angles_deg=tuple(45.0 * k + off_deg * (-1.0) ** k for k in range(8)))
+        seen_px = sheets().camera.pixels_from_points(ring.positions_D + [5.0, 0.1, 0.0])
+        return ring, identify(seen_px, ring=ring, expected_led_px=seen_px, expected_sigma_px=1.0)
+
+    ring, found = alternating(0.25)
+    assert found.status is IdentificationStatus.FOUND
+    Navigator(sheets(ring))
+    ring, found = alternating(0.4)
+    assert found.status is not IdentificationStatus.FOUND
+    with pytest.raises(DockairError, match="at least 5 LEDs in their even places, within 0.28 degrees"):
+        Navigator(sheets(ring))
 
 
 def test_a_code_that_is_the_same_turned_is_refused_before_the_first_frame():
