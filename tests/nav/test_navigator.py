@@ -126,6 +126,30 @@ def test_guidance_is_told_the_mean_of_a_tick_s_gyro_samples(render):
     np.testing.assert_allclose(told[-1], 1.4 * R_BI[:, 2], atol=1e-9)
 
 
+@pytest.mark.parametrize(("gyro_hz", "control_hz"), [(500, 100), (125, 100), (225, 180)])
+def test_guidance_is_told_what_the_tip_feels_whatever_the_rates(gyro_hz, control_hz):
+    """A push of 0.8 m/s; of an IMU of 125 Hz one tick in four has two samples, 16 ms after those of the tick before."""
+    known = sheets()
+    navigator = Navigator(replace(known, gyro=replace(known.gyro, rate_hz=gyro_hz), control_rate_hz=control_hz))
+    told = []
+    guided = navigator._guidance.step
+    navigator._guidance.step = lambda state: told.append(state.dv_WP_B) or guided(state)
+    sent = 0
+    for tick in range(12 * control_hz):
+        samples = []
+        while (sent + 1) * control_hz <= (tick + 1) * gyro_hz:
+            sent += 1
+            force = np.array([0.0, 2.0 if 11.0 < sent / gyro_hz <= 11.4 else 0.0, 9.81])
+            samples.append(
+                ImuSample(time_stamp_s=sent / gyro_hz, angular_rate_rad_s=np.zeros(3), specific_force_m_s2=force)
+            )
+        navigator.step(samples, None)
+    felt = np.array(told[round(10.5 * control_hz) :])
+    assert np.isfinite(felt).all()
+    gained = 2.0 * 11.0 * np.log(11.4 / 11.0) - 0.8 * np.log(12.0 / 11.4)  # the mean since the start takes some off
+    np.testing.assert_allclose(felt.sum(axis=0), [0.0, gained, 0.0], atol=2e-3)
+
+
 def test_one_led_that_is_bent_away_is_left_out_of_the_pose(render):
     sky = Sky(render, still)
     sky.run(0.3)
