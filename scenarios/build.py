@@ -1,6 +1,6 @@
 """Makes a scenario's world, sensors and navigator: the only place where as-built and nominal values are both known."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TypeVar
 
@@ -315,4 +315,7 @@ def _heading(scenario: Scenario) -> OwnHeadingSettings | None:
     table = scenario.navigation
     if not table.heading:
         return None
-    return OwnHeadingSettings(airspeed_m_s=scenario.flight.airspeed_m_s, every_s=table.heading_every_s)
+    settings = OwnHeadingSettings(airspeed_m_s=scenario.flight.airspeed_m_s, every_s=table.heading_every_s)
+    camera = camera_sheets(scenario).exposure  # by its exposure the frame that was asked for is known
+    exposure_s = min(max(settings.exposure_s, camera.shortest_s), camera.longest_s)
+    return replace(settings, exposure_s=exposure_s)

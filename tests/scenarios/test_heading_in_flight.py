@@ -5,10 +5,11 @@ import pytest
 
 from dockair.errors import DockairError
 from dockair.nav.navigator import NavigatorSettings
-from dockair.scenarios.build import build, guidance_settings
+from dockair.scenarios.build import build, camera_sheets, guidance_settings
 from dockair.scenarios.loop import Flight
 from dockair.scenarios.schema import load_scenario
 from dockair.scenarios.truth_navigation import TruthNavigator
+from dockair.sim.camera.exposure import ExposureControl
 
 FLOWN_S = 7.0
 
@@ -29,6 +30,20 @@ def test_the_keys_reach_the_navigator_with_the_briefed_airspeed():
         settings.append(recipe.settings.heading)
     assert settings[0] is None and settings[1] is not None
     assert (settings[1].every_s, settings[1].airspeed_m_s) == (1.5, 120.0)
+
+
+@pytest.mark.parametrize(
+    ("limits_s", "asked_s"),
+    [({}, 500e-6), ({"longest_s": 2e-4}, 2e-4), ({"shortest_s": 8e-4, "exposure_s": 9e-4, "longest_s": 1e-3}, 8e-4)],
+)
+def test_no_exposure_is_asked_for_that_the_camera_cannot_make(limits_s, asked_s):
+    """It would make the nearest one, and by another exposure the heading does not know its frame."""
+    keys = {f"parameters.exposure.{name}": value for name, value in limits_s.items()}
+    scenario = load_scenario("racetrack", {"navigation.heading": True, **keys})
+    recipe, sheets = build(scenario, 0).recipe, camera_sheets(scenario)
+    assert recipe is not None and isinstance(recipe.settings, NavigatorSettings) and recipe.settings.heading is not None
+    assert recipe.settings.heading.exposure_s == asked_s
+    assert ExposureControl(sheets.exposure, sheets.sensor).within_limits(asked_s) == asked_s
 
 
 def test_a_gyro_that_is_too_bad_for_it_is_refused_in_one_line():
