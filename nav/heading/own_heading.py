@@ -58,9 +58,15 @@ class OwnHeading:
     Args:
         sheets: camera, mounting, gyro, rates.
         settings: constants.
+
+    Raises:
+        DockairError: frames are asked for so often that none would show LEDs; what `HeadingFilter` refuses.
     """
 
     def __init__(self, sheets: NavigationSheets, settings: OwnHeadingSettings) -> None:
+        if not settings.every_s * sheets.camera_rate_hz > 1.0:
+            expected = f"more than a camera's period, {1.0 / sheets.camera_rate_hz:g} s, or no frame would show LEDs"
+            raise DockairError("heading.every_s", expected=expected, got=settings.every_s)
         self._sheets, self._settings = sheets, settings
         self._filter = HeadingFilter(sheets.gyro, sheets.mounting, settings.airspeed_m_s, settings.filter)
         self._visual = VisualHeading(sheets.camera, settings.visual)

@@ -73,6 +73,18 @@ def test_one_camera_period_in_two_seconds_is_asked_for():
     assert asked[0] == 500e-6
 
 
+def test_leds_are_left_a_frame():
+    """Of a camera of 2 Hz each frame would be asked for every 0.5 s, and the drogue never seen."""
+    slow = replace(SHEETS, camera_rate_hz=2)
+    with pytest.raises(DockairError, match="heading.every_s: expected more than a camera's period, 0.5 s"):
+        OwnHeading(slow, replace(SETTINGS, every_s=0.5))
+    heading = OwnHeading(slow, replace(SETTINGS, every_s=1.0))
+    heading.step(imu(-4.5, 0.0), None, DROGUE_C)
+    asked = [np.isfinite(heading.ask(0.01 * k)) for k in range(400)]
+    exposed = [asked[k - 1] for k in range(50, 400, 50)]  # every 0.5 s, as was asked a control tick before
+    assert 0 < sum(exposed) < len(exposed)
+
+
 def test_a_frame_was_asked_for_if_it_is_full_and_exposed_as_asked_and_when():
     """In the dark the camera's own control may expose as long: those frames are the LEDs'."""
     heading = levelled()
