@@ -23,7 +23,14 @@ from dockair.calibration import Camera
 from dockair.nav.identify.brightness import brightness_model
 from dockair.nav.identify.chance import log10_false_rings_of_one
 from dockair.nav.identify.hypotheses import IdentifySettings
-from dockair.nav.identify.perspective import SLOTS, RingFit, distorted, fit_ring, undistorted
+from dockair.nav.identify.perspective import (
+    SLOTS,
+    RingFit,
+    distorted,
+    fit_ring,
+    undistorted,
+    undistorted_prediction,
+)
 from dockair.nav.identify.result import Identification, IdentificationStatus
 from dockair.rotations import Array
 
@@ -165,17 +172,17 @@ def followed_ring(
         sigma_px: of a blob's coordinate.
         settings: of the identification.
     """
+    points, predicted_px = undistorted(blobs_px, camera), undistorted_prediction(predicted_px, camera)
     believed_rad, radius_px = _roll_and_radius(predicted_px)
     if not 5.0 * prediction_sigma_px <= _MOST_SHIFT_RADII * radius_px:
         return None
     largest_px = (1.0 + settings.radius_tolerance) * radius_px
     reach_px = 5.0 * prediction_sigma_px + 0.02 * largest_px  # as `prior` has it
     member, clear, inside = _named(
-        blobs_px, predicted_px, radius_px, reach_px + 1.25 * largest_px, _RIVAL_RADII * radius_px + 2.0 * reach_px
+        points, predicted_px, radius_px, reach_px + 1.25 * largest_px, _RIVAL_RADII * radius_px + 2.0 * reach_px
     )
     if not clear:
         return None
-    points = undistorted(blobs_px, camera)
     fit = fit_ring(
         points, member, camera.focal_length_px, camera.principal_point_px,
         tolerance_px=settings.tolerance_sigmas * sigma_px,

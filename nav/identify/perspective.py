@@ -23,7 +23,7 @@ from dockair.calibration import Camera
 from dockair.nav.identify.ring_pose import SLOTS, facing, fit_members
 from dockair.rotations import Array
 
-__all__ = ["SLOTS", "RingFit", "distorted", "fit_ring", "undistorted"]
+__all__ = ["SLOTS", "RingFit", "distorted", "fit_ring", "undistorted", "undistorted_prediction"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -92,11 +92,18 @@ def fit_ring(
 
 
 def undistorted(pixels: Array, camera: Camera) -> Array:
-    """Pixels of the same camera without distortion."""
+    """Pixels of the same camera without distortion; not finite where no ray makes one, far off the sensor."""
     if camera.distortion is None:
         return pixels
-    rays = camera.rays_from_pixels(pixels)
+    with np.errstate(all="ignore"):
+        rays = camera.rays_from_pixels(pixels)
     return np.asarray(-camera.focal_length_px * rays[:, 1:] / rays[:, :1] + np.array(camera.principal_point_px))
+
+
+def undistorted_prediction(pixels: Array, camera: Camera) -> Array:
+    """Predicted pixels of the same camera without distortion; as they are where no ray makes one of them."""
+    straight = undistorted(pixels, camera)
+    return straight if np.isfinite(straight).all() else pixels
 
 
 def distorted(pixels: Array, camera: Camera) -> Array:

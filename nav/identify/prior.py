@@ -12,7 +12,9 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from dockair.calibration import Camera
 from dockair.errors import DockairError
+from dockair.nav.identify.perspective import undistorted_prediction
 from dockair.rotations import Array
 
 Expectation = TypeVar("Expectation", Array, float)
@@ -23,7 +25,7 @@ ANYWHERE_PX = 1e6  #: radius of a gate that lets everything pass
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RingPrior:
-    """Gates that follow from the expectations; wide open where there is none."""
+    """Gates that follow from the expectations, without the lens's distortion; wide open where there is none."""
 
     centre_px: Array  #: (2,)
     centre_tolerance_px: float  #: of a fitted ring's centre
@@ -113,6 +115,7 @@ def make_prior(
     led_px: Array | None,
     sigma_px: float | None,
     led_angle_rad: Array | None = None,
+    camera: Camera | None = None,
 ) -> RingPrior:
     """Gates from whatever is expected; an expectation that is not finite is none (a prediction behind the camera).
 
@@ -126,16 +129,23 @@ def make_prior(
         led_px: (8, 2) expected LEDs, or None: stands for those of the three above that are None.
         sigma_px: of the expected centre, or None.
         led_angle_rad: (8,) where the LEDs stand on the ring; None for every 45 degrees.
+        camera: whose pixels are expected, its distortion is taken off; None where they have none.
 
     Raises:
         DockairError: wrong shapes.
     """
     centre_px, led_px = _finite(centre_px), _finite(led_px)
     radius_px, roll_rad, sigma_px = _finite(radius_px), _finite(roll_rad), _finite(sigma_px)
+    if centre_px is not None:
+        centre_px = np.asarray(centre_px, dtype=float)
+        if centre_px.shape != (2,):
+            raise DockairError("identify.expected_centre_px", expected="an array of shape (2,)", got=centre_px.shape)
+        centre_px = centre_px if camera is None else undistorted_prediction(centre_px[None], camera)[0]
     if led_px is not None:
         led_px = np.asarray(led_px, dtype=float)
         if led_px.shape != (8, 2):
             raise DockairError("identify.expected_led_px", expected="an array of shape (8, 2)", got=led_px.shape)
+        led_px = led_px if camera is None else undistorted_prediction(led_px, camera)
         centre, radius, roll = ring_from_leds(led_px, led_angle_rad)
         centre_px = centre if centre_px is None else centre_px
         radius_px = radius if radius_px is None else radius_px
@@ -144,9 +154,6 @@ def make_prior(
         radius_range_px = (radius_px * (1.0 - radius_tolerance), radius_px * (1.0 + radius_tolerance))
     tolerance = ANYWHERE_PX
     if centre_px is not None:
-        centre_px = np.asarray(centre_px, dtype=float)
-        if centre_px.shape != (2,):
-            raise DockairError("identify.expected_centre_px", expected="an array of shape (2,)", got=centre_px.shape)
         # five sigma, and the two per cent of the radius by which a mean of LEDs and a ring's centre differ
         open_gate = centre_tolerance_radii * radius_range_px[1]
         tolerance = open_gate if sigma_px is None else 5.0 * sigma_px + 0.02 * radius_range_px[1]

@@ -106,13 +106,15 @@ def identify(
     prior = make_prior(
         settings.radius_range_px, settings.centre_tolerance_radii, settings.radius_tolerance,
         expected_centre_px, expected_radius_px, expected_roll_rad, expected_led_px, expected_sigma_px, ring.angles_rad,
+        camera,
     )  # fmt: skip
+    points = undistorted(points, camera)
     index = _candidates(points, prior, flux, settings.max_candidates)
     if len(index) < MIN_LEDS:
         return nothing(IdentificationStatus.NOT_FOUND)
     spread = 0.0 if code.log_brightness is None else float(code.log_brightness.std())
     candidates = Candidates(
-        points=undistorted(points[index], camera), sigma_px=sigma_px,
+        points=points[index], sigma_px=sigma_px,
         brightness=None if brightness is None else brightness_model(flux[index], settings.brightness, spread),
     )  # fmt: skip
     status, fit = _found(candidates, method, prior, camera, settings)
@@ -164,7 +166,7 @@ def _found(
 
 
 def _candidates(points: Array, prior: RingPrior, flux: Array, most: int) -> NDArray[np.int64]:
-    """Indices of the candidates that take part, in reading order: the order they come in does not matter."""
+    """Indices of the candidates, undistorted, that take part, in reading order: how they come does not matter."""
     index = np.flatnonzero((np.abs(points) < ANYWHERE_PX).all(axis=1))  # no frame is so large; false for NaN
     index = index[np.lexsort((flux[index], points[index, 0], points[index, 1]))]
     rank = -flux[index]

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from dockair.calibration import Camera
+from dockair.calibration import Camera, LedRing
 from dockair.errors import DockairError
 from dockair.nav.identify.ring import METHODS, IdentificationStatus, IdentifySettings, identify
 
@@ -167,6 +167,31 @@ def test_a_distorted_camera_gives_the_same_names_and_distorted_predictions(ring_
         assert result.status is FOUND and len(result.members) == 8
         order = np.argsort(result.members)
         np.testing.assert_allclose(result.led_pixels_px[result.led_numbers[order]], seen, atol=0.02)
+
+
+@pytest.mark.parametrize("code", [None, (2.0, 2.0, 1.0, 2.0, 1.0, 1.0, 1.0, 1.0)])
+@pytest.mark.parametrize("at_m", [(4.0, 1.0, 0.35), (10.0, 2.5, 1.0), (20.0, 5.0, -1.9)])
+def test_a_distorted_camera_s_ring_is_found_where_it_is_expected_up_to_the_frame_s_corner(at_m, code):
+    """A barrel by 1.4 % there: the ring's image is off by 11 px, more than the gate about its expected centre."""
+    camera, ring = Camera(distortion=(-0.2, 0.0, 0.0, 0.0, 0.0)), LedRing(brightness=code)
+    seen = camera.pixels_from_points(ring.positions_D + at_m)
+    centre_px = camera.pixels_from_points(np.array(at_m))[0]
+    expected = [
+        {"expected_led_px": seen, "expected_sigma_px": 0.5},
+        {"expected_led_px": seen, "expected_sigma_px": 0.5, "expected_centre_px": centre_px},
+    ]
+    for known in expected:
+        result = identify(seen, camera=camera, ring=ring, brightness=ring.relative_brightness, **known)
+        assert result.status is FOUND
+        np.testing.assert_array_equal(result.led_numbers[np.argsort(result.members)], np.arange(8))
+        np.testing.assert_allclose(result.centre_px, centre_px, atol=0.02)
+
+
+def test_a_ring_expected_where_no_ray_of_the_lens_goes_is_not_found():
+    camera = Camera(distortion=(-0.3, 0.0, 0.0, 0.0, 0.0))
+    seen = camera.pixels_from_points(LedRing().positions_D + [4.0, 0.0, 0.0])
+    result = identify(seen, camera=camera, expected_led_px=seen + [8000.0, 0.0], expected_sigma_px=1.0)
+    assert result.status is NOT_FOUND
 
 
 def test_rows_that_are_not_finite_are_passed_over():
