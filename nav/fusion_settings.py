@@ -86,7 +86,7 @@ class FusionSettings:
     #: LEDs out of the ring's plane and the lens's distortion show as places that change with the view: 0.03 mm in 10 s.
     led_place_walk_m_rts: float = 1e-5
     rate_average_s: float = (
-        0.01  # gyro samples averaged for Eq. (1) of `fusion`: noise against lag, 5 samples at 500 Hz
+        0.01  # gyro samples averaged for Eq. (1) of `fusion`: noise against lag, 5 samples at 500 Hz, 6 by jitter
     )
 
     def __post_init__(self) -> None:

@@ -169,7 +169,8 @@ def _rate_at(times: Array, rates: Array, time_s: float) -> Array:
 def _mean(times: Array, values: Array, start_s: float, end_s: float) -> Array:
     """(3,) mean of the values (k, 3) of samples after a time up to another; NaN of none.
 
-    A stamp that rounding puts beside a limit is on it: in 10 ms five samples at 500 Hz count, and not six.
+    A stamp that rounding puts beside a limit is on it: of even stamps at 500 Hz five count in 10 ms, and not six. Those
+    that jitter by more than a microsecond are taken as they are: where a limit should fall on one, either may be.
     """
     first = int(np.searchsorted(times, start_s + STAMP_RESOLUTION_S, side="right"))
     stop = int(np.searchsorted(times, end_s + STAMP_RESOLUTION_S, side="right"))

@@ -98,7 +98,7 @@ def test_mean_rate_is_of_the_samples_in_the_interval_or_else_the_rate_there():
 
 
 def test_of_a_control_period_as_many_samples_count_at_every_tick():
-    """500 Hz, stamps even to a microsecond as the messages', ticks not: a sixth sample would be 10 ms old."""
+    """500 Hz, stamps even to a microsecond, ticks not: a sixth sample would be 10 ms old."""
     kept = record()
     for k in range(2000):
         kept.take(sample(round(0.002 * k, 6), 0.001 * k))
