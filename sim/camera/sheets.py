@@ -105,7 +105,7 @@ class ExposureParameters:
     dead_band: float
 
     def __post_init__(self) -> None:
-        """Refuse limits that exclude each other or the exposure."""
+        """Refuse limits that exclude each other or the exposure, and steps that the dead band would swallow."""
         if not self.shortest_s < self.longest_s:
             expected = f"less than exposure.longest_s = {self.longest_s} s"
             raise DockairError("exposure.shortest_s", expected=expected, got=self.shortest_s)
@@ -115,6 +115,12 @@ class ExposureParameters:
         if not self.target_level * (1.0 + self.dead_band) < self.clipped_level:
             expected = f"so that with dead_band it stays below exposure.clipped_level = {self.clipped_level}"
             raise DockairError("exposure.target_level", expected=expected, got=self.target_level)
+        if not self.clipped_factor < 1.0 - self.dead_band:
+            expected = f"less than 1 - exposure.dead_band = {1.0 - self.dead_band:g}, or clipped frames change nothing"
+            raise DockairError("exposure.clipped_factor", expected=expected, got=self.clipped_factor)
+        if not self.longest_step > 1.0 + self.dead_band:
+            expected = f"more than 1 + exposure.dead_band = {1.0 + self.dead_band:g}, or dark frames change nothing"
+            raise DockairError("exposure.longest_step", expected=expected, got=self.longest_step)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -193,6 +193,17 @@ def test_the_next_exposure_brings_the_metered_level_to_the_target_counted_from_b
     assert control.step(np.full(SHAPE, level, dtype=np.uint8), 40e-6) == pytest.approx(wanted_s, rel=1e-12)
 
 
+@pytest.mark.parametrize(
+    ("name", "value"), [("clipped_factor", 0.8), ("clipped_factor", 0.7), ("longest_step", 1.2), ("longest_step", 1.3)]
+)
+def test_a_step_that_the_dead_band_would_swallow_is_refused(name: str, value: float) -> None:
+    """Each alone is allowed; together the exposure would stay where frames are clipped, or dark, for good."""
+    assert replace(EXPOSURE, **{name: value}).dead_band == EXPOSURE.dead_band
+    refused = rf"exposure.{name}: expected (less|more) .*dead_band = (0.7|1.3), .*got {value}"
+    with pytest.raises(DockairError, match=refused):
+        replace(EXPOSURE, dead_band=0.3, **{name: value})
+
+
 def test_exposures_and_limits_that_exclude_each_other_are_refused() -> None:
     with pytest.raises(DockairError, match="exposure.shortest_s.*0.0005"):
         replace(EXPOSURE, shortest_s=0.0005)
