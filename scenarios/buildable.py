@@ -17,8 +17,9 @@ from dockair.scenarios.schema import Scenario
 from dockair.sim.basket import require_fit
 from dockair.sim.camera.camera_noise import CameraNoise
 from dockair.sim.camera.defects import Defects
+from dockair.sim.camera.electronics import OUTPUT_BITS, output_black, output_gain
 from dockair.sim.camera.readout import row_time_s, shortest_period_s
-from dockair.sim.camera.sheets import CameraSheets
+from dockair.sim.camera.sheets import CameraSheets, SensorParameters
 from dockair.sim.faults import Faults
 from dockair.sim.hose.chain import DrogueParameters
 from dockair.sim.hose.coupling import CouplingParameters
@@ -41,6 +42,7 @@ def require_buildable(scenario: Scenario) -> None:
     _check_navigator(scenario.navigation.navigator)
     camera, sheets = nominal_camera(scenario), CameraSheets.load(scenario.camera.filter, scenario.parameters)
     _check_camera_rate(scenario.rates.camera_hz, camera, sheets)
+    _check_full_scale(sheets.sensor)
     noise = CameraNoise.of(0)  # nothing is drawn
     Defects(camera, sheets.glare, sheets.exposure, faults, noise.dirt, noise.hot_pixels)
     if scenario.camera.sensing == "measurements":
@@ -84,3 +86,12 @@ def _check_camera_rate(camera_hz: int, camera: Camera, sheets: CameraSheets) -> 
             at_which = f"at which it can still expose for exposure.longest_s = {longest_s} s"
         expected = f"a rate up to {np.floor(10.0 * highest_hz) / 10.0:.1f} Hz, {at_which}"
         raise DockairError("rates.camera_hz", expected=expected, got=camera_hz)
+
+
+def _check_full_scale(sensor: SensorParameters) -> None:
+    """A full well must read full scale: that level is all by which a clipped LED is told from a whole one."""
+    full_scale = 2.0**OUTPUT_BITS - 1.0
+    if output_black(sensor) + output_gain(sensor) * sensor.full_well_e < full_scale:
+        least_e = np.ceil((full_scale - output_black(sensor)) / output_gain(sensor))
+        expected = f"at least {least_e:.0f} e-, which read full scale, by which clipped LEDs are known"
+        raise DockairError("parameters.sensor.full_well_e", expected=expected, got=sensor.full_well_e)

@@ -215,3 +215,20 @@ def test_a_camera_faster_than_its_sensor_can_be_read_is_refused_with_both_rates(
     parts = build(load_scenario("still_air", fast), 0)
     assert parts.camera is not None
     parts.camera.close()
+
+
+@pytest.mark.parametrize(
+    ("changes", "least_e"),
+    [
+        ({"full_well_e": 12000.0}, 13467),
+        ({"conversion_gain_dn_e": 0.07}, 14429),
+        ({"black_level_dn": 0.0}, 13600),
+    ],
+)
+def test_a_sensor_whose_full_well_reads_less_than_full_scale_is_refused(changes, least_e):
+    """Its clipped LEDs would be taken for whole ones: of errors of 0.034 px 0.005 would be stated."""
+    own = {f"parameters.sensor.{key}": value for key, value in changes.items()}
+    with pytest.raises(DockairError, match=rf"parameters.sensor.full_well_e: expected at least {least_e} e-"):
+        require_buildable(load_scenario("still_air", own))
+    require_buildable(load_scenario("truth_navigation", own))
+    require_buildable(load_scenario("still_air", own | {"parameters.sensor.conversion_gain_dn_e": 0.09}))
