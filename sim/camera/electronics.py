@@ -138,6 +138,6 @@ def output_gain(sensor: SensorParameters, bits: int = OUTPUT_BITS) -> float:
 def output_black(sensor: SensorParameters, bits: int = OUTPUT_BITS) -> float:
     """Grey level of no light, of an output of so many bits, before the converter's lowest bits are cut off.
 
-    Cut off, an output of 8 bits reads 3/8 of a level less in the mean, with light and without.
+    Cut off, an output of 8 bits reads 3/8 of a level less in the mean, 15/32 with 12 bits, with light and without.
     """
     return sensor.black_level_dn * 2.0 ** (bits - _STATED_BITS)
