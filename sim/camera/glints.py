@@ -23,14 +23,13 @@ from numpy.typing import NDArray
 from dockair.rotations import Array
 from dockair.sim.camera.curved_mirrors import ellipsoid_spots, rim_spots
 from dockair.sim.camera.facets import facets_that_may_shine
-from dockair.sim.camera.lobes import ROW, SPOT, facet_rows, spot_rows
+from dockair.sim.camera.lobes import MOST_PIECES, ROW, SPOT, facet_rows, spot_rows
 from dockair.sim.camera.mirrors import Mirrors, Vector, finishes, vector
 from dockair.sim.camera.obstacles import Obstacles
 from dockair.sim.camera.occlusion import first_hits, is_clear
 from dockair.sim.camera.round_mirrors import round_spots
 from dockair.sim.camera.sheets import LightParameters, SurfaceParameters
 
-_MOST = 1024  # glints before any is found hidden
 _TINY_M = 1e-300  # keeps a direction finite
 
 
@@ -138,11 +137,11 @@ def glint_rows(
         n += ellipsoid_spots(balls, xpos, xmat, sun, 0.0, eye, spots[n:])
     if mirrors.rim is not None:
         n += rim_spots(mirrors.rim.torus_W(data), mirrors.rim.labels, sun, 0.0, eye, spots[n:])
-    rows = np.empty((_MOST, ROW))
-    count = spot_rows(spots[:n], sun, 0.0, variance, eye, finish, limits, rows, 0)
     poses, facets, s = (xpos, xmat), mirrors.facets, vector(s_W)
     ahead = (0.0, 0.0, 0.0) if ahead_W is None else vector(ahead_W)
     which = facets_that_may_shine(facets, poses, (s, variance), eye, ahead, finish, surfaces.faintest_radiance)
+    rows = np.empty((MOST_PIECES * n + len(which), ROW))  # for all: a streak's pieces, a patch a facet
+    count = spot_rows(spots[:n], sun, 0.0, variance, eye, finish, limits, rows, 0)
     count = facet_rows(facets, which, poses, (s, 0.0, variance), eye, finish, limits, rows, count)
     return rows[: count if ahead_W is None else _keep_ahead(rows, count, eye, ahead)]
 

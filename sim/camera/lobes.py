@@ -38,7 +38,7 @@ SPOT = 23  #: columns: p, n, t1, t2 (3 each), C11 C12 C22, bounds of x1 and of x
 ROW = 11  #: columns: p (3), n (3), A, size, skin, which light, geom
 _SKIN_M = 1e-3  # a ray that starts on a surface starts this far off it
 _STEEPEST = 0.5  # h.n below which no facet of a rough surface stands that way
-_MOST_PIECES = 48  # of a streak: 60 px long in as many points as make it look whole
+MOST_PIECES = 48  #: of a streak: 60 px long in as many points as make it look whole
 _HALF_STREAK = 2.6  # standard deviations of a lobe that is cut; 1 % lies beyond and goes to the ends
 _EVERYWHERE = 1e9  # [m], bounds of surfaces without edges
 _FAINTEST_SHARE = 1e-9  # of a lobe
@@ -102,7 +102,7 @@ def _pieces(spot: Spot, box: Box, lamp: Lamp, limits: Limits, lobe: Lobe, row: A
     half, width = _HALF_STREAK * math.sqrt(lobe[4]), max(math.sqrt(12.0 * lobe[6]), step)
     first, last = max(lobe[2] - half, box[0]), min(lobe[2] + half, box[1])
     streak = math.sqrt(12.0 * lobe[4]) >= 1.5 * width
-    pieces = min(int((last - first) / width + 0.5), _MOST_PIECES) if streak else 1
+    pieces = min(int((last - first) / width + 0.5), MOST_PIECES) if streak else 1
     for k in range(pieces):
         low = box[0] if k == 0 else first + k / pieces * (last - first)
         high = box[1] if k == pieces - 1 else first + (k + 1) / pieces * (last - first)

@@ -125,6 +125,19 @@ def test_what_lies_behind_the_lens_is_left_out_when_its_axis_is_given() -> None:
     assert len(glints_in(world, sun, ahead=unit(-1, 0, 0)).p_W) == 0
 
 
+def test_however_many_tiles_shine_none_is_left_out() -> None:
+    """Eight rough walls side by side, each cut into 144 tiles, and a ball before them that comes last in the scene."""
+    walls = [
+        {"name": f"probe_{k}", "type": _G.mjGEOM_BOX, "pos": [100.0, 6.0 * k - 21.0, 0.0], "size": [0.005, 3.0, 3.0]}
+        for k in range(8)
+    ]
+    ball = metal_sphere([50.0, 0.0, -9.0], 0.5)
+    glints = glints_in(scene_of(*walls, ball), unit(-1, 0, 0), replace(IDEAL, metal_roughness_rad=0.15))
+    x, y, _ = glints.p_W.T
+    assert np.bincount(((y[x > 99.0] + 24.0) // 6.0).astype(int)).tolist() == [144] * 8
+    assert (x < 51.0).sum() == 1
+
+
 def test_materials_go_by_the_names_of_the_scene() -> None:
     names = [
         "tanker_pod",
