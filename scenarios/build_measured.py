@@ -14,7 +14,7 @@ from dockair.nav.navigator import NavigatorSettings
 from dockair.parameters import load_parameters
 from dockair.scenarios.measured_leds import MeasuredLeds, MeasurementParameters, TextureLight
 from dockair.scenarios.mounting_parameters import MountingParameters
-from dockair.scenarios.nominal_sheets import nominal_camera
+from dockair.scenarios.nominal_sheets import nominal_camera, nominal_ring
 from dockair.scenarios.schema import Scenario, load_scenario
 from dockair.sim.as_built import AsBuilt
 from dockair.sim.camera.camera import CameraNoise
@@ -40,7 +40,7 @@ class _Light:
     """What there is to be seen by, of a nominal camera in a scenario."""
 
     surface_e_s: float  #: Y of `measured_leds`: of a pixel on the axis, its surface the mean of a white ball
-    led_e_m2_s: float  #: E: of the spot of an LED on the axis, times its range squared
+    led_e_m2_s: float  #: E: of the spot of the ring's mean LED on the axis, times its range squared
     extinction_1_m: float
 
 
@@ -95,9 +95,10 @@ def _light(scenario: Scenario) -> _Light:
     altitude_m, sun_W, weather = scenario.flight.altitude_m, scenario.sun_W, scenario.weather.as_seen
     response = responses_in_flight(sheets, nominal_camera(scenario), altitude_m, sun_W)  # nominal: alike in all seeds
     sky = SkyRadiance(sheets.sky, weather, sun_W, altitude_m, _SKY_KEY)
+    ring = nominal_ring(scenario)
     return _Light(
         surface_e_s=response.white_e_s * Lighting.toward(scenario.sun.lit_from_W, sky).on_ball(_AFT_W),
-        led_e_m2_s=response.led_e_m2_sr_w_s * led_intensity_w_sr(sheets.leds),
+        led_e_m2_s=response.led_e_m2_sr_w_s * led_intensity_w_sr(sheets.leds) * float(ring.relative_brightness.mean()),
         extinction_1_m=extinction_1_m(weather.visibility_m),
     )
 

@@ -56,6 +56,16 @@ def test_brighter_leds_which_need_less_exposure_leave_less_texture_and_no_other_
     assert brighter.factor * (1.0 / 1.25) ** Q == pytest.approx(1.0 / 1.25, rel=1e-9)
 
 
+@pytest.mark.parametrize("brightness", [(2.0,) * 8, (4.5, *(1.0,) * 6, 5.5)])
+def test_leds_that_the_rings_sheet_makes_brighter_count_as_such_that_their_own_sheet_does(brightness, tmp_path):
+    path = tmp_path / "ring.toml"
+    path.write_text(f"diameter_m = 0.5\ncount = 8\nbrightness = {list(brightness)}\n", encoding="utf-8")
+    twice = 2.0 * CameraSheets.load().leds.drive_current_a
+    assert _light({"hardware.ring": str(path)}).factor == pytest.approx(
+        _light({"parameters.leds.drive_current_a": twice}).factor, rel=1e-9
+    )
+
+
 def test_a_sun_ahead_leaves_the_lee_that_the_camera_sees_darker_than_a_sun_behind():
     behind, ahead = (_light({"sun.azimuth_deg": a, "sun.elevation_deg": 60.0}).factor for a in (180.0, 0.0))
     assert ahead < 0.7 * behind
