@@ -50,6 +50,37 @@ def test_drogue_with_lift_balances_about_the_hoses_end_and_pulls_with_its_whole_
     assert np.sign(rest.p_WH[-1, 2] - neutral.p_WH[-1, 2]) == np.sign(ratio - 1.0)
 
 
+LIFT = {"canopy_area_ratio": 3.0, "canopy_side_coefficient": 0.9, "drag_coefficient": 0.6}
+NO_LIFT = {"canopy_area_ratio": 0.5, "canopy_side_coefficient": 0.3, "drag_coefficient": 1.0}
+LITTLE_DRAG = {"drag_diameter_m": 0.4, "drag_coefficient": 0.6}
+
+
+@pytest.mark.parametrize(
+    ("of_hose", "of_drogue"), [({}, LIFT), ({}, NO_LIFT), ({"links": 4, "length_m": 23.0}, LITTLE_DRAG)]
+)
+@pytest.mark.parametrize("airspeed_m_s", [100.0, 180.0])
+def test_at_the_ends_of_the_sheets_drogue_and_every_link_are_in_balance_too(of_hose, of_drogue, airspeed_m_s):
+    """Plain iteration at 180 and 100 m/s ended 73 degrees off the first drogue's balance, 71 off a long link's."""
+    hose, drogue = (
+        load_parameters("hose", HoseParameters, of_hose),
+        load_parameters("drogue", DrogueParameters, of_drogue),
+    )
+    wind, rho, nu = np.array([-airspeed_m_s, 0.0, 0.0]), 0.66, 2.4e-5
+    rest, k = rest_shape(hose, drogue, wind, rho, nu), load_coefficients(hose, drogue, rho, nu)
+    force, weight = drogue_force(rest.t_D_W, wind, k), np.array([0.0, 0.0, -9.80665 * drogue.mass_kg])
+    to_mass, to_drag = drogue.hose_joint_x_m - drogue.centre_of_mass_x_m, drogue.hose_joint_x_m - drogue.drag_centre_x_m
+    pull = force + weight
+    np.testing.assert_allclose(
+        np.cross(rest.t_D_W, to_mass * weight + to_drag * force) / np.linalg.norm(pull), 0.0, atol=1e-9
+    )
+    for t in rest.t_W[::-1]:
+        load = hose.link_length_m * hose_load_per_length(t, wind, k)
+        load[2] -= 9.80665 * hose.link_mass_kg
+        np.testing.assert_allclose(np.cross(t, pull + 0.5 * load) / np.linalg.norm(pull), 0.0, atol=1e-9)
+        pull = pull + load
+    assert rest.root_tension_n == pytest.approx(np.linalg.norm(pull), rel=1e-9)
+
+
 def test_in_air_that_differs_along_the_hose_every_link_is_in_balance_in_its_own():
     """Side wind that grows toward the drogue: no moment about any front joint, and the root carries all loads."""
     hose, drogue = load_parameters("hose", HoseParameters), load_parameters("drogue", DrogueParameters)
