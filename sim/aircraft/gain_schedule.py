@@ -1,7 +1,9 @@
 """Trims and gains of the flight control between straight flight and turns, level.
 
 They are found where the bank of a level turn, tan(bank) = V r / g, is a multiple of `NODE_RAD`, when first needed, and
-are linear in that bank between; attitudes are roll, pitch and yaw (about z, y, x in turn).
+are linear in that bank between; attitudes are roll, pitch and yaw (about z, y, x in turn). Between the last node that
+the airframe can fly and the next, which thrust or lift do not reach, the line of the cell before is carried on: a turn
+just below that limit still has trim and gains, and so has the little by which a path overshoots it.
 Slopes of the path turn the axes and add their part of the weight to the thrust; the gains are those of level flight.
 """
 
@@ -10,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from dockair.errors import DockairError
 from dockair.rotations import Array
 from dockair.sim.air.atmosphere import STANDARD_GRAVITY_M_S2, Air
 from dockair.sim.aircraft.airframe import AirframeData
@@ -82,6 +85,7 @@ class GainSchedule:
         self._airframe, self._air, self._wanted = airframe, air, wanted
         self._airspeed_m_s = trim.airspeed_m_s
         self._rows: dict[int, Array] = {}
+        self._ends: dict[int, Array] = {}  # outer nodes of cells, flyable or carried on to
         self.model, self.gains, self._rows[0] = self._designed(trim)  #: of straight flight
         self._at, self._row = 0.0, Row.of(self._rows[0])
 
@@ -89,15 +93,32 @@ class GainSchedule:
         """Trim and gains at a turn rate, positive to the left.
 
         Raises:
-            DockairError: the airframe cannot turn that fast.
+            DockairError: the airframe cannot turn as fast as at the last node before.
         """
         if turn_rate_rad_s != self._at:
             place = np.arctan(turn_rate_rad_s * self._airspeed_m_s / STANDARD_GRAVITY_M_S2) / NODE_RAD
             low = int(np.floor(place))
             share = place - low
-            flat = (1.0 - share) * self._node(low) + share * self._node(low + 1) if share else self._node(low)
+            if not share:
+                flat = self._node(low)
+            elif place > 0.0:
+                flat = (1.0 - share) * self._node(low) + share * self._end(low + 1)
+            else:
+                flat = (1.0 - share) * self._end(low) + share * self._node(low + 1)
             self._at, self._row = turn_rate_rad_s, Row.of(flat)
         return self._row
+
+    def _end(self, i: int) -> Array:
+        """Node i, or where it cannot be flown the end of the line through the two before it."""
+        if i not in self._ends:
+            try:
+                self._ends[i] = self._node(i)
+            except DockairError:
+                outward = 1 if i > 0 else -1
+                if i == outward:  # there is but one before it
+                    raise
+                self._ends[i] = 2.0 * self._node(i - outward) - self._node(i - 2 * outward)
+        return self._ends[i]
 
     def _node(self, i: int) -> Array:
         if i not in self._rows:

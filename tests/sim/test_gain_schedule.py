@@ -6,7 +6,7 @@ import pytest
 from dockair.errors import DockairError
 from dockair.parameters import load_parameters
 from dockair.rotations import exp
-from dockair.sim.air.atmosphere import STANDARD_GRAVITY_M_S2, standard_atmosphere
+from dockair.sim.air.atmosphere import STANDARD_GRAVITY_M_S2, Air, standard_atmosphere
 from dockair.sim.aircraft.aerodynamics import AirframeParameters
 from dockair.sim.aircraft.flight_control import FlightControlParameters
 from dockair.sim.aircraft.gain_schedule import NODE_RAD, Design, GainSchedule, roll_pitch_yaw
@@ -17,8 +17,7 @@ PARAMETERS = load_parameters("flight_control", FlightControlParameters)
 AIR = standard_atmosphere(6000.0)
 
 
-@pytest.fixture(scope="module")
-def schedule() -> GainSchedule:
+def _schedule(airspeed_m_s: float, air: Air) -> GainSchedule:
     wanted = Design(
         point_B=np.array([6.0, -0.9, 0.6]),
         feedback=PARAMETERS.tolerances,
@@ -27,7 +26,12 @@ def schedule() -> GainSchedule:
         gust_1_s=0.34,
         swing=PARAMETERS.swing,
     )
-    return GainSchedule(AIRFRAME, AIR, level_trim(AIRFRAME, 180.0, AIR), wanted)
+    return GainSchedule(AIRFRAME, air, level_trim(AIRFRAME, airspeed_m_s, air), wanted)
+
+
+@pytest.fixture(scope="module")
+def schedule() -> GainSchedule:
+    return _schedule(180.0, AIR)
 
 
 def test_roll_pitch_yaw_are_the_angles_of_three_rotations() -> None:
@@ -65,6 +69,19 @@ def test_gains_are_continuous_across_a_node(schedule: GainSchedule) -> None:
     rate = STANDARD_GRAVITY_M_S2 * np.tan(NODE_RAD) / 180.0
     below, above = schedule.at(rate * (1.0 - 1e-9)).K, schedule.at(rate * (1.0 + 1e-9)).K
     np.testing.assert_allclose(below, above, atol=1e-6 * np.abs(below).max())
+
+
+@pytest.mark.parametrize("bank_deg", [30.5, -33.0])
+def test_a_turn_that_can_be_flown_has_a_trim_though_the_next_node_has_none(bank_deg: float) -> None:
+    """At 200 m/s and 12 km military thrust bears 34.5 degrees of bank and not 35: the line from 25 and 30 goes on."""
+    thin, rate = standard_atmosphere(12000.0), STANDARD_GRAVITY_M_S2 * np.tan(np.radians(bank_deg)) / 200.0
+    schedule = _schedule(200.0, thin)
+    row, turn = schedule.at(rate), steady_trim(AIRFRAME, 200.0, thin, turn_rate_rad_s=rate)
+    assert row.trim[0] == pytest.approx(turn.bank_rad, abs=np.radians(0.01))
+    np.testing.assert_allclose(row.trim[6:9], turn.surfaces_rad, atol=np.radians(0.03))
+    assert row.trim[9] * AIRFRAME.mass_kg == pytest.approx(turn.thrust_n, rel=0.015)
+    with pytest.raises(DockairError, match="turning at"):
+        schedule.at(1.3 * rate)
 
 
 def test_turn_without_a_trim_is_refused(schedule: GainSchedule) -> None:
