@@ -18,7 +18,12 @@ v_b of speed, and the drum's damping d act on all that the reel moves; Eq. (1) w
 
     (F_b/v_b + d) dt < 2 m,      m = drum + hose + drogue                                                (4)
 
-Not modelled: the damping of hinges, which is implicit, and that of the air, which is explicit but slower.
+The air damps the drogue's turning and its motion across, explicitly, which a wide and light one feels most: with J_w
+and J_v the Jacobians of its turning and of its canopy's motion across by the hinges, the coefficients of `hose.loads`,
+
+    max eig(M^-1 C) dt < 2,      C = 1/2 rho V (S d^2 C_q J_w'J_w + S_c C_S J_v'J_v)                     (5)
+
+Not modelled: the damping of hinges, which is implicit, and that of the air on the hose, which is explicit but slower.
 Source: Hairer, Lubich & Wanner, Geometric Numerical Integration, ch. I; MuJoCo's documentation on solver parameters;
 Eqs. (2) and (3) derived from the chain's kinetic and potential energy in that motion.
 """
@@ -28,6 +33,7 @@ import numpy as np
 from scipy.linalg import eigh
 
 from dockair.errors import DockairError
+from dockair.rotations import Array
 from dockair.sim.parts import WorldParameters
 
 _STEPS_IN_CONTACT = 2
@@ -49,6 +55,7 @@ def check_step(model: mujoco.MjModel, parameters: WorldParameters, root_tension_
     needed_hz = {key: _STEPS_IN_CONTACT / softest[key]}
     needed_hz["hose and reel"] = lowest_rate_hz(model, parameters, root_tension_n)
     needed_hz["parameters.reel.brake_force_n over speed_band_m_s"] = lowest_rate_of_brake_hz(parameters)
+    needed_hz["parameters.drogue.rate_damping_coefficient and inertia_kg_m2"] = lowest_rate_in_air_hz(model, parameters)
     cause = max(needed_hz, key=lambda name: needed_hz[name])
     if step_s * needed_hz[cause] > 1.0 + 1e-9:  # rounding of a step that just fits
         lowest = int(np.ceil(needed_hz[cause] - 1e-9))
@@ -59,14 +66,9 @@ def check_step(model: mujoco.MjModel, parameters: WorldParameters, root_tension_
 def lowest_rate_hz(model: mujoco.MjModel, parameters: WorldParameters, root_tension_n: float) -> float:
     """Physics rate at which Eq. (1) is just met, with hose in the tube."""
     hose, reel = parameters.hose, parameters.reel
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
-    M = np.zeros((model.nv, model.nv))
-    mujoco.mj_fullM(model, data, M)
-    first, last = model.joint("hose_0_y").dofadr[0], model.joint("drogue_z").dofadr[0]
-    hinges = slice(first, last + 1)
+    hinges, M, _ = _chain(model)
     stiffness = np.array([model.jnt_stiffness[j].ravel()[0] for j in model.dof_jntid[hinges]])
-    bending = eigh(np.diag(stiffness), M[hinges, hinges], eigvals_only=True)[-1]
+    bending = eigh(np.diag(stiffness), M, eigvals_only=True)[-1]
     string = 12.0 * root_tension_n / (hose.link_mass_kg * hose.link_length_m)
     tube = reel.guide_stiffness_n_m2 / hose.line_density_kg_m
     squared = bending + string + 15.0 * tube  # Eq. (2)
@@ -79,3 +81,27 @@ def lowest_rate_of_brake_hz(parameters: WorldParameters) -> float:
     hose, reel = parameters.hose, parameters.reel
     moved_kg = reel.drum_mass_kg + hose.line_density_kg_m * hose.length_m + parameters.drogue.mass_kg
     return float(0.5 * (reel.brake_force_n / reel.speed_band_m_s + reel.drum_damping_n_s_m) / moved_kg)
+
+
+def lowest_rate_in_air_hz(model: mujoco.MjModel, parameters: WorldParameters) -> float:
+    """Physics rate at which Eq. (5) is just met."""
+    p, drogue, body = parameters, parameters.drogue, model.body("drogue").id
+    hinges, M, data = _chain(model)
+    across, turning = np.zeros((2, 3, model.nv))
+    canopy = data.xpos[body] + drogue.drag_centre_x_m * data.xmat[body].reshape(3, 3)[:, 0]
+    mujoco.mj_jac(model, data, across, turning, canopy, body)
+    J_v, J_w = across[1:, hinges], turning[:, hinges]
+    against_turning = drogue.drag_area_m2 * drogue.drag_diameter_m**2 * drogue.rate_damping_coefficient
+    sideways = drogue.canopy_area_m2 * drogue.canopy_side_coefficient
+    C = 0.5 * p.air.density_kg_m3 * p.airspeed_m_s * (against_turning * J_w.T @ J_w + sideways * J_v.T @ J_v)
+    return float(0.5 * eigh(C, M, eigvals_only=True)[-1])
+
+
+def _chain(model: mujoco.MjModel) -> tuple[slice, Array, mujoco.MjData]:
+    """Return the hinges among the degrees of freedom, their mass matrix where all is straight, and that state."""
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    M = np.zeros((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, M)
+    hinges = slice(model.joint("hose_0_y").dofadr[0], model.joint("drogue_z").dofadr[0] + 1)
+    return hinges, M[hinges, hinges], data

@@ -8,7 +8,7 @@ from dockair.errors import DockairError
 from dockair.messages import ReceiverCommand
 from dockair.parameters import load_parameters
 from dockair.sim.hose.reel import Reel, ReelParameters
-from dockair.sim.step_limit import lowest_rate_hz, lowest_rate_of_brake_hz
+from dockair.sim.step_limit import lowest_rate_hz, lowest_rate_in_air_hz, lowest_rate_of_brake_hz
 
 
 def test_step_longer_than_half_a_contact_is_refused_with_its_key(make_world):
@@ -49,6 +49,28 @@ def test_below_the_brakes_rate_a_hose_that_runs_out_chatters_and_above_it_does_n
         rate_m_s += step_s * (reel.step(1726.0, 6.0, rate_m_s) - 3452.0) / moved_kg
         last.append(rate_m_s)
     assert (np.ptp(last[-200:]) < 1e-6) == settles
+
+
+WIDE_AND_LIGHT = {"rate_damping_coefficient": 20.0, "drag_diameter_m": 0.81, "inertia_kg_m2": [0.05, 0.05, 0.05]}
+
+
+def test_step_too_long_for_the_air_about_the_drogue_is_refused_with_its_keys(make_world):
+    keys = r"parameters\.drogue\.rate_damping_coefficient and inertia_kg_m2"
+    with pytest.raises(DockairError, match=rf"rates\.physics_hz: expected at least 1773 Hz, because of {keys}"):
+        make_world(rate_hz=1000, drogue=WIDE_AND_LIGHT)
+
+
+@pytest.mark.parametrize(("share", "stays"), [(1.05, True), (0.95, False)])
+def test_below_the_airs_rate_a_drogue_shakes_itself_apart_and_above_it_rests(make_world, monkeypatch, share, stays):
+    monkeypatch.setattr(dockair.sim.world, "check_step", lambda *_: None)
+    world = make_world(drogue=WIDE_AND_LIGHT)
+    rate_hz = round(share * lowest_rate_in_air_hz(world.model, world.parameters))
+    world = make_world(p_PD_B=(60.0, 0.0, 0.0), rate_hz=rate_hz, drogue=WIDE_AND_LIGHT)
+    try:
+        turning_rad_s = [np.abs(world.step(ReceiverCommand()).w_WD_D).max() for _ in range(rate_hz)]
+    except DockairError:
+        turning_rad_s = [np.inf]
+    assert (turning_rad_s[-1] < 1e-3) == stays
 
 
 def test_bound_grows_with_stiffness_with_damping_and_with_the_number_of_links(make_world):
