@@ -13,10 +13,13 @@ its joints go up and down by turns: then each joint moves m/3, and the tow is bo
 bending (M, K: mass and hinge stiffness of the chain), tension T, and the tube in the pod, which holds each joint by
 k_g, its stiffness times l, with a damping ratio z_g, and turns each link by k_g l^2 (`hose.reel.guide_loads`). It is
 the bound of an endless chain in the tube: whatever length of hose is wound in, it holds. Contacts and stops as soft
-springs need two steps in their time constant, or MuJoCo makes them softer in silence. The reel's brake, F_b over a band
-v_b of speed, and the drum's damping d act on all that the reel moves; Eq. (1) without a spring,
+springs need two steps in their time constant, or MuJoCo makes them softer in silence. The reel's brake and its motor, a
+force F that comes in or falls off over a band v_b of speed, and the drum's damping d act on all that the reel moves;
+Eq. (1) without a spring,
 
-    (F_b/v_b + d) dt < 2 m,      m = drum + hose + drogue                                                (4)
+    (F/v_b + d) dt < 2 m,      m = drum + hose + drogue                                                  (4)
+
+where F is the brake's, or what the motor pulls a slack hose with, (1 + k) f T at most (`hose.reel`).
 
 The air damps the drogue's turning and its motion across, explicitly, which a wide and light one feels most: with J_w
 and J_v the Jacobians of its turning and of its canopy's motion across by the hinges, the coefficients of `hose.loads`,
@@ -54,7 +57,9 @@ def check_step(model: mujoco.MjModel, parameters: WorldParameters, root_tension_
     key = min(softest, key=lambda name: softest[name])
     needed_hz = {key: _STEPS_IN_CONTACT / softest[key]}
     needed_hz["hose and reel"] = lowest_rate_hz(model, parameters, root_tension_n)
-    needed_hz["parameters.reel.brake_force_n over speed_band_m_s"] = lowest_rate_of_brake_hz(parameters)
+    slack_n = (1.0 + p.reel.tension_gain) * p.reel.set_point_fraction * root_tension_n
+    for name, force_n in (("brake_force_n", p.reel.brake_force_n), ("tension_gain", slack_n)):
+        needed_hz[f"parameters.reel.{name} over speed_band_m_s"] = lowest_rate_of_reel_hz(p, force_n)
     needed_hz["parameters.drogue.rate_damping_coefficient and inertia_kg_m2"] = lowest_rate_in_air_hz(model, parameters)
     cause = max(needed_hz, key=lambda name: needed_hz[name])
     if step_s * needed_hz[cause] > 1.0 + 1e-9:  # rounding of a step that just fits
@@ -76,11 +81,11 @@ def lowest_rate_hz(model: mujoco.MjModel, parameters: WorldParameters, root_tens
     return float(0.25 * (damping + np.sqrt(damping**2 + 4.0 * squared)))
 
 
-def lowest_rate_of_brake_hz(parameters: WorldParameters) -> float:
-    """Physics rate at which Eq. (4) is just met."""
+def lowest_rate_of_reel_hz(parameters: WorldParameters, force_n: float) -> float:
+    """Physics rate at which Eq. (4) is just met with a force of the brake or the motor."""
     hose, reel = parameters.hose, parameters.reel
     moved_kg = reel.drum_mass_kg + hose.line_density_kg_m * hose.length_m + parameters.drogue.mass_kg
-    return float(0.5 * (reel.brake_force_n / reel.speed_band_m_s + reel.drum_damping_n_s_m) / moved_kg)
+    return float(0.5 * (force_n / reel.speed_band_m_s + reel.drum_damping_n_s_m) / moved_kg)
 
 
 def lowest_rate_in_air_hz(model: mujoco.MjModel, parameters: WorldParameters) -> float:

@@ -8,7 +8,7 @@ from dockair.errors import DockairError
 from dockair.messages import ReceiverCommand
 from dockair.parameters import load_parameters
 from dockair.sim.hose.reel import Reel, ReelParameters
-from dockair.sim.step_limit import lowest_rate_hz, lowest_rate_in_air_hz, lowest_rate_of_brake_hz
+from dockair.sim.step_limit import lowest_rate_hz, lowest_rate_in_air_hz, lowest_rate_of_reel_hz
 
 
 def test_step_longer_than_half_a_contact_is_refused_with_its_key(make_world):
@@ -42,13 +42,37 @@ def test_below_the_brakes_rate_a_hose_that_runs_out_chatters_and_above_it_does_n
     """One mass, pulled out by twice the set-point, under the reel's own law."""
     world = make_world(rate_hz=1200, reel=HARD_BRAKE)
     p, sheet = world.parameters, load_parameters("reel", ReelParameters, HARD_BRAKE)
-    step_s, rate_m_s, last = 1.0 / (share * lowest_rate_of_brake_hz(p)), 0.0, []
+    step_s, rate_m_s, last = 1.0 / (share * lowest_rate_of_reel_hz(p, sheet.brake_force_n)), 0.0, []
     moved_kg = sheet.drum_mass_kg + p.hose.length_m * p.hose.line_density_kg_m + p.drogue.mass_kg
     reel = Reel(sheet, static_root_tension_n=1918.0, static_pull_n=1876.0, set_point_n=1726.0, step_s=step_s)
     for _ in range(4000):
         rate_m_s += step_s * (reel.step(1726.0, 6.0, rate_m_s) - 3452.0) / moved_kg
         last.append(rate_m_s)
     assert (np.ptp(last[-200:]) < 1e-6) == settles
+
+
+QUICK_MOTOR = {"tension_gain": 2.0, "speed_band_m_s": 0.1, "drum_mass_kg": 10.0, "drum_damping_n_s_m": 0.0}
+
+
+def test_step_too_long_for_the_reels_motor_is_refused_with_its_keys(make_world):
+    keys = r"parameters\.reel\.tension_gain over speed_band_m_s"
+    heavy_drag = {"drag_diameter_m": 0.81, "drag_coefficient": 1.0}
+    with pytest.raises(DockairError, match=rf"rates\.physics_hz: expected at least \d+ Hz, because of {keys}"):
+        make_world(rate_hz=1000, airspeed_m_s=250.0, altitude_m=0.0, reel=QUICK_MOTOR, drogue=heavy_drag)
+
+
+@pytest.mark.parametrize(("share", "settles"), [(1.02, True), (0.98, False)])
+def test_below_the_motors_rate_a_slack_hose_comes_in_chattering_and_above_it_does_not(make_world, share, settles):
+    """One mass whose hose bears nothing, braked by the set-point's force, drawn in as fast as the reel takes it up."""
+    world = make_world(rate_hz=1200, reel=QUICK_MOTOR)
+    p, sheet = world.parameters, load_parameters("reel", ReelParameters, QUICK_MOTOR)
+    moved_kg = sheet.drum_mass_kg + p.hose.length_m * p.hose.line_density_kg_m + p.drogue.mass_kg
+    step_s = 1.0 / (share * lowest_rate_of_reel_hz(p, (1.0 + sheet.tension_gain) * 1726.0))
+    reel = Reel(sheet, static_root_tension_n=1918.0, static_pull_n=1876.0, set_point_n=1726.0, step_s=step_s)
+    rates_m_s = [0.95 * sheet.take_up_speed_m_s]
+    for _ in range(4000):
+        rates_m_s.append(rates_m_s[-1] + step_s * (reel.step(0.0, 6.0, rates_m_s[-1]) - 1726.0) / moved_kg)
+    assert (np.ptp(rates_m_s[-200:]) < 1e-6) == settles
 
 
 WIDE_AND_LIGHT = {"rate_damping_coefficient": 20.0, "drag_diameter_m": 0.81, "inertia_kg_m2": [0.05, 0.05, 0.05]}
