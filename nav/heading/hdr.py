@@ -12,8 +12,8 @@ source prints the loop one way and draws it another; `loop` chooses:
 
 The source prints none of its constants. The defaults are those of a search over (tau, i_c, c_1, c_2) on a drift of 16
 degrees in 85 s, straight and on two laps of an oval, with white noise of 0.05 to 0.5 deg/s: of the printed loop they
-leave 0.033 degrees at most on the straight (400 runs) and read 593 to 626 of the oval's 720 degrees. No closed loop
-tried kept the straight below 0.06 degrees over all that noise.
+leave 0.033 degrees at most on the straight (400 runs) and read 575 to 632 of the oval's 720 degrees (800 runs, half to
+each side). No closed loop tried kept the straight below 0.06 degrees over all that noise.
 
 What it cannot do: tell a slow steady turn from drift. It takes turns for drift and loses part of them (`vdr` does not).
 Sources: [Kyung et al. 2015, eqs 1, 2]; Borenstein & Ojeda, Heuristic Reduction of Gyro Drift, IEEE PLANS 2010 (3).
