@@ -20,7 +20,7 @@ from dockair.nav.pose.difference import pose_difference
 from dockair.nav.pose.estimate import PoseOptions, PoseStatus, solve_pose
 from dockair.nav.pose.measurement import lines_of_sight_from_pixels
 from dockair.nav.pose.prior import AttitudePrior, DirectionPrior, PosePrior
-from dockair.rotations import Array, exp, log
+from dockair.rotations import Array, exp, log, skew
 
 RING, CAMERA, SIGMA_PX = LedRing().positions_D, Camera(), 0.1
 PROBABILITY = st.floats(1e-6, 0.3)
@@ -115,6 +115,22 @@ def test_slopes_are_the_worst_of_all_directions_of_a_fault_that_was_solved(range
             moved = [abs(step[3]), np.hypot(*step[4:]), np.linalg.norm(step[:3])]
             worst = np.maximum(worst, np.array(moved) / np.sqrt(end.chi2))
         np.testing.assert_allclose(slopes[led], worst, rtol=0.01)
+
+
+@pytest.mark.parametrize("seen", [2, 3])
+def test_a_fault_that_no_other_led_would_show_has_no_end_of_a_slope_and_no_local_test(seen):
+    """Of three LEDs none is redundant; of two, with the attitude known, each in one direction only."""
+    points, (R, p) = RING[:seen], pose_at(5.0, 15.0)
+    sight = lines_of_sight_from_pixels(pixels_at(R, p, seed=1, points=points), points, CAMERA, np.full(seen, SIGMA_PX))
+    information = np.zeros((6, 6))
+    for q, W in zip(points @ R.T, sight.weights, strict=True):
+        h, length = (q + p) / np.linalg.norm(q + p), np.linalg.norm(q + p)
+        J = (np.eye(3) - np.outer(h, h)) @ np.hstack([-skew(q), np.eye(3)]) / length
+        information += J.T @ W @ J
+    covariance, known = np.zeros((6, 6)), 3 * (seen == 2)
+    covariance[known:, known:] = np.linalg.inv(information[known:, known:])
+    found = sensitivity(sight, R, p, covariance)
+    assert np.isinf(found.slopes).all() and not found.local_chi2.any()
 
 
 @pytest.mark.parametrize(("range_m", "seen"), [(3.0, 8), (7.0, 8), (7.0, 5)])
