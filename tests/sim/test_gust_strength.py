@@ -21,6 +21,21 @@ def test_strengths_at_20000_feet_are_those_of_the_specification() -> None:
     assert gust_sigma("light", 7500.0 * 0.3048) == pytest.approx(6.7 * 0.3048, rel=1e-12)
 
 
+@pytest.mark.parametrize(
+    ("intensity", "feet_s"),
+    [
+        ("light", (7.4, 6.7, 4.6, 2.7, 0.4, 0.0, 0.0, 0.0, 0.0, 0.0)),
+        ("moderate", (10.6, 10.1, 8.0, 6.6, 5.0, 4.2, 2.7, 0.0, 0.0, 0.0)),
+        ("severe", (23.0, 23.6, 22.1, 20.0, 16.0, 15.1, 12.1, 7.9, 6.2, 5.1)),
+    ],
+)
+def test_strengths_are_those_of_figure_7_as_jsbsim_prints_it(intensity: str, feet_s: tuple[float, ...]) -> None:
+    """Curves 3, 4 and 6 of its table of the probability of exceedance, in ft/s from 3750 ft on."""
+    altitudes_ft = (3750, 7500, 15000, 25000, 35000, 45000, 55000, 65000, 75000, 80000)
+    ours = [gust_sigma(intensity, 0.3048 * feet) / 0.3048 for feet in altitudes_ft]
+    assert ours == pytest.approx(feet_s, abs=1e-9)
+
+
 def test_severe_gusts_are_stronger_than_moderate_and_these_than_light_and_all_fade_above_7500_feet() -> None:
     """As the specification's curves: a wrong figure in the table would stand out from its neighbours."""
     columns = [500.0 * 0.3048 * k for k in range(4, 161)]

@@ -167,6 +167,40 @@ def test_step_from_knot_to_knot_keeps_the_stationary_covariance_of_the_forming_f
         np.testing.assert_allclose(G @ G.T, small, rtol=4.0 * distance)
 
 
+class OneNoise:
+    """Draws nothing but one of the six noises between the first two knots."""
+
+    def __init__(self, which: int) -> None:
+        self._which, self._drawn = which, 0
+
+    def standard_normal(self, size: int | tuple[int, int]) -> np.ndarray:
+        drawn, self._drawn = np.zeros(size), self._drawn + 1
+        if self._drawn == 2:  # the first are those of the start
+            drawn[0, self._which] = 1.0
+        return drawn
+
+
+def test_noise_between_two_knots_runs_on_through_the_forming_filters_and_through_no_others() -> None:
+    """Products of what all six noises leave at all knots after: Phi by expm, P by Lyapunov's equation."""
+    count, span, d = 12, 200.0, 0.3
+    x, dp = d * L * (np.arange(count + 1) - count), d * L * np.pi / (4.0 * span)
+    size = parameters(knot_spacing_m=d * L, front_m=0.0, extent_m=count * d * L)
+    made = np.empty((6, count + 1, 4))
+    for which in range(6):
+        field = DrydenField(size, V, 1e-3, OneNoise(which), span)  # type: ignore[arg-type]
+        made[which, :, :3], made[which, :, 3] = field.velocity(x), [field.rolling(place) for place in x]
+    A, B = np.array([[0.0, 1.0], [-1.0, -2.0]]), np.array([[0.0], [1.0]])
+    P, Phi = solve_continuous_lyapunov(A, -B @ B.T), expm(A * d)
+    G, out, k = np.linalg.cholesky(P - Phi @ P @ Phi.T), SIGMA * np.array([1.0, np.sqrt(3.0)]), np.arange(count)
+    v = np.array([out @ np.linalg.matrix_power(Phi, n) @ G for n in k])
+    u = SIGMA * np.sqrt(1.0 - np.exp(-2.0 * d)) * np.exp(-d * k)[:, None]
+    p = rolling_sigma(SIGMA, L, span) * np.sqrt(1.0 - np.exp(-2.0 * dp)) * np.exp(-dp * k)[:, None]
+    expected = np.zeros((count + 1, 4, count + 1, 4))
+    for axis, left in enumerate((u, v, v, p)):
+        expected[1:, axis, 1:, axis] = left @ left.T
+    np.testing.assert_allclose(np.einsum("nka,nlb->kalb", made, made), expected, rtol=0.0, atol=1e-12)
+
+
 def test_straight_lines_between_knots_lose_what_the_page_says_and_less_than_three_per_mille_with_the_sheet() -> None:
     """At a share s of the way the variance is (1-s)^2 + s^2 + 2 s (1-s) R(h) of the knots'."""
     h = load_parameters("turbulence", TurbulenceParameters).knot_spacing_m
