@@ -125,6 +125,17 @@ def test_the_tailplanes_core_is_in_proportion_to_its_own_span() -> None:
     assert tail[0, 0] == pytest.approx(-bound, rel=1e-9)
 
 
+def test_the_tailplanes_core_grows_with_the_strength_of_its_vortex_whichever_way_it_turns() -> None:
+    """One leg nearly alone: the other is 400 m away."""
+    wide = replace(SHEET, core_fraction=1e-12, core_growth=0.06, tail_vortex_span_m=400.0)
+    (x, _, z), r, behind = SHEET.tail_bound_m, 0.4, 0.19 * V
+    strength = -SHEET.tail_circulation_fraction * gamma(wide)
+    swirl = wake_velocity(np.array([[x - behind, 200.0, z + r]]), table(wide)[-1:])[0, 1]
+    whole = strength / (4.0 * np.pi) * (1.0 + behind / np.hypot(behind, r))
+    core = np.sqrt(whole * r / swirl - r * r)
+    assert core == pytest.approx(2.24 * np.sqrt(0.06 * strength * 0.19), rel=2e-3)
+
+
 def _biot_savart(point: np.ndarray, half: float) -> np.ndarray:
     """Velocity of a singular horseshoe of circulation 1 by quadrature: in along the left leg, out along the right."""
 
