@@ -27,6 +27,7 @@ READY, LATCHED, BARRED = CouplingState.READY, CouplingState.LATCHED, CouplingSta
     [
         (READY, SEATED, LATCHED),
         (READY, replace(SEATED, distance_m=COUPLING.capture_distance_m + 1e-6), READY),
+        (READY, replace(SEATED, distance_m=COUPLING.capture_distance_m + 1e-6, closing_speed_m_s=9.0), READY),
         (READY, replace(SEATED, angle_rad=COUPLING.angle_limit_rad + 1e-6), READY),
         (READY, replace(SEATED, closing_speed_m_s=COUPLING.closing_speed_min_m_s + 1e-6), LATCHED),
         (READY, replace(SEATED, closing_speed_m_s=COUPLING.closing_speed_min_m_s - 1e-6), READY),
@@ -207,3 +208,10 @@ def test_closing_speed_is_the_rate_at_which_the_tip_moves_along_the_turning_drog
     seat_W = now.p_WD + now.R_WD @ [COUPLING.depth_m, 0.0, 0.0]
     assert probe.distance_m == pytest.approx(np.linalg.norm(now.p_WP - seat_W))
     assert probe.angle_rad == pytest.approx(np.arccos(now.R_WD[0, 0]))  # the probe's axis is W's x
+
+
+def test_axes_that_are_the_same_but_for_rounding_are_at_no_angle(make_world):
+    """Of a column a little longer than 1."""
+    turns = (exp(np.array([0.1 * k, 0.2, -0.3])) for k in range(1000))
+    R = next(R for R in turns if R[:, 0] @ R[:, 0] > 1.0)
+    assert probe_in_coupling(replace(make_world().truth, R_WB=R, R_WD=R), 0.0, COUPLING).angle_rad == 0.0
