@@ -9,6 +9,7 @@ import pytest
 from dockair.errors import DockairError
 from dockair.messages import ReceiverCommand
 from dockair.parameters import load_parameters
+from dockair.rotations import exp
 from dockair.sim.aircraft.flight_control import FlightControlParameters
 from dockair.sim.aircraft.reference import Reference
 
@@ -56,6 +57,32 @@ def test_reference_shortens_a_command_beyond_the_velocity_limit() -> None:
     chain = fly_reference(lambda t: command, 10.0)
     assert chain[-1, 0, 1] == pytest.approx(PARAMETERS.velocity_limit_m_s, rel=1e-3)
     assert chain[:, 0, 1].max() < 1.02 * PARAMETERS.velocity_limit_m_s
+
+
+def test_a_command_in_turned_axes_is_the_one_that_points_the_same_way() -> None:
+    R, rng = exp(np.array([0.2, -0.3, 0.9])), np.random.default_rng(3)
+    u, a = rng.normal(size=(2, 3))
+    turned, straight = (Reference(PARAMETERS.reference_limits, 1e-3) for _ in range(2))
+    body, level = (ReceiverCommand(velocity_m_s=Q @ u, acceleration_m_s2=Q @ a) for Q in (np.eye(3), R))
+    turned.start(np.zeros(3), R, body)
+    straight.start(np.zeros(3), np.eye(3), level)
+    for _ in range(500):
+        np.testing.assert_allclose(turned.step(R, body), straight.step(np.eye(3), level), rtol=0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("longer", [0.5, 3.0])
+def test_a_reference_that_starts_at_its_command_stays_there(longer: float) -> None:
+    """Turned to the command's axes, and shortened to the velocity limit if it is longer."""
+    R, toward, limit = exp(np.array([0.2, -0.3, 0.9])), np.array([0.6, -0.64, 0.48]), PARAMETERS.velocity_limit_m_s
+    command, reference = (
+        ReceiverCommand(velocity_m_s=longer * limit * toward),
+        Reference(PARAMETERS.reference_limits, 1e-3),
+    )
+    start = min(longer, 1.0) * limit * R @ toward
+    reference.start(start, R, command)
+    for _ in range(300):
+        chain = reference.step(R, command)
+    np.testing.assert_allclose(chain, [start, np.zeros(3), np.zeros(3), np.zeros(3)], rtol=0.0, atol=1e-9)
 
 
 @pytest.mark.parametrize(("share", "left"), [(0.5, 1.0), (1.5, 0.5), (2.5, 0.0)])
