@@ -151,15 +151,19 @@ def test_beyond_a_distorted_field_the_suns_image_moves_on_as_a_pinholes() -> Non
     assert places[0] - places[1] == pytest.approx([way, 0.0], abs=0.1)
 
 
-def test_outside_the_field_the_hood_cuts_it_to_1_over_e_in_its_angle() -> None:
-    glare = _glare(**(ALONE | {"veiling_glare": 0.01, "iris_blades": 0}))
-    edge = np.arctan((2047.0 - 1023.5) / STRAIGHT.focal_length_px)
+@pytest.mark.parametrize(
+    ("side", "edge_px"), [((-1.0, 0.0), 1023.5), ((1.0, 0.0), 1023.5), ((0.0, -1.0), 543.5), ((0.0, 1.0), 543.5)]
+)
+def test_outside_the_field_the_hood_cuts_it_to_1_over_e_in_its_angle(side: tuple[float, float], edge_px: float) -> None:
+    glare, bare = (_glare(**(ALONE | {"veiling_glare": share, "iris_blades": 0})) for share in (0.01, 0.0))
+    edge = np.arctan(edge_px / STRAIGHT.focal_length_px)
 
-    def far_corner(angle: float) -> float:
-        return float(_stray(glare, np.array([np.cos(angle), -np.sin(angle), 0.0]))[0, 0])
+    def veil(angle: float) -> float:
+        sun_C = np.array([np.cos(angle), *np.sin(angle) * np.array(side)])
+        return float(np.median(_stray(glare, sun_C) - _stray(bare, sun_C)))
 
     foreshortening = np.cos(edge + PARAMETERS.veiling_decay_rad) / np.cos(edge)
-    ratio = far_corner(edge + PARAMETERS.veiling_decay_rad) / far_corner(edge - 1e-6)
+    ratio = veil(edge + PARAMETERS.veiling_decay_rad) / veil(edge - 1e-6)
     assert ratio == pytest.approx(np.exp(-1.0) * foreshortening, rel=2e-3)
 
 
@@ -232,6 +236,25 @@ def test_a_round_iris_has_no_spikes_and_loses_no_light_by_it() -> None:
     nodes = _stray(glare, _toward((1024.0, 544.0)))
     ring = [nodes[68 + i, 128 + j] for i, j in ((30, 40), (-40, 30), (50, 0), (0, -50), (-30, -40))]
     assert ring == pytest.approx([ring[0]] * 5, rel=1e-5)
+
+
+def test_a_round_irises_wing_is_the_airy_patterns_tail() -> None:
+    """Beyond r a point has 2 lambda N/(pi^2 r) [Born & Wolf 8.5.2]; 37 radii of the Sun's image out so has the Sun."""
+    glare, sun_C = _glare(**(ALONE | {"iris_blades": 0})), _toward((700.0, 400.0))
+    Q, nodes = 2.0 * 870e-9 * 8.0 / (np.pi**2 * 5.5e-6), _stray(glare, sun_C)
+    v, u = 8.0 * np.indices(nodes.shape)
+    r = np.hypot(u - 700.0, v - 400.0)
+    law = Q / (2.0 * np.pi * r**3) * FLUX_E_S * EXPOSURE_S * sun_C[0]
+    assert np.allclose(nodes[r > 500.0], law[r > 500.0], rtol=1e-3)
+
+
+def test_a_ghost_is_as_large_as_the_defocused_pupil_or_as_the_suns_image_in_it() -> None:
+    """A cone of f/2.8 is, from its axis, 1/5.6 as wide as it is long."""
+    told = _glare(f_number=2.8).compact_ghosts(_toward((500.0, 300.0)), 1.0, EXPOSURE_S)
+    R, k = STRAIGHT.focal_length_px * np.tan(LIGHT.sun_angular_radius_rad), slice(len(told.radius_px))
+    pupil, sun = PARAMETERS.ghost_defocus_m[k] / 5.6 / 5.5e-6, np.abs(PARAMETERS.ghost_position[k]) * R
+    assert told.radius_px == pytest.approx(np.maximum(pupil, sun))
+    assert (pupil > sun).any() and (pupil < sun).any()
 
 
 def test_dirt_raises_veil_and_halo_and_nothing_else() -> None:
