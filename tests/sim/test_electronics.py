@@ -55,15 +55,27 @@ def _levels(electrons: float, sensor: SensorParameters, key: int, shape: tuple[i
     return _read(_flat(electrons, shape), sensor, key, bits=sensor.converter_bits).astype(float)
 
 
-@pytest.mark.parametrize(("electrons", "read_noise_e"), [(0.0, 13.0), (40.0, 13.0), (2500.0, 13.0), (32.0, 4.0)])
+@pytest.mark.parametrize(
+    ("electrons", "read_noise_e", "full_well_e"),
+    [
+        (0.0, 13.0, 13500.0),
+        (40.0, 13.0, 13500.0),
+        (2500.0, 13.0, 13500.0),
+        (32.0, 4.0, 13500.0),
+        (118.0, 4.0, 200.0),
+        (3.2, 2.0, 13500.0),
+        (12.9, 2.0, 13500.0),
+    ],
+)
 def test_shot_and_read_noise_together_have_the_exact_first_three_cumulants(
-    electrons: float, read_noise_e: float
+    electrons: float, read_noise_e: float, full_well_e: float
 ) -> None:
     """Mean e, variance e + s^2 + 1/12, third cumulant e; the last to 4.5 sqrt(6/n) of the deviation cubed.
 
-    Of two full frames: the skew term is tested to 6 % by 32 e- and 4 e-, where it is largest.
+    Of two full frames: the skew term is tested to 6 % by 32 e- and 4 e-, where it is largest. 118 e- are seven
+    deviations below a well of 200 e-, where both noises are drawn apart; below 4 e- electrons are counted.
     """
-    sensor = replace(FINE, read_noise_e=read_noise_e)
+    sensor = replace(FINE, read_noise_e=read_noise_e, full_well_e=full_well_e)
     m = (
         np.concatenate([_read(_flat(electrons, FULL), sensor, 15, frame, bits=12) for frame in (0, 1)]).astype(float)
         - 200.0
