@@ -5,8 +5,10 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 import pytest
+from scipy.stats import norm, truncnorm
 
 from dockair.rotations import exp
+from dockair.sim.camera.lobes import _strip
 from mirror_scenes import EYE, IDEAL, LIGHT, SHEET, glints_in, metal_body, metal_sphere, scene_of, unit
 
 # --------------------------------------------------------------------------------------------------- energy, rays
@@ -66,6 +68,18 @@ def test_a_small_rough_face_shows_beckmanns_share_of_facets(off: float) -> None:
     found = glints_in(world, sun, replace(IDEAL, metal_roughness_rad=s), eye=1e3 * v).area_m2_sr.sum()
     density = np.exp(-0.5 * (np.tan(off) / s) ** 2) / (2.0 * np.pi * s**2 * np.cos(off) ** 4)
     assert found == pytest.approx(0.25 * 4.0 * half[1] * half[2] * density, rel=2e-3)
+
+
+@pytest.mark.parametrize("off", [0.1, 0.25])
+def test_a_flat_end_of_a_cylinder_shows_its_own_areas_share_of_facets(off: float) -> None:
+    """As a face does, by pi r^2."""
+    radius, s, h = 0.1, 0.1, np.array([-np.cos(off), 0.6 * np.sin(off), 0.8 * np.sin(off)])
+    sun, upright = unit(-0.9, 0.3, -0.2), exp(np.array([0.0, 0.5 * np.pi, 0.0]))
+    world = scene_of(metal_body(_G.mjGEOM_CYLINDER, EYE, [radius, 0.02, 0.0], upright))
+    v = 2.0 * (h @ sun) * h - sun
+    found = glints_in(world, sun, replace(IDEAL, metal_roughness_rad=s), eye=1e3 * v).area_m2_sr.sum()
+    density = np.exp(-0.5 * (np.tan(off) / s) ** 2) / (2.0 * np.pi * s**2 * np.cos(off) ** 4)
+    assert found == pytest.approx(0.25 * np.pi * radius**2 * density, rel=2e-3)
 
 
 def test_a_large_plane_mirror_shows_the_whole_sun() -> None:
@@ -173,6 +187,15 @@ def test_paint_mirrors_by_fresnels_law_of_a_dielectric() -> None:
     assert _painted_sphere_share(np.cos(1.56)) > 0.9
 
 
+@pytest.mark.parametrize(("cos_incidence", "reflected"), [(1.0, 0.6), (0.5, 0.6125), (0.2, 0.731072)])
+def test_metal_mirrors_by_schlicks_law(cos_incidence: float, reflected: float) -> None:
+    """0.6 + 0.4 (1 - cos)^5."""
+    i = np.arccos(cos_incidence - 1e-9)
+    sun, metal = np.array([-np.cos(2.0 * i), np.sin(2.0 * i), 0.0]), replace(IDEAL, metal_reflectance=0.6)
+    area = glints_in(scene_of(metal_sphere([5e3, 0.0, 0.0], 0.5)), sun, metal).area_m2_sr.sum()
+    assert area == pytest.approx(0.25 * 0.5**2 * reflected, rel=1e-3)
+
+
 @pytest.mark.parametrize(
     ("geom", "share"),
     [
@@ -193,6 +216,23 @@ def test_the_suns_image_in_a_ball_is_its_angle_times_half_the_radius() -> None:
     r, a = 0.4, LIGHT.sun_angular_radius_rad
     glints = glints_in(scene_of(metal_sphere([4e3, 0.0, 0.0], r)), unit(-1, 0.01, 0), light=LIGHT)
     assert glints.size_m[0] == pytest.approx(np.sqrt(12.0) * 0.25 * a * r, rel=1e-3)
+
+
+def test_the_suns_image_in_a_ball_is_wider_across_the_plane_of_a_slanting_reflection() -> None:
+    """The normal turns by half the Sun's angle in the plane of incidence i, by 1/(2 cos i) of it across."""
+    r, a = 0.4, LIGHT.sun_angular_radius_rad
+    glints = glints_in(scene_of(metal_sphere([4e3, 0.0, 0.0], r)), unit(0.0, 1.0, 0.0), light=LIGHT)
+    variances = np.array([0.5 * r * a, 0.5 * r * a / np.cos(np.pi / 4)]) ** 2 / 4.0
+    assert glints.size_m[0] == pytest.approx(np.sqrt(12.0 * variances.mean()), rel=1e-3)
+
+
+@pytest.mark.parametrize(("low", "high"), [(-0.3, 1.9), (0.8, 1.1), (-2.0, -0.9), (1.2, 30.0), (0.69, 0.6902)])
+def test_a_strip_of_a_normal_law_has_its_part_mean_and_variance(low: float, high: float) -> None:
+    mean, sd = 0.4, 0.7
+    a, b = (low - mean) / sd, (high - mean) / sd
+    cut = truncnorm(a, b, mean, sd)
+    expected = (norm.cdf(b) - norm.cdf(a), cut.mean(), cut.var())
+    assert _strip(low, high, mean, sd) == pytest.approx(expected, rel=1e-5)
 
 
 def test_roughness_widens_a_balls_glint_and_leaves_its_light() -> None:
@@ -235,6 +275,27 @@ def test_a_highlight_darker_than_the_limit_is_left_out() -> None:
     rough = replace(IDEAL, metal_roughness_rad=0.05)
     assert len(glints_in(world, sun, replace(rough, faintest_radiance=49.5)).p_W) == 1
     assert len(glints_in(world, sun, replace(rough, faintest_radiance=50.5)).p_W) == 0
+
+
+@pytest.mark.parametrize(("share", "count"), [(0.99, 1), (1.01, 0)])
+def test_a_slanting_highlight_is_brighter_by_the_cosine_at_which_it_is_seen(share: float, count: int) -> None:
+    """1/(8 x 0.05^2 cos 45 degrees) = 70.7."""
+    world, sun = scene_of(metal_sphere([3e3, 0.0, 0.0], 0.5)), unit(0, 1, 0)
+    limit = replace(IDEAL, metal_roughness_rad=0.05, faintest_radiance=share * 50.0 * np.sqrt(2.0))
+    assert len(glints_in(world, sun, limit).p_W) == count
+
+
+@pytest.mark.parametrize(("share", "count"), [(0.99, 1), (1.01, 0)])
+@pytest.mark.parametrize("off", [0.1, 0.25])
+def test_a_small_face_is_as_bright_as_the_facets_that_lean_so_far(off: float, share: float, count: int) -> None:
+    """exp(-tan^2/(2 s^2))/(8 s^2 cos^4 v.n), at the angle `off` of face and half-way direction."""
+    s, h = 0.1, np.array([-np.cos(off), 0.6 * np.sin(off), 0.8 * np.sin(off)])
+    sun = unit(-0.9, 0.3, -0.2)
+    v = 2.0 * (h @ sun) * h - sun
+    radiance = np.exp(-0.5 * (np.tan(off) / s) ** 2) / (8.0 * s**2 * np.cos(off) ** 4 * -v[0])
+    world = scene_of(metal_body(_G.mjGEOM_BOX, EYE, [0.02, 0.15, 0.1]))
+    limit = replace(IDEAL, metal_roughness_rad=s, faintest_radiance=share * radiance)
+    assert len(glints_in(world, sun, limit, eye=1e3 * v).p_W) == count
 
 
 def test_a_glint_weaker_than_the_limit_is_left_out() -> None:
