@@ -114,6 +114,24 @@ def test_energy_of_the_worlds_integrator_is_first_order_in_the_step():
     assert fine < 1.0
 
 
+def test_the_winds_power_is_what_the_energy_gains_and_on_a_chain_at_rest_it_is_odd_in_the_motion():
+    """Without friction of the hose's own, over one step of 10 us."""
+    hose, step_s = _hose(bending_damping_n_m2_s=0.0), 1e-5
+    drogue = load_parameters("drogue", DrogueParameters, {"hinge_damping_n_m_s": 0.0})
+    rig = HoseRig(hose, drogue, FAST_W, standard_atmosphere(6000.0), step_s=step_s)
+    start, rates = _leaning(rig), np.random.default_rng(4).normal(0.0, 0.5, (hose.links + 1, 2))
+    rig.put(start, -rates)
+    opposite, _ = rig.air_powers_w()
+    rig.put(start, rates)
+    before, powers = rig.energy_j(), [rig.air_powers_w()]
+    assert powers[0][0] == pytest.approx(-opposite, rel=1e-9)
+    rig.step()
+    gained = rig.energy_j() - before
+    powers.append(rig.air_powers_w())
+    assert gained / step_s == pytest.approx(0.5 * np.sum(powers), rel=1e-3)
+    assert min(np.abs(powers[0])) > 0.01 * max(np.abs(powers[0]))
+
+
 def _path(rig, ticks=1500):
     places = np.empty((ticks, 3))
     for k in range(ticks):

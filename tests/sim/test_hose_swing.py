@@ -14,7 +14,7 @@ from dockair.sim.air.atmosphere import standard_atmosphere
 from dockair.sim.hose.chain import DrogueParameters, HoseParameters
 from dockair.sim.hose.rest import hinge_angles
 from dockair.sim.hose.rig import HoseRig
-from dockair.sim.hose.swing import LinearSwing
+from dockair.sim.hose.swing import LinearSwing, Mode
 
 GRAVITY = 9.80665
 HOSE, DROGUE = load_parameters("hose", HoseParameters), load_parameters("drogue", DrogueParameters)
@@ -62,6 +62,18 @@ def test_first_swing_of_a_taut_light_hose_is_a_pendulum_in_the_pull_of_its_drag(
     stiffness, damping = pull / (drogue.mass_kg * hose.length_m), drag / 180.0 / drogue.mass_kg
     assert abs(mode.eigenvalue_1_s) == pytest.approx(np.sqrt(stiffness), rel=2e-3)
     assert -2.0 * mode.eigenvalue_1_s.real == pytest.approx(damping, rel=0.02)
+    assert mode.damping_ratio == pytest.approx(0.5 * damping / np.sqrt(stiffness), rel=0.02)
+    assert mode.period_s == pytest.approx(2.0 * np.pi / np.sqrt(stiffness - 0.25 * damping**2), rel=3e-3)
+
+
+@pytest.mark.parametrize("ratio", [-0.1, 0.05, 0.6])
+def test_a_modes_period_and_damping_are_an_oscillators(ratio):
+    """q'' + 2 z w q' + w^2 q = 0 has lambda = w (-z + i sqrt(1 - z^2))."""
+    omega = 2.7
+    root = np.roots([1.0, 2.0 * ratio * omega, omega**2])[0]
+    mode = Mode(eigenvalue_1_s=complex(root.real, abs(root.imag)), shape=np.zeros(1, dtype=complex))
+    assert mode.damping_ratio == pytest.approx(ratio)
+    assert mode.period_s == pytest.approx(2.0 * np.pi / (omega * np.sqrt(1.0 - ratio**2)))
 
 
 def test_mass_matrix_springs_and_dampers_are_mujocos_in_absolute_angles():
