@@ -57,6 +57,13 @@ def test_the_share_falls_as_the_equations_say(relief):
     assert relief.haste == 1.0
 
 
+def test_however_long_an_aileron_is_late_the_least_share_is_left_and_haste_is_whole(relief):
+    for _ in range(5000):
+        shares = relief.step(np.array([0.0, 0.2, 0.0]), CALM, CALM)
+    np.testing.assert_allclose(shares, [1.0, 0.2, 1.0], atol=1e-12)
+    assert relief.haste == 1.0
+
+
 def test_to_the_left_the_worse_of_both_counts_and_so_it_does_for_the_feedback(relief):
     for _ in range(100):
         relief.step(np.array([0.0, 0.2, 0.0]), CALM, CALM)

@@ -108,6 +108,20 @@ def test_shares_take_back_the_acceleration_axis_by_axis() -> None:
     np.testing.assert_allclose(chain[1], shares * limits.acceleration_m_s2, rtol=0.02)
 
 
+def test_shares_take_back_the_acceleration_alone() -> None:
+    """As limits of acceleration that are smaller from the outset, to the bit; the limits of jerk stay."""
+    rng, limits, shares = np.random.default_rng(5), PARAMETERS.reference_limits, np.array([0.5, 0.25, 0.75])
+    smaller = replace(limits, acceleration_m_s2=shares * limits.acceleration_m_s2)
+    shared, alone = Reference(limits, 1e-3), Reference(smaller, 1e-3)
+    for reference in (shared, alone):
+        reference.start(np.zeros(3), np.eye(3), ReceiverCommand())
+    for u in rng.normal(0.0, 6.0, (10, 3)):
+        command = ReceiverCommand(velocity_m_s=u, acceleration_m_s2=9.0 * u)
+        for _ in range(150):
+            expected = alone.step(np.eye(3), command)
+            np.testing.assert_array_equal(shared.step(np.eye(3), command, 0.0, shares), expected)
+
+
 @pytest.mark.parametrize("banks_rad", [(0.4, 0.4), (0.7, 0.4)])
 def test_banks_between_which_nothing_could_be_taken_back_are_refused(banks_rad: tuple[float, float]) -> None:
     with pytest.raises(DockairError, match=r"increment_bank_rad: expected two banks, the second larger"):
