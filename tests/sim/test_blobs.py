@@ -145,6 +145,22 @@ def test_sources_that_reach_no_further_than_the_edge_are_asked_for() -> None:
     assert asked == [1, 0]
 
 
+def test_a_long_smear_reaches_into_a_window_that_its_middle_is_far_from() -> None:
+    """300 px away and 590 px long: its end passes 5 px beside the first column."""
+    spread, x, f = _spread(), 10.0, CAMERA.focal_length_px
+    pixel, smear = np.array([[START[1] - 300.0, START[0] + 10.0]]), np.array([[590.0, 0.0]])
+    ab = (pixel[0] - CAMERA.principal_point_px) / f
+    source = Sources(
+        p_C=x * np.array([[1.0, *-ab]]), electrons=np.array([1e6]), size_m=np.zeros(1),
+        way_C_m=-x / f * np.array([[0.0, *smear[0]]]), patches_W=np.zeros((1, ROW)),
+    )  # fmt: skip
+    image, alone = np.zeros((2, *SHAPE), dtype=np.float32)
+    Blobs(CAMERA, spread).add(image, START, source, None, _all_seen)
+    spread.splat(alone, START, pixel, source.electrons, np.array([x]), 0.0, smear)
+    assert alone.sum() > 10.0
+    np.testing.assert_allclose(image, alone, rtol=1e-4, atol=1e-4)
+
+
 def test_the_hidden_add_nothing_and_the_others_what_they_add_alone() -> None:
     sources, blobs = _sources(np.random.default_rng(9), 200), Blobs(CAMERA, _spread())
     odd, even, both = np.zeros((3, *SHAPE), dtype=np.float32)

@@ -9,7 +9,7 @@ from scipy.special import erf, j0, j1
 
 from dockair.calibration import Camera
 from dockair.parameters import load_parameters
-from dockair.sim.camera.optics import NEAREST_M, PointSpread
+from dockair.sim.camera.optics import NEAREST_M, PointSpread, _divided
 from dockair.sim.camera.point_spread import Spread, airy_px, blur_px, core
 from dockair.sim.camera.sheets import LensParameters, SensorParameters
 
@@ -230,6 +230,12 @@ def test_a_square_drawn_in_parts_is_the_one_made_in_one_piece(depth_m: float, si
     expected = core(made)[0, 0] + A * (r**2 + w**2) ** -1.5
     image = _blob(_spread(), (0.0, 0.0), electrons=1e8, depth_m=depth_m, size_m=size_m, half=half) / 1e8
     assert image == pytest.approx(expected, rel=0.0, abs=7e-3 * expected.max())
+
+
+@pytest.mark.parametrize(("size_m", "side"), [(0.0, 1), (5e-3, 1), (5.01e-3, 2), (8e-3, 2), (0.0101, 4), (0.064, 16)])
+def test_no_square_is_cut_larger_than_five_millimetres_nor_smaller_than_need_be(size_m: float, side: int) -> None:
+    """By halving: the widest core that there is, is one of 5 mm."""
+    assert _divided(size_m) == (side, pytest.approx(size_m / side))
 
 
 def test_a_large_square_holds_its_electrons_where_it_stands() -> None:
