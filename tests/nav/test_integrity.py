@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.linalg import null_space
 from scipy.stats import binom, chi2, ncx2, norm
 
 from dockair.calibration import Camera, LedRing
@@ -115,6 +116,36 @@ def test_slopes_are_the_worst_of_all_directions_of_a_fault_that_was_solved(range
             moved = [abs(step[3]), np.hypot(*step[4:]), np.linalg.norm(step[:3])]
             worst = np.maximum(worst, np.array(moved) / np.sqrt(end.chi2))
         np.testing.assert_allclose(slopes[led], worst, rtol=0.01)
+
+
+def test_tests_and_slopes_of_errors_that_differ_by_direction_are_those_of_raw_residuals():
+    """e = T (b - h), C = M^-1 - J P J' its covariance: t = e' C^-1 e, slope^2 the largest root of C^-1 J P_r P_r' J'.
+
+    T any two tangents, J = T dh/d(phi, delta) by differences, M = T W T', P = (sum J' M J)^-1, P_r columns of a kind.
+    """
+    (R, p), step = pose_at(3.0, 15.0, (0.1, -0.03)), 1e-6
+    root = np.random.default_rng(5).normal(0.0, 3e3, (8, 3, 3))
+    sight = lines_of_sight_from_pixels(pixels_at(R, p, seed=2), RING, CAMERA, np.full(8, SIGMA_PX))
+    sight = replace(sight, weights=root @ root.transpose(0, 2, 1))
+    T = [null_space(b[None]).T for b in sight.rays]
+
+    def directions(x):
+        s = RING @ R.T @ exp(x[:3]).T + p + x[3:]
+        return s / np.linalg.norm(s, axis=1, keepdims=True)
+
+    e = [t @ d for t, d in zip(T, sight.rays - directions(np.zeros(6)), strict=True)]
+    slopes = np.array([(directions(step * x) - directions(-step * x)) / (2.0 * step) for x in np.eye(6)])
+    J = [t @ slopes[:, i].T for i, t in enumerate(T)]
+    M = [t @ W @ t.T for t, W in zip(T, sight.weights, strict=True)]
+    P = np.linalg.inv(sum(j.T @ m @ j for j, m in zip(J, M, strict=True)))
+    found = sensitivity(sight, R, p, P)
+    for i in range(8):
+        C = np.linalg.inv(M[i]) - J[i] @ P @ J[i].T
+        assert found.local_chi2[i] == pytest.approx(e[i] @ np.linalg.solve(C, e[i]), rel=1e-5)
+        for kind, rows in ((RANGE, slice(3, 4)), (LATERAL, slice(4, 6)), (ATTITUDE, slice(0, 3))):
+            moved = J[i] @ P[:, rows]
+            largest = np.linalg.eigvals(np.linalg.solve(C, moved @ moved.T)).real.max()
+            assert found.slopes[i, kind] == pytest.approx(np.sqrt(largest), rel=1e-5)
 
 
 @pytest.mark.parametrize("seen", [2, 3])
