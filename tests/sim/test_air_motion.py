@@ -206,6 +206,22 @@ def test_gusts_stay_level_when_the_tanker_banks():
     np.testing.assert_allclose(now(air, R_WT, p_WT).tow_W, np.outer(TOW[:, 0], [0.0, 0.0, 1.0]), atol=1e-12)
 
 
+def test_gusts_run_along_the_level_heading_of_a_pitched_and_banked_tanker_from_its_hoses_exit():
+    """Beside its middle; to the tow, and as rolling at the receiver's centre of gravity."""
+    yaw, exit_T, p_WT = 0.5, np.array([-19.5, 9.0, -1.9]), np.array([4.0, -3.0, 2.0])
+    R_WT = matrix_from_yaw_pitch_roll(yaw, 0.25, 0.3)
+    level = matrix_from_yaw_pitch_roll(yaw, 0.0, 0.0)
+    ahead = (np.vstack([TOW, P_WB]) - p_WT - R_WT @ exit_T) @ level[:, 0]
+    per_metre = np.array([0.03, 0.02, -0.05])
+    slope, rolling = Ramp(per_metre), Ramp(np.zeros(3), 0.02)
+    air = AirMotion(rolling, slope, exit_T=exit_T, receiver_points_B=CENTRE)
+    state = air.at(TOW, R_WB, P_WB, R_WT, p_WT)
+    felt = np.outer(ahead, level @ per_metre)
+    np.testing.assert_allclose(state.tow_W, felt[:-1], atol=1e-12)
+    np.testing.assert_allclose(state.receiver_W, felt[-1], atol=1e-12)
+    np.testing.assert_allclose(state.receiver_rotation_B, [0.02 * ahead[-1], 0.0, 0.0], atol=1e-12)
+
+
 def test_a_step_moves_the_gusts_on_and_a_copy_of_the_air_goes_the_same_way():
     air = motion(dryden(), single(), WAKE, BOW_WAVE)
     twin, before = copy.deepcopy(air), now(air)

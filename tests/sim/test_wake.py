@@ -108,6 +108,12 @@ def test_the_core_grows_with_age_by_squires_law_and_with_the_peers_constant_to_t
         assert core == pytest.approx(2.24 * np.sqrt(eddy * gamma() * age_s), rel=2e-3)
 
 
+def test_ahead_of_the_wing_no_core_has_grown() -> None:
+    points = np.array([[x, HALF + y, 0.4] for x in (0.5, 3.0, 20.0) for y in (-0.3, 0.0, 1.0)])
+    young, old = (table(replace(ALONE, core_growth=growth)) for growth in (0.0, 0.06))
+    np.testing.assert_allclose(wake_velocity(points, old), wake_velocity(points, young), rtol=1e-12)
+
+
 def test_the_bound_vortex_keeps_its_young_core() -> None:
     """Just above its middle, within the core, the legs' part being the half of theirs far behind."""
     z, core = 0.2, 0.035 * SPAN
