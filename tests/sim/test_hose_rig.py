@@ -43,6 +43,17 @@ def test_hose_let_go_straight_settles_where_it_rests_and_its_drogue_as_well():
     np.testing.assert_allclose(rig.tensions(), [rest.root_tension_n, rest.drogue_tension_n], rtol=1e-5)
 
 
+def test_relaxing_brakes_a_motion_that_nothing_else_slows_by_its_own_rate_alone():
+    """A straight hose that moves along with its exit, without air and weight: exp(-0.7 x 2) of it is left."""
+    hose = _hose(**LIMP)
+    rig = HoseRig(hose, DROGUE, np.zeros(3), None, step_s=2e-3, gravity_W=np.zeros(3))
+    rig.put(_straight(hose), exit_m_s=5.0)
+    before = np.abs(rig.data.qvel).max()
+    rig.relax(2.0, 0.7)
+    assert before == pytest.approx(5.0)
+    assert np.abs(rig.data.qvel).max() == pytest.approx(5.0 * np.exp(-1.4), rel=1e-6)
+
+
 def test_hose_pulled_aft_without_air_hangs_in_a_catenary():
     """aft = H/w (asinh((W + w L)/H) - asinh(W/H)) and so on; 40 links for a continuous cable: of order 1/40^2."""
     hose, pull = _hose(links=40, bending_stiffness_n_m2=0.0), 900.0

@@ -179,7 +179,8 @@ def test_a_fast_lens_bends_the_centroid_by_what_passes_at_one_cycle_per_pixel() 
 
 
 @pytest.mark.parametrize(
-    "f_number,depth_m,size_m", [(8.0, 2.7, 1e-3), (2.8, 3.3, 1e-3), (1.4, 1.9, 0.0), (4.0, 6.1, 5e-3)]
+    "f_number,depth_m,size_m",
+    [(8.0, 2.7, 1e-3), (2.8, 3.3, 1e-3), (1.4, 1.9, 0.0), (4.0, 6.1, 5e-3), (16.0, 1.13, 5e-3)],
 )
 def test_between_tabulated_depths_a_blob_is_the_one_made_for_its_depth(
     f_number: float, depth_m: float, size_m: float
