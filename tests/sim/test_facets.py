@@ -10,7 +10,7 @@ import pytest
 from dockair.rotations import exp
 from dockair.sim.camera.facets import facets_that_may_shine
 from dockair.sim.camera.lobes import ROW, facet_rows
-from dockair.sim.camera.mirrors import Mirrors, finishes, vector
+from dockair.sim.camera.mirrors import Mirrors, _facet_table, finishes, vector
 from dockair.sim.camera.round_mirrors import _is_steep
 from dockair.sim.camera.sheets import CameraSheets
 
@@ -50,6 +50,18 @@ def test_facets_that_are_spared_send_nothing_to_the_lens(make_world: Callable[..
         assert np.array_equal(_rows(mirrors, which, data, sun, eye), every)
         found, spared = found + len(every), spared + len(toward) - len(which)
     assert found > 500 and spared > 10000
+
+
+def test_a_facets_slopes_differ_from_its_middles_by_no_more_than_its_bend() -> None:
+    """By its second fundamental form at its corners, saddles among them."""
+    rng = np.random.default_rng(4)
+    C, half = rng.normal(0.0, 1.0, (500, 3)), rng.uniform(0.05, 0.5, (500, 2))
+    C[:20, [0, 2]] = 0.0
+    facets = _facet_table([(0, 0, np.eye(4, 3), (h, k), tuple(c)) for (h, k), c in zip(half, C, strict=True)])
+    for sign in (1.0, -1.0):
+        x, y = half[:, 0], sign * half[:, 1]
+        slope = np.hypot(C[:, 0] * x + C[:, 1] * y, C[:, 1] * x + C[:, 2] * y)
+        assert np.all(slope <= facets.bend * (1.0 + 1e-12))
 
 
 def test_facets_behind_the_lens_are_spared_and_no_other(make_world: Callable[..., Any]) -> None:

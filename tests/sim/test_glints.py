@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from dockair.rotations import exp
-from dockair.sim.camera.glints import find_glints
+from dockair.sim.camera.glints import find_glints, glint_rows
 from dockair.sim.camera.meshes import Meshes
 from dockair.sim.camera.mirrors import GLASS, METAL, PAINT, RUBBER, Mirrors, material_of, rim_of
 from dockair.sim.camera.solids import VISIBLE_GROUPS
-from mirror_scenes import EYE, IDEAL, LIGHT, SHEET, glints_in, metal_body, metal_sphere, scene_of, unit
+from mirror_scenes import EYE, IDEAL, LIGHT, POINT_SUN, SHEET, glints_in, metal_body, metal_sphere, scene_of, unit
 
 
 def _mirror_error_rad(p: np.ndarray, n: np.ndarray, sun: np.ndarray, eye: np.ndarray = EYE) -> float:
@@ -97,6 +97,21 @@ def test_a_tubes_glint_obeys_the_law_of_reflection_and_lies_on_its_side() -> Non
 # ------------------------------------------------------------------------------------------------------------ hiding
 
 
+@pytest.mark.parametrize("sun", [unit(-1.0, 0.3, 0.9), unit(-1.0, 0.3, -0.9), unit(-1.0, 0.5, 0.02)])
+def test_a_capsule_mirrors_as_a_tube_with_a_ball_at_either_end(sun: np.ndarray) -> None:
+    """Upright, its ends' outer halves alone: where the Sun stands high the upper one, where low the lower one."""
+    place, radius, half = np.array([6.0, 0.3, 0.1]), 0.2, 0.7
+    capsule = glints_in(scene_of(metal_body(_G.mjGEOM_CAPSULE, place, [radius, half, 0.0])), sun)
+    if abs(sun[2]) > 0.1:
+        end = metal_sphere(list(place + [0.0, 0.0, np.sign(sun[2]) * half]), radius)
+        alone = glints_in(scene_of(end), sun)
+    else:
+        alone = glints_in(scene_of(metal_body(_G.mjGEOM_CYLINDER, place, [radius, half, 0.0])), sun)
+    assert len(alone.p_W) > 0
+    np.testing.assert_allclose(capsule.p_W, alone.p_W, atol=1e-9)
+    np.testing.assert_allclose(capsule.area_m2_sr, alone.area_m2_sr, rtol=1e-9)
+
+
 def test_something_in_the_way_of_the_sun_or_of_the_camera_puts_a_glint_out() -> None:
     sun = unit(-0.2, 0.0, 1.0)
     ball = metal_sphere([8.0, 0.0, 0.0], 0.5)
@@ -106,6 +121,17 @@ def test_something_in_the_way_of_the_sun_or_of_the_camera_puts_a_glint_out() -> 
         dull = replace(IDEAL, rubber_share=0.0)
         assert len(glints_in(scene_of(ball, box), sun, dull).p_W) == 0
         assert len(glints_in(scene_of(ball, box | {"group": 3}), sun, dull).p_W) == 1
+
+
+def test_a_body_alone_hides_none_of_its_own_patches() -> None:
+    """Large ones, whose middles lie under its surface."""
+    centre, n = np.array([16.0, 2.0, 6.0]), unit(-0.1, 0.2, -1.0)
+    v, surfaces = -unit(*centre), replace(IDEAL, metal_roughness_rad=0.03)
+    sun = 2.0 * (n @ v) * n - v
+    model, data = scene_of(metal_body(_G.mjGEOM_ELLIPSOID, centre, [10.4, 1.7, 1.5]))
+    rows = glint_rows(data, Mirrors.of(model), EYE, sun, surfaces, POINT_SUN)
+    assert len(rows) >= 8
+    assert len(glints_in((model, data), sun, surfaces).p_W) == len(rows)
 
 
 def test_the_sun_behind_a_body_makes_no_glint() -> None:

@@ -286,7 +286,9 @@ def test_the_bound_is_above_every_reflection_and_not_far_above_the_best() -> Non
         led = centre + unit(*rng.normal(size=3)) * rng.uniform(0.15, 1.0)
         for kind, geom in (("ball", _sphere(centre, 0.04)), ("tube", _tube(centre, 0.04, 2.0, R))):
             world = scene_of(geom)
-            for axis in (unit(*(centre - led)), unit(*(led - centre))):
+            toward, sight = unit(*(centre - led)), EYE - centre
+            edge = unit(*(sight - (sight @ toward) * toward)) - 0.02 / np.linalg.norm(centre - led) * toward
+            for axis in (toward, -toward, unit(*edge)):  # a part of the ball lies ahead, not its middle
                 found = _find(world, led, side, axis=axis, exponent=1e-6)
                 bound = _bound(world, led, axis, side)
                 for intensity in found.intensity_w_sr:
