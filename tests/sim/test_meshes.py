@@ -11,6 +11,7 @@ from dockair.calibration import Mounting
 from dockair.parameters import load_parameters
 from dockair.rotations import exp, quaternion_from_matrix
 from dockair.sim.camera.drawn import DrawnSolids
+from dockair.sim.camera.mesh_view import _is_beside
 from dockair.sim.camera.meshes import Meshes, mesh_of
 from dockair.sim.camera.mirrors import Mirrors
 from dockair.sim.camera.obstacles import Obstacles
@@ -143,6 +144,52 @@ def test_blocks_show_a_mesh_where_mujocos_rays_meet_it(world: Any) -> None:
             count += hit >= 0.0
     assert count > 30
     assert wrong == 0
+
+
+def test_a_mesh_is_as_bright_and_as_far_as_moller_and_trumbore_find_it(world: Any) -> None:
+    """A block in 47: light of the corners in proportion to the ray's place between them, haze by its slant range."""
+    name, model, data = world
+    R_WC, p_WC = pose = _looking_at_it(0.4 * FAR[name], 5)
+    corners, lit = [], []
+    for g in range(model.ngeom):
+        local, normals, triangles = mesh_of(model, int(model.geom_dataid[g]))
+        turn = data.geom_xmat[g].reshape(3, 3)
+        light = 0.25 + 0.75 * np.maximum(normals @ turn.T @ SUN, 0.0)
+        corners.append((local @ turn.T + data.geom_xpos[g])[triangles])
+        lit.append(model.geom_rgba[g, 0] * light[triangles])
+    a, b, c = np.concatenate(corners).transpose(1, 0, 2)
+    of_corners, picture, found = np.concatenate(lit), _draw(TracedSolids(model, SUNLIT), data, pose).ravel(), []
+    for k in range(3, picture.size, 47):
+        d = R_WC @ np.array([1.0, -X[k % len(X)], -Y[k // len(X)]])
+        across = np.cross(d, c - a)
+        volume = np.sum((b - a) * across, axis=1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            second = np.sum((p_WC - a) * across, axis=1) / volume
+            third = np.cross(p_WC - a, b - a) @ d / volume
+            depth = np.sum((c - a) * np.cross(p_WC - a, b - a), axis=1) / volume
+        inside = (volume > 0.0) & (np.minimum(second, third) > 1e-4) & (second + third < 1.0 - 1e-4) & (depth > 0.1)
+        if picture[k] != SKY and inside.any():
+            t = np.flatnonzero(inside)[np.argmin(depth[inside])]
+            through = np.exp(-1e-3 * depth[t] * np.linalg.norm(d))
+            light = of_corners[t] @ [1.0 - second[t] - third[t], second[t], third[t]]
+            found.append((picture[k], light * through + 0.2 * (1.0 - through)))
+    assert len(found) > 100
+    ours, theirs = np.array(found).T
+    assert np.mean(np.abs(ours - theirs) > 1e-5) < 0.01  # rays that pass along an edge
+
+
+def test_a_patch_is_left_out_only_where_no_blocks_ray_meets_its_ball() -> None:
+    """In a wide picture whose axis is not its middle."""
+    rng, x, y, left = np.random.default_rng(3), np.linspace(-1.2, 0.8, 41), np.linspace(-0.5, 1.5, 41), 0
+    rays = np.stack(np.broadcast_arrays(1.0, -x, -y[:, None]), axis=-1).reshape(-1, 3)
+    rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+    for _ in range(3000):
+        centre, radius = rng.uniform([0.5, -6.0, -6.0], 6.0), rng.uniform(0.1, 3.0)
+        nearest = np.linalg.norm(centre - np.maximum(rays @ centre, 0.0)[:, None] * rays, axis=1).min()
+        if _is_beside((centre[0], centre[1], centre[2]), radius, x, y, 0.1):
+            assert nearest > radius
+            left += 1
+    assert left > 500
 
 
 def test_rays_from_anywhere_meet_meshes_where_mujocos_do(world: Any) -> None:
