@@ -13,10 +13,10 @@ exposure t. The image stages state of the spot, on each axis,
 
 and it is measured with an error of e sigma, e = e_u or e_c. Of the texture's part a share stays with the LED for a
 time (Gauss-Markov); the rest is new in every frame. An LED is seen that is on the sensor, not hidden, and whose
-brightest pixel is above y exp(y_s N(0, 1)), y = y_0 + y_T T levels. A share of the seen, in proportion to T, gets no
-name, a share a wrong place. Fewer than `ring_least` LEDs are no ring, and none of them is named unless a belief that
-follows does it, that is while the last LEDs that were named are not too old. In a share of the frames, in proportion to
-T, no LED is named anyway.
+brightest pixel reads more than y exp(y_s N(0, 1)) levels above a dark one, y = y_0 + y_T T. A share of the seen, in
+proportion to T, gets no name, a share a wrong place. Fewer than `ring_least` LEDs are no ring, and none of them is
+named unless a belief that follows does it, that is while the last LEDs that were named are not too old. In a share of
+the frames, in proportion to T, no LED is named anyway.
 
 In the light of the fit, that is in daylight, filter and air of the scenario "default", k = 1 and B = 0. Else surfaces
 make Y in place of Y_0 electrons a second, LEDs E in place of E_0, and the air takes B more per metre: texture has
@@ -294,7 +294,8 @@ class MeasuredLeds:
         error = np.sqrt(variance - lasting)[:, None] * numbers.new + np.sqrt(lasting)[:, None] * self._lasting
         error = ratio * error + np.where(uniform[:count, 1:] < p.stray_share, p.stray_px * numbers.stray, 0.0)
         faintest_dn, clutter = p.faintest_dn + p.faintest_dn_per_e * texture_e, texture_e / max(p.texture_e, 1.0)
-        bright = levels.max(axis=1) - self._black > faintest_dn * np.exp(p.faintest_spread * numbers.level)
+        contrast_dn = above_dark_dn(levels.max(axis=1), self._black)
+        bright = contrast_dn > faintest_dn * np.exp(p.faintest_spread * numbers.level)
         named = np.flatnonzero(view.clear & bright & (uniform[:count, 0] >= clutter * p.unnamed_share))
         least = 1 if time_s - self._named_s <= self._followed_s else p.ring_least
         if len(named) < least or uniform[count, 0] < np.median(clutter) * p.no_ring_share:  # where the ring is
@@ -324,6 +325,19 @@ class MeasuredLeds:
         half = 0.5 * (self._p.window_heights * (seen.max() - seen.min()) + self._p.window_margin_px)
         first, stop = max(int(middle - half), 0), min(int(middle + half) + 1, camera.height_px)
         return Window(first, stop, 0, camera.width_px)
+
+
+def above_dark_dn(level: NDArray[np.integer[Any]], black_dn: float) -> Array:
+    """Grey levels of `MeasuredLeds.spots` above that of a pixel without light, which is cut to a whole one as they are.
+
+    This is what image stages see of a spot: its pixels beside those around it, not beside a black of 2.5 levels that no
+    pixel reads.
+
+    Args:
+        level: any shape.
+        black_dn: of the output before it is cut.
+    """
+    return np.asarray(level - np.floor(black_dn))
 
 
 @njit(cache=True)

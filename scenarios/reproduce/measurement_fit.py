@@ -17,7 +17,7 @@ from scipy.optimize import least_squares, minimize
 from scipy.stats import norm
 
 from dockair.rotations import Array
-from dockair.scenarios.measured_leds import MeasurementParameters
+from dockair.scenarios.measured_leds import MeasurementParameters, above_dark_dn
 from dockair.scenarios.reproduce.measurement_frames import Mask, Seen
 
 STRAY_SIGMAS = 6.0  # one normal number in 5e8
@@ -103,7 +103,7 @@ def _errors(seen: Seen) -> Fitted:
 
 
 def _seen(seen: Seen, texture_e: Array, black_dn: float) -> Fitted:
-    peak = np.maximum(seen.spot_peak_dn - black_dn + 0.5, _DARK_DN)
+    peak = np.maximum(above_dark_dn(seen.spot_peak_dn, black_dn), _DARK_DN)
 
     def unlikely(x: Array) -> float:
         level = np.exp(x[0]) + np.exp(x[1]) * texture_e

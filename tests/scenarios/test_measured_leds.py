@@ -193,6 +193,29 @@ def test_an_led_dimmed_below_the_faintest_level_is_not_seen_and_above_it_is():
         assert (2 in dimmed.look().led_numbers) is seen
 
 
+@pytest.mark.parametrize("above_dark_dn", [1, 2, 4])
+def test_an_led_is_seen_in_the_share_of_frames_that_its_levels_above_a_dark_pixel_have_over_the_faintest(above_dark_dn):
+    """Within five standard deviations of a binomial: a false alarm in 1.7e6; the seed is fixed."""
+    p, t, frames = replace(EXACT, faintest_spread=PARAMETERS.faintest_spread), SHEETS.exposure.exposure_s, 600
+    stand = Stand(automatic_exposure=False)
+    view, gain = stand.leds.view(stand.data, 1.0, t), output_gain(SHEETS.sensor)
+    _, width_px = stand.leds.spots(view)
+    off_px2 = ((view.pixels_px[2] - np.round(view.pixels_px[2])) ** 2).sum()
+    peak_e = view.electrons[2] * np.exp(-0.5 * off_px2 / width_px[2] ** 2) / (2.0 * np.pi * width_px[2] ** 2)
+    dimmed = Stand(p, [LedDim(leds=(2,), factor=above_dark_dn / (gain * peak_e))], automatic_exposure=False)
+    seen = np.mean([2 in dimmed.look(0.02 * k).led_numbers for k in range(frames)])
+    faintest_dn = p.faintest_dn + p.faintest_dn_per_e * stand.leds.texture_e(t, view.depth_m)[2]
+    share = norm.cdf(np.log(above_dark_dn / faintest_dn) / p.faintest_spread)
+    assert seen == pytest.approx(share, abs=5.0 * np.sqrt(share * (1.0 - share) / frames))
+
+
+@pytest.mark.parametrize("black_dn", [8.0, 10.0, 11.0])
+def test_a_dark_led_is_never_seen_whatever_the_black_level(black_dn):
+    stand = Stand(replace(EXACT, faintest_spread=3.0), [LedOff(leds=(2,))])
+    stand.leds._black = output_black(replace(SHEETS.sensor, black_level_dn=black_dn))
+    assert not any(2 in stand.look(0.02 * k).led_numbers for k in range(200))
+
+
 def test_a_camera_that_has_dropped_out_sends_nothing_and_a_stuck_one_the_same_again():
     faults = [StuckFrame(start_s=1.0, stop_s=2.0), CameraDropOut(start_s=2.0, stop_s=3.0)]
     stand = Stand(PARAMETERS, faults)

@@ -20,45 +20,39 @@ _SPEC.loader.exec_module(stand_module)
 Stand, SHEETS = stand_module.Stand, stand_module.SHEETS
 DRAWN = replace(
     stand_module.PARAMETERS, unnamed_share=0.03, no_ring_share=0.05, stray_share=0.01, stray_px=0.7,
-    texture_lasting_share=0.4, error_over_sigma=0.8, clipped_error_over_sigma=0.6, faintest_dn=4.0, photon_factor=1.3,
+    texture_lasting_share=0.4, error_over_sigma=0.8, clipped_error_over_sigma=0.6, photon_factor=1.3,
 )  # fmt: skip
+ALL_NAMED = {"unnamed_share": 0.0, "no_ring_share": 0.0, "ring_least": 1}  # whatever is seen
 _FACTORS = (0.6, 0.3, 0.15, 0.1, 0.07, 0.05, 0.03, 0.02)
 _FEW = ((0, 2, 5), (0, 2, 5, 7), (0, 2, 3, 5, 7))
 
 
 def _drawn(flight: int, depth_m: float, frames: int, faults=(), depth_rate_m: float = 0.0) -> list[dict]:
     """Rows of the model's own observations, in the columns of the camera's."""
-    stand, rng = Stand(DRAWN, faults, seed=flight), np.random.default_rng(flight)
+    stand = Stand(DRAWN, faults, seed=flight)
+    found_by = Stand(replace(DRAWN, **ALL_NAMED), faults, seed=flight)  # of the same numbers
     rows = []
     for k in range(frames):
         stand.put(depth_m + k * depth_rate_m)
-        drawn = stand.leds.expose(stand.data, 0.02 * k, k, None)
+        drawn, found = (one.leds.expose(stand.data, 0.02 * k, k, None) for one in (stand, found_by))
         exposure_s = stand.leds.exposure_s
         view = stand.leds.view(stand.data, 0.02 * k, exposure_s)
         levels, width_px = stand.leds.spots(view)
         window = stand.leds._window
-        at = {int(led): i for i, led in enumerate(drawn.led_numbers)}
-        texture_e = stand.leds.texture_e(exposure_s, view.depth_m)
-        faintest_dn = DRAWN.faintest_dn + DRAWN.faintest_dn_per_e * texture_e
+        error, sigma = np.full((8, 2), np.nan), np.full(8, np.nan)
+        error[found.led_numbers] = found.centroids_px - view.pixels_px[found.led_numbers]
+        sigma[found.led_numbers] = found.sigma_px
         for led in range(8):
-            full, i = int((levels[led] == 255).sum()), at.get(led, -1)
-            # of what is found, if unnamed: surely, or of a whole ring by half
-            least = (2.0 if at else 1.0) * faintest_dn[led]
-            bright = levels[led].max() - output_black(SHEETS.sensor) > least
-            error = drawn.centroids_px[i] - view.pixels_px[led] if i >= 0 else np.full(2, np.nan)
-            sigma = drawn.sigma_px[i] if i >= 0 else np.nan
-            if i < 0 and bright:
-                sigma = np.sqrt(stand.leds.variances(view.electrons, width_px, np.zeros(8, int), texture_e)[0][led])
-                error = DRAWN.error_over_sigma * sigma * rng.standard_normal(2)
+            full = int((levels[led] == 255).sum())
             off = view.pixels_px[led] - np.round(view.pixels_px[led])
             rows.append({
-                "flight": flight, "frame": k, "ring": len(at) > 0, "named": i >= 0, "led": led,
-                "depth_m": view.depth_m[led], "electrons": view.electrons[led], "off_px2": float(off @ off),
+                "flight": flight, "frame": k, "ring": len(drawn.led_numbers) > 0, "named": led in drawn.led_numbers,
+                "led": led, "depth_m": view.depth_m[led], "electrons": view.electrons[led], "off_px2": float(off @ off),
                 "width_px": width_px[led], "full_pixels": full, "spot_peak_dn": int(levels[led].max()),
                 "exposure_s": exposure_s, "latency_s": 0.01, "rows": window.shape[0],
-                "height_px": float(np.ptp(view.pixels_px[:, 1])), "error_px": error, "sigma_px": sigma,
+                "height_px": float(np.ptp(view.pixels_px[:, 1])), "error_px": error[led], "sigma_px": sigma[led],
                 "clipped": full > 0, "peak_dn": int(levels[led].max()), "model_exposure_s": exposure_s,
-                "model_latency_s": 0.01, "model_error_px": error, "model_sigma_px": sigma,
+                "model_latency_s": 0.01, "model_error_px": error[led], "model_sigma_px": sigma[led],
             })  # fmt: skip
     return rows
 
@@ -82,6 +76,7 @@ def test_the_fit_gives_back_the_numbers_that_the_material_was_drawn_from(materia
         "background_e": 0.05, "texture_e": 0.02, "texture_exponent": 0.02, "clipped_sigma_px": 0.01,
         "error_over_sigma": 0.05, "clipped_error_over_sigma": 0.12, "texture_lasting_share": 0.35,
         "window_heights": 0.02, "window_margin_px": 0.1, "no_ring_share": 0.3, "stray_share": 0.6, "stray_px": 0.4,
+        "faintest_dn": 0.1, "faintest_dn_per_e": 0.1, "faintest_spread": 0.15, "unnamed_share": 0.2,
     }  # fmt: skip
     for name, relative in within.items():
         assert found[name] == pytest.approx(getattr(DRAWN, name), rel=relative), name
