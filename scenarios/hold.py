@@ -5,8 +5,6 @@ from dataclasses import dataclass
 from itertools import takewhile
 from operator import attrgetter
 
-import numpy as np
-
 from dockair.sim.truth import Truth
 
 
@@ -16,7 +14,7 @@ class Hold:
 
     duration_s: float
     take_in_max_m: float  #: most hose that was wound in
-    coupling_force_max_n: float  #: largest pull, that of the tick at which it let go included
+    coupling_force_max_n: float  #: largest pull at any physics tick, that at which it let go included
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -26,12 +24,13 @@ class Disconnect:
     time_s: float
 
 
-def hold_of(truths: Sequence[Truth], pull_max_n: float = -np.inf) -> tuple[Hold | None, Disconnect | None]:
+def hold_of(truths: Sequence[Truth], pull_max_n: float) -> tuple[Hold | None, Disconnect | None]:
     """Return what happened while the probe was held, and how it came free (None: it did not).
 
     Args:
         truths: one a control tick.
-        pull_max_n: largest pull that the referee saw: that which opens the coupling lasts for one physics tick.
+        pull_max_n: largest pull that the referee saw, who watches every physics tick: that which opens the coupling
+            lasts for one of them.
     """
     first = next((k for k, truth in enumerate(truths) if truth.latched), None)
     if first is None:
@@ -42,6 +41,6 @@ def hold_of(truths: Sequence[Truth], pull_max_n: float = -np.inf) -> tuple[Hold 
     hold = Hold(
         duration_s=truths[last].time_s - truths[first].time_s,
         take_in_max_m=max(truth.reel_position_m for truth in during),
-        coupling_force_max_n=max(pull_max_n, *(truth.coupling_force_n for truth in (*during, *released))),
+        coupling_force_max_n=pull_max_n,
     )
     return hold, Disconnect(time_s=released[0].time_s) if released else None

@@ -104,10 +104,18 @@ def test_availability_is_counted_from_the_first_valid_tick():
     assert metrics.availability([False, False]) == 0.0
 
 
+def _hold_of(truths):
+    """As of a flight whose every physics tick is a control tick."""
+    referee = Referee()
+    for truth in truths:
+        referee.watch(truth)
+    return hold_of(truths, referee.pull_max_n)
+
+
 def test_hold_and_disconnect_are_read_from_the_latch(hand_made):
     """Latched from 6.55 to 8.49 s, so that the first free control tick is at 8.5 s."""
     truths = [hand_made.truth(10 * k) for k in range(1, 900)]
-    hold, disconnect = hold_of(truths)
+    hold, disconnect = _hold_of(truths)
     assert hold is not None and disconnect is not None
     assert hold.duration_s == pytest.approx(8.49 - 6.55)
     assert hold.take_in_max_m == pytest.approx(1.2)
@@ -119,7 +127,7 @@ def test_the_pull_that_opened_the_coupling_is_the_largest(hand_made):
     truths = [hand_made.truth(10 * k) for k in range(1, 900)]
     opens = next(k for k, truth in enumerate(truths) if truth.time_s == 8.5)
     truths[opens] = replace(truths[opens], coupling_force_n=1913.0)
-    hold, _ = hold_of(truths)
+    hold, _ = _hold_of(truths)
     assert hold is not None and hold.coupling_force_max_n == 1913.0
 
 
@@ -131,6 +139,11 @@ def test_the_pull_that_opened_the_coupling_between_two_control_ticks_counts_too(
     assert hold is not None and hold.coupling_force_max_n == 1913.0
 
 
+def test_the_largest_pull_is_the_referees_alone(hand_made):
+    hold, _ = hold_of([hand_made.truth(10 * k) for k in range(1, 900)], 650.0)
+    assert hold is not None and hold.coupling_force_max_n == 650.0
+
+
 def test_of_two_holds_the_first_counts(hand_made):
     """Of the second everything is larger, and its time is later."""
     once = [hand_made.truth(10 * k) for k in range(1, 900)]
@@ -138,11 +151,11 @@ def test_of_two_holds_the_first_counts(hand_made):
         replace(t, time_s=9.0 + 2.0 * t.time_s, reel_position_m=2.0 * t.reel_position_m, coupling_force_n=900.0)
         for t in once
     ]
-    assert hold_of(once + again) == hold_of(once)
+    assert _hold_of(once + again) == _hold_of(once)
 
 
 def test_a_probe_still_held_at_the_end_was_not_disconnected(hand_made):
-    _, disconnect = hold_of([hand_made.truth(10 * k) for k in range(600, 700)])
+    _, disconnect = _hold_of([hand_made.truth(10 * k) for k in range(600, 700)])
     assert disconnect is None
 
 
