@@ -18,6 +18,7 @@ from dockair.errors import DockairError
 from dockair.scenarios.campaign.code import Code
 from dockair.scenarios.campaign.jobs import Job
 from dockair.scenarios.campaign.plan import Plan
+from dockair.scenarios.campaign.points import runs_of
 from dockair.scenarios.campaign.whole_file import write_whole
 from dockair.scenarios.result import versions
 
@@ -163,10 +164,4 @@ def _hashes(jobs: Sequence[Job]) -> dict[str, Any]:
 
 def _in_runs(seeds: Sequence[int]) -> list[int | str]:
     """Return whole numbers in order with runs as "first-last": 0-59 instead of sixty numbers."""
-    runs: list[list[int]] = []
-    for seed in seeds:
-        if runs and seed == runs[-1][-1] + 1:
-            runs[-1] = [runs[-1][0], seed]
-        else:
-            runs.append([seed])
-    return [run[0] if len(run) == 1 else f"{run[0]}-{run[1]}" for run in runs]
+    return [first if first == last else f"{first}-{last}" for first, last in runs_of(seeds)]

@@ -27,6 +27,17 @@ def seeds_of(source: PlanFile, entry: Entry) -> list[int]:
     return seeds
 
 
+def runs_of(seeds: Sequence[int]) -> list[tuple[int, int]]:
+    """Return (first, last) of each run of whole numbers that follow one another."""
+    runs: list[tuple[int, int]] = []
+    for seed in seeds:
+        if runs and seed == runs[-1][1] + 1:
+            runs[-1] = runs[-1][0], seed
+        else:
+            runs.append((seed, seed))
+    return runs
+
+
 def refuse_too_many(source: PlanFile) -> None:
     """Count the flights before any of them is made: they may be more than the memory holds.
 

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from typing import Any, TypeGuard
 
+from dockair.parameters import read_sheet
 from dockair.scenarios.campaign.jobs import Job
 from dockair.scenarios.campaign.worker import Answer
 from dockair.scenarios.metrics import HeadingFigures, NavigationFigures
@@ -32,7 +33,7 @@ COLUMNS: dict[str, str] = (
     | {"outcome": "text", "attempts": "int", "first_attempt": "bool", "success": "bool", "unsafe": "text"}
     | {"cause": "text"}
     | dict.fromkeys(_CONTACT, "float")
-    | {"fuel_kg": "float", "collided_with": "text"}
+    | {"fuel_kg": "float", "collided_with": "text", "rim_radius_m": "float"}
     | {f"nav_{f.name}": "int" if f.name == "frames_used" else "float" for f in fields(NavigationFigures)}
     | dict.fromkeys(_HEADING, "float")
     | {"frames": "int", "duration_s": "float", "background": "text", "error": "text"}
@@ -41,7 +42,7 @@ COLUMNS: dict[str, str] = (
 )
 
 _NEVER_EMPTY = {"scenario", "seed", "sensing", "scenario_hash", "command", "attempt_log"}
-_ALWAYS = COLUMNS.keys() - {"nav_by_range", "timeline", "background", *_HEADING}  # these came later
+_ALWAYS = COLUMNS.keys() - {"nav_by_range", "timeline", "background", "rim_radius_m", *_HEADING}  # these came later
 _TYPES = {"text": (str,), "bool": (bool,), "int": (int,), "float": (float, int)}
 
 
@@ -84,6 +85,8 @@ def _asked(job: Job) -> Row:
     row["command"] = job.command
     row |= {"sensing": scenario.sensing, "navigator": scenario.navigation.navigator}
     row["controller"] = scenario.guidance.controller
+    sheet, own = read_sheet("drogue"), scenario.parameters.get("drogue", {})
+    row["rim_radius_m"] = 0.5 * own.get("ring_diameter_m", sheet["ring_diameter_m"].value)
     return row | {f"{SET}{key}": value for key, value in job.drawn.items()}
 
 

@@ -17,9 +17,9 @@ from dockair.scenarios.report.groups import CAPTURE_M, CLOSING_BAND_M_S, Group, 
 from dockair.scenarios.report.headings import Headings, headings_of
 from dockair.scenarios.report.svg import STYLE, as_svg, say
 
-RIM_M = 0.25  # the LED ring's radius
 CLOSING_LIMIT_M_S = 2.6
 _FRAME_M = 0.6  # half the side of the picture of where tips went
+_NO_RIM = "no rim: this table does not say its radius"  # of before it was a column
 _CLOSING_AXIS_M_S = 2.8
 _ROWS_APART_IN = 0.12  # half of the gap between a label and the title below it
 #: Outcomes of attempts whose tip never crossed the ring's plane; of a collision or a strike it may have, or not.
@@ -82,7 +82,10 @@ def _scatter(ax: Axes, group: Group) -> None:
         )  # fmt: skip
     outside = int((np.abs(_places(group.attempts)) > _FRAME_M).any(axis=1).sum())
     ax.add_patch(Circle((0.0, 0.0), CAPTURE_M, fill=False, color="tab:green", linestyle="--"))
-    ax.add_patch(Circle((0.0, 0.0), RIM_M, fill=False, color="black"))
+    for rim_m in group.rims_m:
+        ax.add_patch(Circle((0.0, 0.0), rim_m, fill=False, color="black"))
+    if not group.rims_m:
+        ax.text(0.0, -0.95 * _FRAME_M, _NO_RIM, ha="center", color="tab:gray", fontsize=7)
     frame = (-_FRAME_M, _FRAME_M)
     beyond = f"; {outside} beyond, on the frame" if outside else ""
     ax.set(xlim=frame, ylim=frame, aspect="equal", xlabel=f"right [m], seen from behind{beyond}", ylabel="up [m]")

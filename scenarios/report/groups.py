@@ -21,6 +21,7 @@ import numpy as np
 
 from dockair.rotations import Array
 from dockair.scenarios.accept import has_refuelled
+from dockair.scenarios.campaign.points import runs_of
 from dockair.scenarios.campaign.row import SET
 from dockair.scenarios.crew_tables import OUR_NAVIGATOR
 from dockair.scenarios.no_attempt import cause_and_ending, ending
@@ -134,6 +135,12 @@ class Group:
         return f"{len(self.rows)} flights" + ("" if self.independent else f" of {self.seeds} seeds")
 
     @property
+    def seeds_in_words(self) -> str:
+        """Which seeds, with runs of them as "first to last"."""
+        runs = runs_of(sorted({int(row["seed"]) for row in self.rows}))
+        return ", ".join(str(first) if first == last else f"{first} to {last}" for first, last in runs)
+
+    @property
     def mark(self) -> str:
         """Stands behind an interval that is too narrow."""
         return "" if self.independent else " †"
@@ -162,6 +169,11 @@ class Group:
     def refuelled(self) -> Share:
         """Flights that held the probe in the coupling until they had refuelled."""
         return Share(sum(map(has_refuelled, self.rows)), len(self.rows))
+
+    @property
+    def rims_m(self) -> list[float]:
+        """Radii of the rims of the drogues flown; none where the rows are from before they were told."""
+        return sorted({radius for row in self.rows if (radius := row.get("rim_radius_m")) is not None})
 
     @cached_property
     def contacts(self) -> list[Row]:

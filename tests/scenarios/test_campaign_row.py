@@ -77,6 +77,18 @@ def test_an_own_heading_fills_its_columns_and_without_one_they_are_empty(job):
     assert is_row(kept) and is_row(before_there_was_one)
 
 
+def test_a_row_says_the_rims_radius_of_its_scenarios_drogue_and_one_of_before_it_did_is_a_row_too(tmp_path):
+    (tmp_path / "ring.toml").write_text("diameter_m = 0.61\ncount = 8\n")
+    wide = (
+        '{ scenario = "default", set = { "hardware.ring" = "ring.toml", "parameters.drogue.ring_diameter_m" = 0.61 } }'
+    )
+    (tmp_path / "p.toml").write_text(PLAN.format(seeds=1, scenarios=f'"default", {wide}'))
+    own, other = (row_of(job, Answer(columns=columns_of(result()))) for job in jobs_of(PlanFile(tmp_path / "p.toml")))
+    assert (own["rim_radius_m"], other["rim_radius_m"]) == (0.25, 0.305)
+    before = {name: value for name, value in other.items() if name != "rim_radius_m"}
+    assert is_row(before)
+
+
 def test_without_contact_its_columns_are_empty_and_what_was_unsafe_is_one_text(job):
     row = row_of(job, Answer(columns=columns_of(result(contact=None, outcome="miss", unsafe=("3.1 m/s", "rim")))))
     assert row["unsafe"] == "3.1 m/s; rim"

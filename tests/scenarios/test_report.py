@@ -5,7 +5,9 @@ import re
 from html.parser import HTMLParser
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
+from matplotlib.figure import Figure
 
 from dockair.errors import DockairError
 from dockair.scenarios.campaign import manifest as manifests
@@ -97,6 +99,35 @@ def test_sensing_is_never_pooled():
     rows = [_row(seed, sensing=kind) for seed in range(3) for kind in ("camera", "truth", "measurements")]
     groups = groups_of(rows)
     assert [(group.sensing, len(group.rows)) for group in groups] == [("camera", 3), ("measurements", 3), ("truth", 3)]
+
+
+def test_the_seeds_of_a_group_are_told_with_their_gaps():
+    (group,) = groups_of([_row(seed) for seed in (12, 13, 14, 9, 1, 2, 3, 4)])
+    assert group.seeds_in_words == "1 to 4, 9, 12 to 14"
+    assert "8 flights, seeds 1 to 4, 9, 12 to 14; navigator" in page("made", [_campaign(group.rows)])
+    drawn = {"set.start.aft_m": 5.0}
+    (twice,) = groups_of([_row(3, command=_command("light_gusts", 3, **{"start.aft_m": 5.0})) | drawn] * 2)
+    assert twice.seeds_in_words == "3"
+    assert "2 flights of 1 seeds, seed 3; navigator" in page("made", [_campaign(twice.rows)])
+
+
+@pytest.mark.parametrize("rims_m", [[0.25], [0.305], [0.25, 0.305], []])
+def test_the_places_of_the_tip_are_shown_in_the_rim_of_the_drogue_flown_and_without_one_it_is_said(rims_m):
+    (group,) = groups_of([_row(seed, rim_radius_m=radius_m) for seed, radius_m in enumerate(rims_m or [None])])
+    ax = Figure().subplots()
+    figures._scatter(ax, group)
+    assert [patch.radius for patch in ax.patches] == [0.15, *rims_m]
+    assert [text.get_text() for text in ax.texts] == ([] if rims_m else ["no rim: this table does not say its radius"])
+    assert group.rims_m == rims_m
+
+
+def test_a_table_of_before_the_rims_radius_was_a_column_is_read_and_has_no_rim(tmp_path):
+    table.write_table([_row(0)], tmp_path)
+    parquet = pq.read_table(tmp_path / table.FILE_NAME).drop_columns(["rim_radius_m"])
+    pq.write_table(parquet, tmp_path / table.FILE_NAME)
+    (group,) = groups_of(table.read_table(tmp_path))
+    assert "rim_radius_m" not in group.rows[0] and group.rims_m == []
+    assert "no rim" in panels(group)
 
 
 def test_what_is_set_makes_a_group_of_its_own_and_so_does_a_draw():
