@@ -43,7 +43,7 @@ class AttemptOutcome(Enum):
 class RefereeLimits:
     """What a good contact keeps to, and what is unsafe. Defaults: service practice, or this test bed's drogue."""
 
-    radial_offset_m: float = 0.15  # the basket guides a tip within it to the coupling at every permitted speed
+    radial_offset_m: float = 0.15  # whatever the drogue; one of 0.5 m leads a tip within it to the coupling at 2.4 m/s
     angle_deg: float = 10.0  # of the coupling
     closure_speed_m_s: float = 2.6  # 5 kt, service limit; above it a touch is unsafe
     rim_radius_m: float = 0.25  # half the ring's diameter: what is touched from farther out is the basket's outside

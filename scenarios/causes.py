@@ -18,10 +18,11 @@ not flown. The largest share names the cause. Rules, the first that holds:
 | collision        | the coupling held the probe in the attempt, and then the receiver struck something               |
 | detection        | the solution was not valid for half of the last second                                           |
 | integrity        | it was valid, and marked as not to be flown into contact for half of the last second             |
-| outside_limits   | the tip entered the basket inside the capture radius and was held, too fast or at too wide an    |
-|                  | angle                                                                                            |
-| not_held         | the same, and was not held                                                                       |
-| called_off       | the navigation went back although the ring was inside the capture radius for all of that second  |
+| outside_limits   | the attempt's offset (drogue axes, in the ring's plane) was a good contact's and the tip held,   |
+|                  | too fast or at too wide an angle                                                                 |
+| not_held         | the same, and it was not held                                                                    |
+| called_off       | the navigation went back although the ring was no farther off the probe's line than a good       |
+|                  | contact may be, for all of that second                                                           |
 | ambiguity        | share of navigation the largest, and the believed attitude was the mirrored one, about the line  |
 |                  | from the camera, or rolled by more than half an LED's spacing for half of the last second        |
 | navigation_error | share of navigation the largest, otherwise                                                       |
@@ -31,6 +32,9 @@ not flown. The largest share names the cause. Rules, the first that holds:
 | control_limit    | the rest the largest, otherwise: the receiver could not follow, or was not told to               |
 | fault            | instead of one of these, when a fault that can bring it about acted before the attempt was       |
 |                  | decided, or ended if it was called off                                                           |
+
+How far off a good contact may be is asked of the flight whatever drogue it meets: a wider ring leads no farther tip to
+the coupling, for its ribs stand flatter (docs/models/coupling.md).
 
 A flight without any attempt has the cause diverged if the simulation broke down, detection if the solution was valid
 for less than half of its last half, else never_steady. A flight in which an attempt failed or none began, and whose
@@ -80,7 +84,7 @@ class CauseRules:
     leds: int = 8  # on the ring: a numbering that is off by one is rolled by 1/8 of a turn
     away_cosine: float = 0.7071  # within 45 degrees of "away from the nose"
     blown: float = 2.0  # times the air's own variation; more than 1 in 20 gusts of a second reach
-    limits: RefereeLimits = field(default_factory=RefereeLimits)  # whose radius the basket takes the tip within
+    limits: RefereeLimits = field(default_factory=RefereeLimits)  # of a good contact
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -199,7 +203,9 @@ def _cause(attempt: Attempt, flown: Flown, rules: CauseRules) -> str:
     if called_off:
         k = max(last, key=lambda i: float(np.linalg.norm(flown.truths[i].p_PD_B[1:])))
     miss = flown.truths[k].p_PD_B[1:]
-    if np.linalg.norm(miss) <= rules.limits.radial_offset_m:
+    # the offset is that which decides on a good contact: across the body it is less by the cosine of the angle
+    offset_m = float(np.linalg.norm(miss)) if called_off else attempt.radial_offset_m
+    if offset_m <= rules.limits.radial_offset_m:
         if attempt.outcome == AttemptOutcome.CONTACT.value:
             return "outside_limits"
         return "called_off" if called_off else "not_held"

@@ -65,7 +65,9 @@ def solution(t, p_PD_B, R_BD, valid=True, usable=True):
 
 
 def cause(flown, **changes):
-    return with_cause(attempt(**changes), flown).cause
+    """Cause of an attempt whose offset is the flight's where it was decided."""
+    at = flown.truths[flown.tick_at(changes.get("decided_s", END_S))]
+    return with_cause(attempt(**{"radial_offset_m": float(np.linalg.norm(at.p_DP[1:]))} | changes), flown).cause
 
 
 def kick(t):
@@ -234,6 +236,22 @@ def test_a_tip_inside_the_basket_that_was_not_held_and_one_that_was_called_off_o
     assert cause(inside, outcome="rim_strike") == "not_held"
     assert cause(inside, outcome="given_up") == "called_off"
     assert cause(flight(tip=lambda t: (0.0, -0.16)), outcome="given_up") == "control_limit"
+
+
+@pytest.mark.parametrize(
+    ("offset_m", "held", "lost"),
+    [(0.149, "outside_limits", "not_held"), (0.152, "control_limit", "control_limit")],
+)
+def test_a_tip_is_inside_by_its_offset_in_the_drogues_axes_not_by_that_across_the_body(flight, offset_m, held, lost):
+    """The drogue is tilted by 15 degrees: 0.152 m off its axis are 0.147 m across the body."""
+    angle = np.radians(15.0)
+    across, along = -offset_m * np.cos(angle), -offset_m * np.sin(angle)
+    flown = flight(tip=lambda t: (0.0, across), attitude=(0.0, angle, 0.0))
+    moved = [replace(truth, p_WP=truth.p_WP + np.array([along, 0.0, 0.0])) for truth in flown.truths]
+    tilted = replace(flown, truths=moved)
+    np.testing.assert_allclose(tilted.truths[400].p_DP, [0.0, 0.0, -offset_m], atol=1e-12)
+    assert cause(tilted, outcome="contact", angle_deg=15.0) == held
+    assert cause(tilted, outcome="rim_strike") == lost
 
 
 def test_a_receiver_that_was_held_and_then_struck_something_has_collided_and_one_that_was_not_held_has_not_been(flight):
