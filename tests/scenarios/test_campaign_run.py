@@ -98,7 +98,7 @@ def fakes(tmp_path, monkeypatch):
     (folder / "fake_flights.py").write_text(FAKE)
     monkeypatch.syspath_prepend(str(folder))
     monkeypatch.setenv("FLOWN", str(tmp_path / "flown"))
-    monkeypatch.setenv("PYTHONPATH", str(folder))
+    monkeypatch.setenv("PYTHONPATH", str(folder), prepend=os.pathsep)  # of a clone its own Dockair stands there
     monkeypatch.setattr("dockair.scenarios.campaign.code.dockair_files", dict)  # whoever edits the sources meanwhile
     monkeypatch.setattr(manifest, "commit_of_the_code", lambda: ("abc", False))
     return tmp_path / "flown"
