@@ -179,7 +179,7 @@ class RelativeFilter:
         if time_s is None:
             time_s = self._buffer.newest_s if self._buffer.newest is not None else 0.0
         belief, r, average_s = self._belief(time_s), self._p_IP, self._settings.rate_average_s
-        w_B = self._record.mean_rate_B(time_s - average_s, time_s) - belief.bias
+        w_B = self._record.mean_rate_B(time_s, average_s) - belief.bias
         rate2 = self._rate_variance(time_s)
         v, rate, covariance = _of_tip(w_B, belief.p_ID, belief.v_ID, belief.P, r, self._to_tip, self._lever2, rate2)
         return FilterState(
@@ -195,10 +195,10 @@ class RelativeFilter:
         """(3,) gyro rate less its bias [rad/s], linear between samples, that of the nearest one outside."""
         return self._record.rate_B(time_s) - self.bias_B if math.isfinite(self.imu_time_s) else np.zeros(3)
 
-    def mean_rate_B(self, start_s: float, end_s: float) -> Array:
-        """(3,) mean of the gyro samples after `start_s` up to `end_s`, less the bias [rad/s]; without any, `rate_B`."""
+    def mean_rate_B(self, time_s: float, span_s: float) -> Array:
+        """(3,) mean of the newest gyro samples up to a time, a span of them, less the bias [rad/s]."""
         felt = math.isfinite(self.imu_time_s)
-        return self._record.mean_rate_B(start_s, end_s) - self.bias_B if felt else np.zeros(3)
+        return self._record.mean_rate_B(time_s, span_s) - self.bias_B if felt else np.zeros(3)
 
     @property
     def bias_B(self) -> Array:
@@ -260,12 +260,13 @@ class RelativeFilter:
         return self._shown[1]
 
     def _rate_variance(self, time_s: float) -> float:
-        """Of the averaged rate, each axis, by what may have changed since the samples' middle.
+        """Of the averaged rate, each axis, by what may have changed since the moment that it belongs to.
 
         The gyro's noise is left out: v was found with the same samples, which took w x s for a part of it, so that in
         v - w x r it nearly cancels.
         """
-        age_s = max(time_s - self._record.newest_s, 0.0) + 0.5 * self._settings.rate_average_s
+        averaged_s = self._record.mean_age_s(self._settings.rate_average_s)
+        age_s = max(time_s - self._record.newest_s, 0.0) + averaged_s
         return float(min(self._motion.held_turn2 * age_s**2, self._settings.held_rate_sigma_rad_s**2))
 
     def _feel(self, force_B: Array) -> None:

@@ -85,9 +85,7 @@ class FusionSettings:
     led_place_share: float = 0.3  # of what a frame says of the LEDs' places (docs/fusion.md)
     #: LEDs out of the ring's plane and the lens's distortion show as places that change with the view: 0.03 mm in 10 s.
     led_place_walk_m_rts: float = 1e-5
-    rate_average_s: float = (
-        0.01  # gyro samples averaged for Eq. (1) of `fusion`: noise against lag, 5 samples at 500 Hz, 6 by jitter
-    )
+    rate_average_s: float = 0.01  # gyro samples averaged for Eq. (1) of `fusion`: noise against lag, 5 at 500 Hz
 
     def __post_init__(self) -> None:
         exists = ("tight", "loose")

@@ -53,6 +53,7 @@ class ImuRecord:
 
     def __init__(self, mounting: Mounting, gyro: GyroSheet, saturated: float) -> None:
         self._R_BI = np.ascontiguousarray(mounting.R_BI, dtype=float)
+        self._rate_hz = float(gyro.rate_hz)
         self._limits = saturated * gyro.range_rad_s, saturated * gyro.accelerometer_range_m_s2  # rad/s, m/s^2
         self._times, self._rates, self._forces = np.empty(_FIRST_ROOM), np.empty((_FIRST_ROOM, 3)), self._none()
         self._first = self._end = 0
@@ -100,14 +101,31 @@ class ImuRecord:
         """(3,) rate [rad/s], linear between samples, that of the nearest one outside, 0 when there is none."""
         return _rate_at(self.times_s, self.rates_B, time_s)
 
-    def mean_rate_B(self, start_s: float, end_s: float) -> Array:
-        """(3,) mean of the samples after `start_s` up to `end_s`, or else the rate there; to a microsecond."""
-        mean = _mean(self.times_s, self.rates_B, start_s, end_s)
-        return self.rate_B(end_s) if math.isnan(mean[0]) else mean  # no rate is taken that is not a number
+    def mean_rate_B(self, time_s: float, span_s: float) -> Array:
+        """(3,) mean of the newest samples up to a time, always of as many: the rate `mean_age_s` before the newest.
+
+        They are counted, because stamps jitter: a span that begins where a sample should be holds it or not, by chance.
+        After a gap they are fewer: none is older than the newest by as many periods. With none up to the time it is the
+        rate there.
+
+        Args:
+            time_s: to the microsecond.
+            span_s: as long as so many periods, to the nearest: of 0.01 s five at 500 Hz, two at 225 Hz, one at 125 Hz
+                and below. Noise and age of the mean go with it.
+        """
+        samples = self._samples_in(span_s)
+        return _mean_of_newest(self.times_s, self.rates_B, time_s, samples, samples / self._rate_hz)
+
+    def mean_age_s(self, span_s: float) -> float:
+        """How long before the newest of its samples the moment is of which `mean_rate_B` is the rate [s]."""
+        return 0.5 * (self._samples_in(span_s) - 1) / self._rate_hz
 
     def mean_force_B(self, start_s: float, end_s: float) -> Array:
-        """(3,) mean specific force of the samples after `start_s` up to `end_s`; NaN when any or all are none."""
-        return _mean(self.times_s, self.forces_B, start_s, end_s)
+        """(3,) mean specific force of the samples after `start_s` up to `end_s`; NaN when any or all are none.
+
+        From the stamp of one sample to that of another jitter moves none in or out, and none counts in two steps.
+        """
+        return _mean_between(self.times_s, self.forces_B, start_s, end_s)
 
     def is_unbroken(self, start_s: float, end_s: float, longest_gap_s: float, *, forces: bool) -> bool:
         """Whether samples came all the time from one moment to another.
@@ -121,6 +139,9 @@ class ImuRecord:
         return bool(
             _is_unbroken(self.times_s, self.forces_B, start_s, end_s, longest_gap_s + STAMP_RESOLUTION_S, forces)
         )
+
+    def _samples_in(self, span_s: float) -> int:
+        return max(math.floor(span_s * self._rate_hz + 0.5), 1)
 
     def _make_room(self) -> None:
         kept = self._end - self._first
@@ -166,16 +187,28 @@ def _rate_at(times: Array, rates: Array, time_s: float) -> Array:
 
 
 @njit(cache=True, error_model="numpy")
-def _mean(times: Array, values: Array, start_s: float, end_s: float) -> Array:
-    """(3,) mean of the values (k, 3) of samples after a time up to another; NaN of none.
+def _mean_of_newest(times: Array, rates: Array, time_s: float, samples: int, longest_s: float) -> Array:
+    """(3,) of rates (k, 3), see `ImuRecord.mean_rate_B`; left out are those as old as `longest_s` beside the newest."""
+    stop = int(np.searchsorted(times, time_s + STAMP_RESOLUTION_S, side="right"))
+    if stop == 0:
+        return _rate_at(times, rates, time_s)
+    first, after_s = stop - 1, times[stop - 1] - longest_s + STAMP_RESOLUTION_S
+    while first > 0 and stop - first < samples and times[first - 1] > after_s:
+        first -= 1
+    return _mean(rates, first, stop)
 
-    A stamp that rounding puts beside a limit is on it: of even stamps at 500 Hz five count in 10 ms, and not six. Those
-    that jitter by more than a microsecond are taken as they are: where a limit should fall on one, either may be.
-    """
+
+@njit(cache=True, error_model="numpy")
+def _mean_between(times: Array, values: Array, start_s: float, end_s: float) -> Array:
+    """(3,) mean of the values (k, 3) of samples after a time up to another, both to the microsecond; NaN of none."""
     first = int(np.searchsorted(times, start_s + STAMP_RESOLUTION_S, side="right"))
     stop = int(np.searchsorted(times, end_s + STAMP_RESOLUTION_S, side="right"))
-    if stop <= first:
-        return np.full(3, np.nan)
+    return _mean(values, first, stop) if stop > first else np.full(3, np.nan)
+
+
+@njit(cache=True, error_model="numpy")
+def _mean(values: Array, first: int, stop: int) -> Array:
+    """(3,) mean of some rows of (k, 3)."""
     out = values[first].copy()
     for k in range(first + 1, stop):
         out += values[k]

@@ -315,7 +315,7 @@ class Navigator:
         claim = self.contact_claim()
         contact_usable = valid and claim is not None and claim.usable
         self._contact.note_basket(state, claim, usable=contact_usable)
-        w_WB_B = self._filter.mean_rate_B(self._felt_time_s, self._time_s)
+        w_WB_B = self._filter.mean_rate_B(self._time_s, 1.0 / self._sheets.control_rate_hz)
         command = self._guidance.step(
             RelativeState(
                 usable=valid,

@@ -485,20 +485,41 @@ def test_rate_is_told_in_body_axes_linear_between_samples_and_held_outside():
         np.testing.assert_allclose(filter_.rate_B(time_s), factor * w, atol=1e-12)
 
 
-def test_the_mean_rate_is_that_of_the_samples_between_two_moments_less_the_bias():
+def test_the_mean_rate_is_that_of_as_many_samples_as_last_a_span_less_the_bias():
+    """At 250 Hz, in 0.02 s: five."""
     filter_ = RelativeFilter(sheets(8.0), SETTINGS)
-    np.testing.assert_array_equal(filter_.mean_rate_B(0.0, 0.01), np.zeros(3))
+    np.testing.assert_array_equal(filter_.mean_rate_B(0.01, 0.02), np.zeros(3))
     w = np.array([0.1, 0.2, -0.3])
-    samples = [(1.002 + 0.002 * k, 1.0 + k) for k in range(10)]
+    samples = [(1.004 + 0.004 * k, 1.0 + k) for k in range(10)]
     filter_.propagate([ImuSample(time_stamp_s=t, angular_rate_rad_s=k * MOUNTING.R_BI.T @ w) for t, k in samples])
-    np.testing.assert_allclose(filter_.mean_rate_B(1.011, 1.021), 8.0 * w, atol=1e-12)  # the last five of ten
-    np.testing.assert_allclose(filter_.mean_rate_B(1.03, 1.04), 10.0 * w, atol=1e-12)  # none: the last one holds
-    R, p, _ = filter_.predicted_pose(1.02)
+    np.testing.assert_allclose(filter_.mean_rate_B(1.041, 0.02), 8.0 * w, atol=1e-12)  # the last five of ten
+    np.testing.assert_allclose(filter_.mean_rate_B(1.08, 0.02), 8.0 * w, atol=1e-12)  # held
+    R, p, _ = filter_.predicted_pose(1.04)
     seen = solve_pose(CAMERA.pixels_from_points(RING @ R.T + p + [0.0, 0.02, 0.0]), RING, CAMERA)
-    assert filter_.update(seen, 1.02)
-    bias = filter_.rate_B(1.02) - 10.0 * w
+    assert filter_.update(seen, 1.04)
+    bias = filter_.rate_B(1.04) - 10.0 * w
     assert np.abs(bias).max() > 1e-9
-    np.testing.assert_allclose(filter_.mean_rate_B(1.011, 1.021), 8.0 * w + bias, atol=1e-12)
+    np.testing.assert_allclose(filter_.mean_rate_B(1.041, 0.02), 8.0 * w + bias, atol=1e-12)
+
+
+def test_the_rate_of_the_place_is_by_the_gyros_mean_of_one_age_whatever_the_jitter():
+    """500 Hz, rates that grow evenly, stamps as the MTi's: v_PD - d/dt p_PD = w x p_PD, w of 4 ms before the tick."""
+    known = sheets(8.0)
+    filter_ = RelativeFilter(replace(known, gyro=replace(GYRO, rate_hz=500)), SETTINGS)
+    draws, slope = np.random.default_rng(0), np.array([0.01, 0.02, -0.03])
+    for tick in range(1, 1000):
+        times = (5 * tick + np.arange(-4, 1)) / 500.0
+        filter_.propagate(
+            [
+                ImuSample(
+                    time_stamp_s=t + 1e-5 * draws.standard_normal(), angular_rate_rad_s=t * MOUNTING.R_BI.T @ slope
+                )
+                for t in times
+            ]
+        )
+        state = filter_.state(filter_.imu_time_s)
+        turning = np.cross((times[-1] - 0.004) * slope, state.p_PD_B)
+        np.testing.assert_allclose(state.v_PD_B - state.rate_PD_B, turning, atol=1e-9)
 
 
 def struck(seed, settings):

@@ -88,25 +88,68 @@ def test_nothing_is_lost_when_nothing_may_be_forgotten():
     np.testing.assert_allclose(kept.rates_B[:, 1], 0.001 * np.arange(1500))
 
 
-def test_mean_rate_is_of_the_samples_in_the_interval_or_else_the_rate_there():
+def test_mean_rate_is_of_the_newest_samples_up_to_a_time_or_else_the_rate_there():
     kept = record()
     for k in range(5):
-        kept.take(sample(0.01 * k, float(k % 2)))
-    assert kept.mean_rate_B(0.005, 0.035)[1] == pytest.approx(2.0 / 3.0)
-    assert kept.mean_rate_B(0.011, 0.015)[1] == pytest.approx(0.5)
-    np.testing.assert_array_equal(record().mean_rate_B(0.0, 1.0), np.zeros(3))
+        kept.take(sample(1.0 + 0.01 * k, 0.1 * k**2))
+    assert kept.mean_rate_B(1.035, 0.03)[1] == pytest.approx((0.1 + 0.4 + 0.9) / 3.0)
+    assert kept.mean_rate_B(1.04, 0.015)[1] == pytest.approx((0.9 + 1.6) / 2.0)
+    assert kept.mean_rate_B(1.2, 0.015)[1] == pytest.approx((0.9 + 1.6) / 2.0)  # held
+    assert kept.mean_rate_B(1.04, 0.0)[1] == pytest.approx(1.6)
+    assert kept.mean_rate_B(1.015, 0.05)[1] == pytest.approx(0.05)  # there are no more
+    assert kept.mean_rate_B(0.9, 0.05)[1] == 0.0
+    np.testing.assert_array_equal(record().mean_rate_B(1.0, 0.05), np.zeros(3))
 
 
-def test_of_a_control_period_as_many_samples_count_at_every_tick():
-    """500 Hz, stamps even to a microsecond, ticks not: a sixth sample would be 10 ms old."""
+def test_mean_rate_leaves_out_what_is_older_than_a_gap():
+    """At 100 Hz, four samples: those that are 0.04 s older than the newest, or more."""
     kept = record()
-    for k in range(2000):
-        kept.take(sample(round(0.002 * k, 6), 0.001 * k))
-    for tick in range(1, 400):
-        time_s = tick / 100.0 * (1.0 + 1e-10 * (-1) ** tick)
-        newest = round(time_s * 500)
-        if newest < 2000:
-            assert kept.mean_rate_B(time_s - 0.01, time_s)[1] == pytest.approx(0.001 * (newest - 2.0)), tick
+    for k in (*range(10), *range(20, 26)):
+        kept.take(sample(0.01 * k, 0.1 if k < 10 else 0.1 * k))
+    means = [kept.mean_rate_B(0.01 * k, 0.04)[1] for k in (9, 15, 20, 21, 22, 23, 24)]
+    np.testing.assert_allclose(means, [0.1, 0.1, 2.0, 2.05, 2.1, 2.15, 2.25])
+    missed = record()
+    for k in (0, 1, 2, 4):
+        missed.take(sample(0.01 * k, 0.1 * k))
+    assert missed.mean_rate_B(0.04, 0.04)[1] == pytest.approx((0.1 + 0.2 + 0.4) / 3.0)
+
+
+@pytest.mark.parametrize("jitter_s", [0.0, 1e-6, 1e-5, 1e-4, 0.01], ids=["none", "tactical", "mti", "consumer", "most"])
+@pytest.mark.parametrize(
+    ("gyro_hz", "control_hz", "samples"),
+    [(500, 100, 5), (300, 100, 3), (700, 100, 7), (250, 100, 3), (225, 100, 2), (125, 100, 1), (450, 180, 3)]
+    + [(100, 100, 1), (50, 100, 1), (20, 100, 1)],
+)
+def test_of_a_control_period_as_many_samples_count_at_every_tick(gyro_hz, control_hz, samples, jitter_s):
+    """The rate grows evenly, so that the mean is that of the moment to which it belongs. Jitter as [imu, eq 3]."""
+    kept = ImuRecord(MOUNTING, replace(GYRO, rate_hz=gyro_hz), 0.999)
+    draws, span_s, sent = np.random.default_rng(0), 1.0 / control_hz, 0
+    for tick in range(1, 3000):
+        while sent * control_hz <= tick * gyro_hz:
+            off_s = np.clip(jitter_s * draws.standard_normal(), -0.49 / gyro_hz, 0.49 / gyro_hz)
+            assert kept.take(sample(sent / gyro_hz + off_s, 0.1 * sent / gyro_hz))
+            sent += 1
+        if sent > samples:
+            moment_s = (sent - 1) / gyro_hz - kept.mean_age_s(span_s)
+            assert kept.mean_rate_B(kept.newest_s, span_s)[1] == pytest.approx(0.1 * moment_s, abs=1e-12), tick
+        kept.forget(kept.newest_s - 0.3)
+    assert kept.mean_age_s(span_s) == pytest.approx(0.5 * (samples - 1) / gyro_hz)
+
+
+def test_a_sample_counts_in_the_mean_force_of_one_step_whatever_the_jitter():
+    """Steps from one tick's newest stamp to the next one's, at 225 Hz and 100 Hz: of two samples or three."""
+    kept, draws, sent, before_s = record(), np.random.default_rng(0), 0, 0.0
+    for tick in range(1, 2000):
+        felt = []
+        while (sent + 1) * 100 <= tick * 225:
+            sent += 1
+            off_s = np.clip(0.01 * draws.standard_normal(), -0.49 / 225, 0.49 / 225)
+            force = np.array([0.0, 0.0, 9.8 + 0.01 * sent])
+            assert kept.take(replace(sample(sent / 225 + off_s), specific_force_m_s2=force))
+            felt.append(force[2])
+        assert len(felt) in (2, 3)
+        assert kept.mean_force_B(before_s, kept.newest_s)[2] == pytest.approx(np.mean(felt)), tick
+        before_s = kept.newest_s
 
 
 def test_a_stamp_that_leaps_needs_a_second_one():

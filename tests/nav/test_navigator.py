@@ -126,6 +126,29 @@ def test_guidance_is_told_the_mean_of_a_tick_s_gyro_samples(render):
     np.testing.assert_allclose(told[-1], 1.4 * R_BI[:, 2], atol=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("gyro_hz", "control_hz", "age_s"),
+    [(500, 100, 0.004), (125, 100, 0.0), (225, 100, 0.5 / 225), (450, 180, 1.0 / 450), (50, 100, 0.0)],
+)
+def test_the_rate_that_guidance_is_told_is_of_one_age_whatever_the_rates(gyro_hz, control_hz, age_s):
+    """A rate that grows evenly, stamps with jitter: of a gyro that is no multiple of control, too, not of 2 or 3."""
+    known = sheets()
+    navigator = Navigator(replace(known, gyro=replace(known.gyro, rate_hz=gyro_hz), control_rate_hz=control_hz))
+    told, draws, sent = [], np.random.default_rng(0), 0
+    guided = navigator._guidance.step
+    navigator._guidance.step = lambda state: told.append(state.w_WB_B) or guided(state)
+    for tick in range(1, 2 * control_hz):
+        samples = []
+        while (sent + 1) * control_hz <= tick * gyro_hz:
+            sent += 1
+            stamp_s, rate = sent / gyro_hz + 1e-5 * draws.standard_normal(), np.array([0.0, 0.0, 0.1 * sent / gyro_hz])
+            samples.append(ImuSample(time_stamp_s=stamp_s, angular_rate_rad_s=rate))
+        navigator.step(samples, None)
+        if sent > 3:
+            expected = 0.1 * (sent / gyro_hz - age_s) * known.mounting.R_BI[:, 2]
+            np.testing.assert_allclose(told[-1], expected, atol=1e-9)
+
+
 @pytest.mark.parametrize(("gyro_hz", "control_hz"), [(500, 100), (125, 100), (225, 180)])
 def test_guidance_is_told_what_the_tip_feels_whatever_the_rates(gyro_hz, control_hz):
     """A push of 0.8 m/s; of an IMU of 125 Hz one tick in four has two samples, 16 ms after those of the tick before."""
