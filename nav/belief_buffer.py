@@ -1,4 +1,4 @@
-"""What is believed at the moments of the last half second, so that a message that is late finds its place.
+"""What is believed at the moments of the last second, so that a message that is late finds its place.
 
 A node is a moment with the belief after it: that of a frame, or one to begin at. Between nodes the belief is run
 forward with the IMU's samples; the head is that at the newest sample. A frame put among the nodes is followed by all

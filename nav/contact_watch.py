@@ -23,6 +23,17 @@ from dockair.nav.integrity.monitor import Integrity
 from dockair.nav.integrity.sensitivity import moved_by_places
 from dockair.rotations import Array
 
+_PERIODS = 1.5  # of the camera, between two frames of which none is missing
+
+
+def look_back_s(sheets: NavigationSheets, limits: ContactLimits, coasting: CoastingSettings) -> float:
+    """Return how long before a frame one may have been taken that is asked what it foretold of it.
+
+    The newest that is as old as the horizon, if frames come as they should; after a drop-out an older one, unless the
+    claim had ended meanwhile: the drogue is found again then, which says nothing of a belief that follows it.
+    """
+    return max(limits.age_s, coasting.horizon_s + _PERIODS / sheets.camera_rate_hz)
+
 
 class ContactWatch:
     """Keeps the newest test of a pose, and what has become of the belief since.
@@ -45,6 +56,7 @@ class ContactWatch:
         self._camera_rate_hz = sheets.camera_rate_hz
         self._belief, self._limits = belief, limits
         self._horizon_s, self._coasting = coasting.horizon_s, CoastingError(coasting)
+        self._look_back_s = look_back_s(sheets, limits, coasting)
         self._integrity: Integrity | None = None
         self._posed_time_s = self._used_time_s = float("nan")
         self._contradicted_s = -np.inf
@@ -125,8 +137,9 @@ class ContactWatch:
     def _ask_coasting(self, time_s: float) -> None:
         """Hold what had been foretold for a frame against what is believed with it."""
         foretold_B, age_s = self._belief.foretold_p_PD_B(time_s, self._horizon_s)
-        error_B = self._belief.p_PD_B(time_s) - foretold_B
-        self._coasting.take(self._R_BC.T @ error_B, age_s, time_s)
+        if age_s <= self._look_back_s:  # NaN where none is kept
+            error_B = self._belief.p_PD_B(time_s) - foretold_B
+            self._coasting.take(self._R_BC.T @ error_B, age_s, time_s)
 
     def _sigmas_to_ask_m(self, time_s: float) -> Array:
         """(3,) of the belief in camera axes [m]; 0 where what it foretold wrongly says all: with IMU, well followed."""

@@ -1,8 +1,8 @@
 """Which frames say nothing, found before anyone looks at them.
 
 A camera that hangs sends its last picture with new stamps: one that equals the picture before it to the last bit is
-none, since noise makes any two differ. A stamp ahead of the navigation's own clock, or older than what the filter
-keeps, is one to which nothing can be carried. An LED whose numbers are not finite is not seen.
+none, since noise makes any two differ. A stamp ahead of the navigation's own clock, or older than a frame may
+be, is one to which nothing can be carried. An LED whose numbers are not finite is not seen.
 
 Not modelled: a camera that hangs for some rows only, or whose clock is off by less than a period.
 """

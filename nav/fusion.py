@@ -57,9 +57,13 @@ class RelativeFilter:
     Args:
         sheets: calibration, mounting, start geometry, gyro.
         settings: belief about motion, and the gate.
+        look_back_s: how long before the latest frame one may have been taken whose belief can still be asked what it
+            foretold of that (`foretold_p_PD_B`).
     """
 
-    def __init__(self, sheets: NavigationSheets, settings: FusionSettings | None = None) -> None:
+    def __init__(
+        self, sheets: NavigationSheets, settings: FusionSettings | None = None, *, look_back_s: float = 0.0
+    ) -> None:
         self._settings = settings or FusionSettings()
         self._sheets = sheets
         self._sight = Sight(mounting=sheets.mounting, points_D=sheets.ring.positions_D)
@@ -81,7 +85,7 @@ class RelativeFilter:
             self._motion,
             [start_of(self._settings, sheets)],
             self._taken_again,
-            span_s=self._settings.buffer_s,
+            span_s=self._settings.buffer_s + look_back_s,
             interval_s=self._settings.node_interval_s,
         )
         self._refusals, self._felt, self._doubted_s = 0, False, -math.inf
@@ -125,7 +129,7 @@ class RelativeFilter:
 
         Args:
             pose: of the LEDs, with its lines of sight if it comes from `solve_pose`.
-            time_stamp_s: middle of the exposure; at most `buffer_s` before the newest message.
+            time_stamp_s: middle of the exposure; at most `buffer_s` and `look_back_s` before the newest message.
 
         Returns:
             True if it was used; False when there is no pose, it is older than the buffer or a second one of the same

@@ -69,7 +69,7 @@ class FusionSettings:
     doubt_velocity_sigma_m_s: float = 1.2
     doubt_position_sigma_m: float = 0.08
     doubt_attitude_sigma_rad: float = 0.1
-    buffer_s: float = 0.45  # how late a frame may be; the belief is asked what it foretold 0.3 s before a late one
+    buffer_s: float = 0.45  # how late a frame may be
     leap_s: float = 1.0  # how far ahead of all others a frame's stamp is believed without a second one
     imu_leap_s: float = 0.1  # the same of a sample: it sets the time that all else is held against
     node_interval_s: float = 0.02  # between beliefs kept to begin at when a frame is late; a frame's period

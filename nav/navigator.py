@@ -17,7 +17,7 @@ import numpy as np
 from dockair.calibration import LedRing, NavigationSheets
 from dockair.errors import DockairError
 from dockair.messages import CameraFrame, ImuSample, LedObservation, NavSolution, PodSignal, TankerAnnouncement
-from dockair.nav.contact_watch import ContactWatch
+from dockair.nav.contact_watch import ContactWatch, look_back_s
 from dockair.nav.frame_checks import FrameChecks, only, with_numbers
 from dockair.nav.fusion import FusionSettings, RelativeFilter
 from dockair.nav.guidance.approach import Guidance, GuidanceSettings, RelativeState
@@ -80,8 +80,7 @@ class Navigator:
 
     Raises:
         DockairError: a ring that cannot be identified, having fewer than five LEDs within four as-built tolerances of
-            their even places, or numbered by the code it has; a horizon of coasting that the filter's buffer does not
-            hold; fewer than no tolerances of a learnt place.
+            their even places, or numbered by the code it has; fewer than no tolerances of a learnt place.
     """
 
     def __init__(self, sheets: NavigationSheets, settings: NavigatorSettings | None = None) -> None:
@@ -90,11 +89,9 @@ class Navigator:
         learnt_sigmas = self._settings.learnt_place_sigmas
         if not learnt_sigmas >= 0.0:
             raise DockairError("navigator.learnt_place_sigmas", expected="a number, 0 or more", got=learnt_sigmas)
-        horizon_s, buffer_s = self._settings.coasting.horizon_s, self._settings.fusion.buffer_s
-        if not horizon_s < buffer_s:
-            expected = f"less than fusion.buffer_s = {buffer_s}, in which what was foretold is kept"
-            raise DockairError("coasting.horizon_s", expected=expected, got=horizon_s)
-        self._filter = RelativeFilter(sheets, self._settings.fusion)
+        contact, coasting = self._settings.contact, self._settings.coasting
+        asked_s = look_back_s(sheets, contact, coasting)
+        self._filter = RelativeFilter(sheets, self._settings.fusion, look_back_s=asked_s)
         self._finder = RingFinder(
             sheets, self._filter, self._settings.detect, self._settings.track, self._settings.turned_rad,
             self._settings.few, self._settings.led_position_sigma_m,
@@ -105,13 +102,13 @@ class Navigator:
         field_of_view = FieldOfView(sheets.camera, mounting)
         self._guidance = Guidance(self._settings.guidance, sheets.control_rate_hz, field_of_view)
         self._heading = None if self._settings.heading is None else OwnHeading(sheets, self._settings.heading)
-        self._checks = FrameChecks(1.0 / sheets.camera_rate_hz, buffer_s)
+        self._checks = FrameChecks(1.0 / sheets.camera_rate_hz, self._settings.fusion.buffer_s)
         self._points_D = sheets.ring.positions_D
         self._time_s = 0.0
         self._used_time_s = self._begun_s = float("nan")
         self._looked_time_s = 0.0  # when the newest frame came that says something
         self._felt_time_s = 0.0
-        self._contact = ContactWatch(sheets, self._filter, self._settings.contact, self._settings.coasting)
+        self._contact = ContactWatch(sheets, self._filter, contact, coasting)
         self._status = self._finder.status
         self._not_shown = False
         self._candidates_px: Array = np.empty((0, 2))

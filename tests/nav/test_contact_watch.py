@@ -50,3 +50,20 @@ def test_a_struck_drogue_has_gone_since_the_last_frame_that_was_used_whatever_it
         watch.used(there, RING, 1.02)
     level_m = [watch.claim(time_s).levels.lateral_m for time_s in (1.04, 1.08)]
     assert level_m[1] - level_m[0] == pytest.approx(gone_m[1] * (0.04 / (0.02 if by else 0.04)), rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("camera_hz", "age_s", "asked"),
+    [(50, 0.3, True), (50, 0.4, True), (50, 0.41, False), (50, np.nan, False), (4, 0.55, True), (4, 0.7, False)],
+)
+def test_a_belief_is_not_asked_over_a_drop_out_that_ended_its_claim(camera_hz, age_s, asked):
+    """It has just found the drogue again: what it foretold then says nothing of it; of a slow camera it is usual."""
+    sheets = SimpleNamespace(
+        mounting=SimpleNamespace(R_BC=np.eye(3)), ring=SimpleNamespace(diameter_m=0.5), camera_rate_hz=camera_hz
+    )
+    belief = Stands()
+    belief.p_PD_B = lambda time_s: PLACE_M
+    belief.foretold_p_PD_B = lambda time_s, horizon_s: (PLACE_M, age_s)
+    watch = ContactWatch(sheets, belief, ContactLimits(), CoastingSettings())
+    watch.used(check_integrity(solve_pose(CAMERA.pixels_from_points(RING + PLACE_M), RING, CAMERA)), RING, 1.0)
+    assert watch._coasting.is_of(1.0) == asked

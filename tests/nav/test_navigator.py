@@ -378,9 +378,23 @@ def test_a_cameras_clock_that_is_a_little_ahead_costs_no_claim_of_contact(ahead_
     assert all(claimed)
 
 
-def test_a_horizon_that_the_buffer_does_not_hold_is_refused():
-    with pytest.raises(DockairError, match=r"coasting\.horizon_s"):
-        Navigator(sheets(None), NavigatorSettings(coasting=CoastingSettings(horizon_s=0.5)))
+@pytest.mark.parametrize(
+    ("late_ticks", "every_ticks", "horizon_s"),
+    [(20, 2, 0.3), (17, 2, 0.3), (20, 10, 0.3), (10, 25, 0.3), (0, 25, 0.3), (0, 2, 0.6)],
+)
+def test_contact_is_claimed_by_frames_that_are_late_or_seldom(late_ticks, every_ticks, horizon_s):
+    """The belief can be asked what it foretold of each, a horizon before it was taken."""
+    sky, claimed = Sky(None, still), []
+    known = replace(sky.sheets, camera_rate_hz=100 // every_ticks)
+    sky.navigator = Navigator(known, NavigatorSettings(coasting=CoastingSettings(horizon_s=horizon_s)))
+    for k in range(1200):
+        imu, seen = sky.imu(), None
+        if (sky.tick - late_ticks) % every_ticks == 0:
+            seen = named(sky, range(8), imu[-1].time_stamp_s - 0.01 * late_ticks)
+        sky.navigator.step(imu, seen)
+        if k >= 900:  # what is assumed before anything is measured has faded
+            claimed.append(sky.navigator.contact_claim().usable)
+    assert all(claimed)
 
 
 def test_contact_may_not_be_claimed_where_the_range_is_not_known_well_enough(render):
