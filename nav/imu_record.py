@@ -11,9 +11,9 @@ Not modelled: a first stamp that is wrong. It sets the clock, and those of a rig
 import math
 
 import numpy as np
-from numba import njit
 
 from dockair.calibration import GyroSheet, Mounting
+from dockair.kernels import njit
 from dockair.messages import STAMP_RESOLUTION_S, ImuSample
 from dockair.rotations import Array
 

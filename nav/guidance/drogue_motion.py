@@ -8,9 +8,9 @@ prediction over the response time is what a command given now can still meet.
 """
 
 import numpy as np
-from numba import njit
 from scipy.linalg import expm
 
+from dockair.kernels import njit
 from dockair.nav.guidance.swing_model import (
     FIRST_MODE,
     SwingSettings,

@@ -24,9 +24,9 @@ more near by, so that a member may be the only blob there is. Both look at place
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from dockair.kernels import njit
 from dockair.nav.identify.perspective import SLOTS, RingFit
 from dockair.rotations import Array
 

@@ -16,10 +16,10 @@ are no members, or one in a member's place. Where there are such, or anything el
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from dockair.calibration import Camera
+from dockair.kernels import njit
 from dockair.nav.identify.brightness import brightness_model
 from dockair.nav.identify.chance import log10_false_rings_of_one
 from dockair.nav.identify.hypotheses import IdentifySettings

@@ -15,10 +15,10 @@ import math
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from dockair.calibration import Camera
+from dockair.kernels import njit
 from dockair.nav.identify.brightness import BrightnessModel, BrightnessSettings
 from dockair.nav.identify.chance import box_area_px2, densities_px2, log10_false_rings, member_odds
 from dockair.nav.identify.circle_hough import find_circles, radius_row, triples_near

@@ -15,9 +15,9 @@ here.
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from dockair.kernels import njit
 from dockair.nav.identify.posit import SLOTS, rings_through
 from dockair.nav.identify.triangles import plausible_maps
 from dockair.rotations import Array

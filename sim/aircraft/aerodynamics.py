@@ -29,9 +29,9 @@ Source: Stevens, Lewis & Johnson, Aircraft Control and Simulation, section 3.5 a
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from dockair.errors import DockairError
+from dockair.kernels import njit
 from dockair.rotations import FLU_FROM_FRD, Array
 from dockair.sim.aircraft.airframe import NO_ROTATION, AirframeData
 

@@ -12,8 +12,8 @@ of `airframe.Aerodynamics`, the aircraft's and the model's; the state x is that 
 """
 
 import numpy as np
-from numba import njit
 
+from dockair.kernels import njit
 from dockair.sim.air.atmosphere import STANDARD_GRAVITY_M_S2
 from dockair.sim.aircraft.gain_schedule import THRUST_0
 from dockair.sim.aircraft.linear_model import ATTITUDE

@@ -21,8 +21,8 @@ Source: Roskam, Airplane Flight Dynamics and Automatic Flight Controls, part I, 
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from dockair.kernels import njit
 from dockair.rotations import FLU_FROM_FRD, Array
 from dockair.sim.aircraft.airframe import NO_ROTATION, AirframeData
 

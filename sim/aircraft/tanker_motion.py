@@ -11,8 +11,8 @@ A segment is a row: when it begins, how long it is, r and gamma at both ends, he
 import math
 
 import numpy as np
-from numba import njit
 
+from dockair.kernels import njit
 from dockair.rotations import Array
 from dockair.sim.air.atmosphere import STANDARD_GRAVITY_M_S2
 

@@ -12,10 +12,10 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from dockair.calibration import Camera
+from dockair.kernels import njit
 from dockair.rotations import Array
 from dockair.sim.camera.dirt import Dirt
 from dockair.sim.camera.image_point import margin_slope

@@ -13,10 +13,10 @@ Sources: metering by a high quantile of the histogram is common practice; the fi
 """
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from dockair.errors import DockairError
+from dockair.kernels import njit
 from dockair.sim.camera.electronics import OUTPUT_BITS, output_black, output_gain
 from dockair.sim.camera.sheets import ExposureParameters, SensorParameters
 

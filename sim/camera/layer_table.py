@@ -22,9 +22,9 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from dockair.kernels import njit
 from dockair.rotations import Array
 from dockair.sim.camera.earth import Interval
 from dockair.sim.camera.layer_keys import Keys, Place

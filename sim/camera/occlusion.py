@@ -22,9 +22,9 @@ import math
 
 import mujoco
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from dockair.kernels import njit
 from dockair.rotations import Array
 from dockair.sim.camera.meshes import Meshes
 from dockair.sim.camera.obstacles import Obstacles

@@ -10,9 +10,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from dockair.kernels import njit
 from dockair.rotations import Array
 from dockair.sim.camera.solids import CAPSULE
 

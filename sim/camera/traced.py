@@ -19,9 +19,9 @@ Source: Glassner (ed.), An Introduction to Ray Tracing, ch. 2.
 
 import mujoco
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from dockair.kernels import njit
 from dockair.rotations import Array
 from dockair.sim.camera.fading import clear, lay_before
 from dockair.sim.camera.mesh_view import MeshView, view_meshes

@@ -40,9 +40,9 @@ from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
-from numba import njit
 
 from dockair.errors import DockairError
+from dockair.kernels import njit
 from dockair.rotations import Array
 from dockair.sim.air.atmosphere import STANDARD_GRAVITY_M_S2
 from dockair.sim.hose.chain import HoseParameters
