@@ -7,8 +7,9 @@ Along, the commanded velocity u goes to
 
     v = y_D' - e,     u* = v + k (y_D - y_r - wanted),     du/dt = y_D'' + k (v - u) + s (u* - u)         (1)
 
-where k (y_D - y_r - wanted) is no more than the speed asked for, nor is u* forward. While closing at c no place is
-kept: u* = v + c, and du/dt is without k (v - u). Both u and du/dt go out, so that the flight control has nothing to
+where k (y_D - y_r - wanted) is no more than the speed asked for, nor is u* forward. What has come to such a limit does
+not change, and has no part in du/dt: else s (u* - u) would stand against it, and 1.33 m/s be flown where 1.5 are asked
+for. While closing at c no place is kept: u* = v + c, and du/dt is without k (v - u). Both u and du/dt go out, so that the flight control has nothing to
 guess. A bias of the receiver's inertial velocity is part of y_D'. What the tip does otherwise than commanded is part of
 y_r where it is felt; where not, of y_D: it is then predicted and flown against like the drogue's own motion, with the
 same filter.
@@ -187,8 +188,11 @@ class Predictive:
             goal, change = velocity + wanted.speed_m_s, 0.0
         else:
             to_go = place - self._own.place_ahead_m[0] - wanted.distance_m
-            goal = min(velocity + clipped(gain * to_go, wanted.speed_m_s), wanted.speed_m_s)
-            change = gain * (velocity - u[0])
+            way = clipped(gain * to_go, wanted.speed_m_s)
+            change = gain * (velocity - u[0]) if way == gain * to_go else 0.0
+            goal = velocity + way
+            if goal > wanted.speed_m_s:
+                goal, acceleration, change = wanted.speed_m_s, 0.0, 0.0
         return float(acceleration + change + s.smoothing_1_s * (goal - u[0]))
 
     def _across(self, u: Array, wanted: Wanted, bearable: bool) -> list[float]:

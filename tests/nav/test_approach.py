@@ -118,6 +118,22 @@ def test_joins_up_from_afar_before_it_stands_astern():
     assert plant.radial_at_contact < 0.04
 
 
+@pytest.mark.parametrize("drift_m_s", [-0.3, 0.0, 0.3])
+def test_the_way_to_the_stand_off_point_is_flown_at_the_speed_that_is_set_and_not_past_it(drift_m_s):
+    """A drogue that drifts away is not run after any faster, one that drifts nearer is met as much more slowly."""
+    plant = Plant(offset=(30.0, 0.0, 0.0), drogue=lambda t: np.array([drift_m_s, 0.0, 0.0]) * t)
+    guidance, speeds, ahead_m = Guidance(SETTINGS, RATE_HZ), [], []
+    now = plant.step(ReceiverCommand())
+    while guidance.phase in (Phase.JOIN_UP, Phase.PRE_CONTACT):
+        now = plant.step(guidance.step(now))
+        speeds.append(plant.v[0])
+        ahead_m.append(now.p_PD_B[0])
+    flown_m_s = np.array(speeds)[(np.array(ahead_m) < 16.0) & (np.array(ahead_m) > 8.0)]
+    expected_m_s = SETTINGS.join_up_speed_m_s + min(drift_m_s, 0.0)
+    np.testing.assert_allclose(flown_m_s, expected_m_s, atol=0.03)
+    assert min(ahead_m) > SETTINGS.stand_off_m - 0.1
+
+
 def test_closure_speed_is_relative_to_a_drifting_drogue():
     plant = Plant(drogue=lambda t: np.array([0.15, 0.1, 0.0]) * t)
     fly(plant)
