@@ -9,7 +9,8 @@ receiver, and its mean a' before contact,
 
 since the blow of contact, which turns the drogue on a taut hose, too, is over. Gusts turn it there as well, up more
 than down: so a nose that is up has to be so by more. It is asked for some time, for a slack hose may lie straight for a
-moment between two waves.
+moment between two waves. The hose is told only while the drogue is still turned by half of that angle: where the
+medians are a blow's that has lasted, it has come back meanwhile.
 
 Nothing is said where the drogue has not been seen on the probe for half of that time.
 
@@ -67,7 +68,9 @@ class SlackHose:
         looked = round((self._contact_s - limits.slack_from_s) / self._step_s) + 1
         if looked >= round(limits.slack_over_s / self._step_s) and len(self._turns_rad) >= 0.5 * looked:
             drop_rad, tilt_rad = np.median(self._turns_rad, axis=0)
-            self.is_slack = bool(tilt_rad > (limits.slack_tilt_rad if drop_rad > 0.0 else limits.slack_tilt_up_rad))
+            limit_rad = limits.slack_tilt_rad if drop_rad > 0.0 else limits.slack_tilt_up_rad
+            still_rad = self._turns_rad[-1][1]
+            self.is_slack = bool(tilt_rad > limit_rad and still_rad > limits.slack_still * limit_rad)
 
 
 def turn_rad(along: Array, before: Array) -> tuple[float, float]:

@@ -77,6 +77,16 @@ def test_a_taut_hose_that_a_gust_turns_at_last_is_not_told():
     assert not told(lambda t: np.interp(t, [0.0, 0.3, 0.5], [3.0, 3.0, LIMIT_DEG + 1.0])).any()
 
 
+@pytest.mark.parametrize(("to", "limit_deg"), [(DOWN, LIMIT_DEG), (UP, UP_LIMIT_DEG)])
+def test_a_taut_hose_whose_blow_has_lasted_is_not_told_for_its_drogue_has_come_back(to, limit_deg):
+    """As 26977 of unmanned on measured LEDs: the blow lasts until 0.26 s, and when the medians are over 5 degrees 2.1 are left."""
+    still_deg = LIMITS.slack_still * limit_deg
+    for left_deg, expected in ((still_deg - 0.1, False), (still_deg + 0.1, True)):
+        blow_s = LIMITS.slack_from_s + 0.6 * LIMITS.slack_over_s
+        slack = told(lambda t, left_deg=left_deg, blow_s=blow_s: limit_deg + 3.0 if t < blow_s else left_deg, to=to)
+        assert slack.any() == expected
+
+
 def test_the_drogue_s_own_attitude_of_the_last_second_is_what_it_turns_from():
     """Half a swing before, the drogue hung elsewhere: only the last second counts."""
     assert not told(lambda t: 8.0, before=lambda t: 8.0 if t >= -LIMITS.slack_before_s else -40.0).any()
