@@ -33,6 +33,9 @@ class PredictiveSettings:
     gusts_s: float = 30.0  # over which it is taken before an approach: a lull in severe turbulence is over too soon
     #: Over which the drift is taken that is held on the probe: longer than a surge of the reel; less is a glimpse.
     steady_s: float = 6.0
+    #: T_L, in which a drift is learnt: the filter knows 0.8 of one 4 s after it shows, and what is felt as the
+    #: receiver's velocity comes to its bias is taken for straying at first, and forgotten as slowly.
+    learnt_s: float = 4.0
     unseen_s: float = 0.5  # after which the swing is begun anew: what has come of it would be taken for drift
     #: T_e of `own_path`: in moderate gusts the tip, astern, went on by 0.41, 0.36, 0.30 m in half a second for each m/s
     #: that it strayed at.

@@ -9,10 +9,10 @@ Along, the commanded velocity u goes to
 
 where k (y_D - y_r - wanted) is no more than the speed asked for, nor is u* forward. What has come to such a limit does
 not change, and has no part in du/dt: else s (u* - u) would stand against it, and 1.33 m/s be flown where 1.5 are asked
-for. While closing at c no place is kept: u* = v + c, and du/dt is without k (v - u). Both u and du/dt go out, so that the flight control has nothing to
-guess. A bias of the receiver's inertial velocity is part of y_D'. What the tip does otherwise than commanded is part of
-y_r where it is felt; where not, of y_D: it is then predicted and flown against like the drogue's own motion, with the
-same filter.
+for. While closing at c no place is kept: u* = v + c, and du/dt is without k (v - u). Both u and du/dt go out, so that
+the flight control has nothing to guess. A bias of the receiver's inertial velocity is part of y_D'. What the tip does
+otherwise than commanded is part of y_r where it is felt; where not, of y_D: it is then predicted and flown against like
+the drogue's own motion, with the same filter.
 
 A swing that asks for more than a share of the acceleration that the receiver may fly (rms over some swings) is not
 followed but waited for astern: then y_D is the middle of the swing, and haste has a higher price. In gusts that move
@@ -87,6 +87,7 @@ class Predictive:
         self._gusts: Array = np.zeros(2)  # the same over some swings more, beginning at nothing ...
         self._gusts_seen = 0.0  # ... so that this share of it has been seen
         self._seen_s = 0.0  # how long the drogue has been in view since the drift was begun anew
+        self._learnt = 0.0  # share of a drift that lasts which the swing's filter knows by now
         self._drift: Array = np.zeros(3)  # mean of the drift, beginning at nothing likewise
         self._drift_seen = 0.0
 
@@ -124,7 +125,8 @@ class Predictive:
             self._gusts_seen += share * (1.0 - self._gusts_seen)
             share = self._step_s / self._settings.steady_s
             self._drift = self._drift + share * (self._motion.drift_m_s - self._drift)
-            self._drift_seen += share * (1.0 - self._drift_seen)
+            self._learnt += self._step_s / self._settings.learnt_s * (1.0 - self._learnt)
+            self._drift_seen += share * (self._learnt - self._drift_seen)
 
     def _begin_anew(self, place_m: Array, velocity_m_s: Array) -> None:
         """Take up a drogue that comes into view; a drift learnt from glimpses may be a gust's, and is forgotten."""
@@ -132,7 +134,7 @@ class Predictive:
             self._motion.resume(place_m)
             return
         self._motion.start(place_m, velocity_m_s)
-        self._seen_s = self._drift_seen = 0.0
+        self._seen_s = self._learnt = self._drift_seen = 0.0
         self._drift = np.zeros(3)
 
     def given(self, velocity_m_s: Array, acceleration_m_s2: Array) -> None:
@@ -147,7 +149,10 @@ class Predictive:
 
     @property
     def steady_drift_m_s(self) -> Array:
-        """(3,) its mean over the last seconds: what lasts is the bias of the receiver's inertial velocity."""
+        """(3,) its mean over the last seconds: what lasts is the bias of the receiver's inertial velocity.
+
+        Of the mean of a drift that is being learnt, 1 - exp(-t/T_L) of it after t, so much is made up for.
+        """
         return np.asarray(self._drift / max(self._drift_seen, np.finfo(float).tiny))
 
     @property
