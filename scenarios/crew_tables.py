@@ -43,5 +43,5 @@ class Guidance(Table):
     capture_radius_m: float = Field(default=0.12, gt=0.0, le=1.0)  #: predicted miss inside which it closes, at first
     closure_speed_m_s: float = Field(default=1.2, ge=0.5, le=1.5)  #: at contact; more is not gained on the way
     hold_s: float = Field(default=5.0, ge=0.0, le=300.0)  #: on the probe in the refuelling range, before disconnecting
-    take_in_m: float = Field(default=1.5, ge=0.0, le=6.0)  #: hose pushed in before holding
+    take_in_m: float = Field(default=2.5, ge=0.0, le=6.0)  #: hose pushed in before holding
     stabilise_s: float = Field(default=3.0, ge=0.0, le=60.0)  #: steady in pre-contact before closing; 0: at once
