@@ -53,7 +53,9 @@ from dockair.sim.world import World, WorldParameters, WorldStart
 from dockair.streams import random_stream
 
 SETTLE_S = 12.0  # hose and gusts run this long before the flight: several periods of the drogue's swing
-ATTEMPT_S = 15.0  # before a flight's time is over: an approach begun then still ends, with the probe clear again
+#: Of an attempt, its hold apart: 5 s of approach, 3.5 until the hose is pushed in, 7.5 until the probe is clear again.
+#: One begun so long before a flight's time is over still ends.
+ATTEMPT_S = 16.0
 RESPONSE_S = {  # delay of the probe's tip forward, left, up, behind a command at 0.1-0.4 Hz, a control tick included
     "fighter": (0.28, 0.10, 0.10),
     "unmanned": (0.40, 0.25, 0.10),
@@ -187,11 +189,12 @@ def guidance_settings(scenario: Scenario) -> GuidanceSettings:
     source_B = bow_wave_coefficients(bow_wave, mounting.probe_tip_m, scenario.flight.airspeed_m_s)[:3]
     x, y, z = (float(value) for value in source_B - mounting.probe_tip_m)
     control = load_parameters(scenario.hardware.receiver_sheet("flight_control"), FlightControlParameters)
+    attempt_s = ATTEMPT_S + g.hold_s
     limits = PhaseLimits(
         rim_m=0.5 * nominal_ring(scenario).diameter_m,
         frames_stop_s=max(nominal.limits.frames_stop_s, FRAMES_STOP / scenario.rates.camera_hz),
         attempts_max=g.attempts_max,
-        slot_s=duration_s - ATTEMPT_S if duration_s >= 2.0 * ATTEMPT_S else float("inf"),
+        slot_s=duration_s - attempt_s if duration_s >= 2.0 * attempt_s else float("inf"),
         stabilise_s=g.stabilise_s,
         capture_radius_m=g.capture_radius_m,
         take_in_m=g.take_in_m,

@@ -84,6 +84,12 @@ def test_guidance_takes_the_scenarios_figures():
     assert settings.stand_off_m == 4.0
 
 
+@pytest.mark.parametrize(("hold_s", "slot_s"), [(5.0, 39.0), (10.0, 34.0), (20.0, float("inf"))])
+def test_no_approach_is_begun_that_would_not_end_with_its_hold_within_the_flights_time(hold_s, slot_s):
+    settings = guidance_settings(load_scenario("default", {"guidance.hold_s": hold_s, "flight.duration_s": 60.0}))
+    assert settings.limits.slot_s == slot_s
+
+
 def test_guidance_knows_the_rim_of_the_ring_that_is_flown(tmp_path):
     """As the referee and the claim of contact do: between two rims a tip is in the basket of one of them."""
     ring = tmp_path / "ring.toml"
