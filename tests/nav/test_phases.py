@@ -90,7 +90,7 @@ OPENING = {"closing_m_s": -1.0}
         ("contact", HELD | {"beside_m": 0.24}, None),
         ("contact", HELD | {"beside_m": 0.26}, "back_off"),
         ("contact", HELD | {"track_lost_s": 0.6}, "back_off"),
-        ("contact", HELD | {"pushed_in_m": 1.36}, "hold"),
+        ("contact", HELD | {"pushed_in_m": 2.26}, "hold"),
         ("hold", HELD | {"in_phase_s": 4.9}, None),
         ("hold", HELD | {"in_phase_s": 5.0}, "disconnect"),
         ("hold", HELD | {"ahead_m": 0.5}, "breakaway"),
