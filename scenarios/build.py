@@ -54,7 +54,7 @@ from dockair.streams import random_stream
 
 SETTLE_S = 12.0  # hose and gusts run this long before the flight: several periods of the drogue's swing
 #: Of an attempt, its hold apart: 5 s of approach, 3.5 until the hose is pushed in, 7.5 until the probe is clear again.
-#: One begun so long before a flight's time is over still ends.
+#: One begun so long before a flight's time is over still ends, unless its hold is long in coming to a green light.
 ATTEMPT_S = 16.0
 RESPONSE_S = {  # delay of the probe's tip forward, left, up, behind a command at 0.1-0.4 Hz, a control tick included
     "fighter": (0.28, 0.10, 0.10),
@@ -140,7 +140,7 @@ def build(scenario: Scenario, seed: int) -> Parts:
         settle_s=SETTLE_S,
     )
     path, announcer = _tanker_path(scenario, seed, parameters)
-    pod_light = PodLight(faults.reel_seen_dead, _sheet(scenario, "pod_light", PodLightParameters))
+    pod_light = PodLight(faults.reel_seen_dead, parameters.reel, _sheet(scenario, "pod_light", PodLightParameters))
     world = World(parameters, receiver, motion, start, clock, faults.reel_locked, path, pod_light.is_red)
     place_leds(world.model, world.data, sheets.ring)
     as_built = _as_built(scenario, seed, sheets)

@@ -117,7 +117,7 @@ class FaultTable(Table):
         Expected("three numbers, each from -5000 to 5000"),
     ] = None  #: jump of the gyros' biases, IMU axes
     limit_deg_s: float | None = Field(default=None, gt=0.0, le=5000.0)  #: range that is left to each gyro
-    unnoticed: bool | None = None  #: whether the pod's light stays amber; false if not given
+    unnoticed: bool | None = None  #: whether the pod's light does not turn red; false if not given
 
     def check(self, where: str) -> None:
         """Refuse a table without a key that its kind must have, or with one that it cannot have.

@@ -106,7 +106,7 @@ class Flight:
         announcement = self._announcer.due(truth.time_s)
         if announcement is not None:
             announce_to(self.navigator, announcement)
-        signal = self._pod_light.due(truth.time_s)
+        signal = self._pod_light.due(truth.time_s, truth.reel_position_m)
         if signal is not None:
             signal_to(self.navigator, signal)
         # LEDs in place of a frame only where they are asked for

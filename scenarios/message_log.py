@@ -35,7 +35,16 @@ from numpy.typing import NDArray
 import dockair
 from dockair.calibration import NavigationSheets
 from dockair.errors import DockairError, MachineError
-from dockair.messages import CameraFrame, ImuSample, Navigates, NavSolution, PodSignal, TankerAnnouncement, Window
+from dockair.messages import (
+    CameraFrame,
+    ImuSample,
+    Light,
+    Navigates,
+    NavSolution,
+    PodSignal,
+    TankerAnnouncement,
+    Window,
+)
 from dockair.rotations import Array
 from dockair.scenarios.exact_json import decode, encode
 from dockair.scenarios.plug_in import make_navigator, navigator_class_of
@@ -143,9 +152,11 @@ class TickMessages:
 
 
 def numbers(value: Any) -> Array:
-    """(n,) 64-bit floats of a number, an array, a message of such, or nothing (None)."""
+    """(n,) 64-bit floats of a number, an array, a light, a message of such, or nothing (None)."""
     if value is None:
         return np.empty(0)
+    if isinstance(value, Light):
+        return np.array([float(value.value)])
     if is_dataclass(value):
         return np.concatenate([numbers(getattr(value, f.name)) for f in fields(value)])
     return np.asarray(value, dtype=np.float64).ravel()
@@ -321,7 +332,7 @@ def _tick_from_row(row: dict[str, Any], pixels: bool) -> TickMessages:
     png, said, shown = row["png"], row.get("announcement"), row.get("pod_signal")
     names = [f.name for f in fields(TankerAnnouncement)]
     announcement = TankerAnnouncement(**dict(zip(names, said, strict=True))) if said else None
-    signal = PodSignal(time_stamp_s=shown[0], red=bool(shown[1])) if shown else None
+    signal = PodSignal(time_stamp_s=shown[0], light=Light(shown[1])) if shown else None
     if png is None:
         return TickMessages(imu=imu, frame=None, png=None, announcement=announcement, signal=signal)
     window = Window(*(row[name] for name in _WINDOW_COLUMNS))

@@ -120,7 +120,7 @@ class GyroDropOut(Fault):
 class DeadReel(Fault):
     """The reel's drum is locked: it neither takes hose up nor pays it out."""
 
-    unnoticed: bool = False  #: by the hose unit, so that the pod's light stays amber
+    unnoticed: bool = False  #: by the hose unit, so that the pod's light does not turn red
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

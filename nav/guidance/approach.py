@@ -4,7 +4,8 @@ Everything is flown in stabilised axes (`stabilised_axes`): a controller (`predi
 the drogue; `closure` says how fast to close, and when to be called back; `phases` says what comes next.
 
 After contact the view says nothing about the way to the tanker: the way pushed in is the integral of what was
-commanded beyond the drogue's drift.
+commanded beyond the drogue's drift. Whether that has come into the refuelling range the pod's light says, and a hold
+goes by it: on while it is amber, back while it flashes.
 
 Where the tanker turns or descends, the receiver's own path does so as announced, and leans on what announced and true
 turn differ by (`announced_path`). None of this is left to the controller: to its u is added the velocity v, level to
@@ -23,7 +24,7 @@ import math
 
 import numpy as np
 
-from dockair.messages import PodSignal, ReceiverCommand, TankerAnnouncement
+from dockair.messages import Light, PodSignal, ReceiverCommand, TankerAnnouncement
 from dockair.nav.guidance.announced_path import AnnouncedPath
 from dockair.nav.guidance.closing import PredictedMiss, time_to_contact_s
 from dockair.nav.guidance.closure import Closure
@@ -80,8 +81,9 @@ class Guidance:
         speeds = settings.closure_speed_m_s, settings.closure_acceleration_m_s2
         self._closure = Closure(settings.closing, *speeds, self._dt)
         self._clocks = PhaseClocks(self._dt, settings.limits)
-        self._attempts, self._pushed_in_m = 0, 0.0
-        self._light_is_red = self._is_evading = self._is_recalled = False
+        self._attempts, self._pushed_in_m, self._push_to_m = 0, 0.0, 0.0
+        self._light = Light.AMBER
+        self._is_evading = self._is_recalled = False
         self._evasion = Evasion(settings, self._dt)
         self._hose = SlackHose(settings.limits, self._dt)
 
@@ -91,7 +93,7 @@ class Guidance:
 
     def signal(self, signal: PodSignal) -> None:
         """Take note of what the pod's light begins to show."""
-        self._light_is_red = signal.red
+        self._light = signal.light
 
     def step(self, state: RelativeState) -> ReceiverCommand:
         """Advance by one control tick.
@@ -180,7 +182,7 @@ class Guidance:
             ring_ahead_m,
             steady=self._is_steady(ring_ahead_m),
             sure=state.usable and state.sigma_lateral_m < self._settings.limits.steady_sigma_m,
-            light_is_red=self._light_is_red,
+            light=self._light,
         )
         if self.phase is Phase.APPROACH:
             self._close(state, ring_ahead_m, -float(rate[0]))
@@ -190,6 +192,8 @@ class Guidance:
             self._entered_m = lateral_m
         if self.phase in _TOUCHING:
             self._pushed_in_m += (self._u[0] - self._controller.steady_drift_m_s[0]) * self._dt
+            reckoned_m = self._pushed_in_m if self._light is Light.GREEN else self._settings.limits.take_in_m
+            self._push_to_m = max(self._push_to_m, reckoned_m + self._settings.limits.push_on_m)
 
     def _is_steady(self, ring_ahead_m: float) -> bool:
         """Whether the receiver is where an approach may begin, as far as it knows."""
@@ -248,7 +252,9 @@ class Guidance:
             committed=self._closure.committed,
             pushed_in_m=self._pushed_in_m,
             attempts=self._attempts,
-            light_is_red=self._light_is_red,
+            light_is_red=self._light is Light.RED,
+            green_s=clocks.green_s,
+            no_fuel_s=clocks.no_fuel_s,
             hose_is_slack=self._hose.is_slack,
             hose_has_whipped=self._evasion.hose_has_whipped,
         )
@@ -265,6 +271,7 @@ class Guidance:
             self._closure.begin()
         elif self.phase is Phase.CONTACT:  # what is commanded already will still be flown
             self._pushed_in_m = self._closure.speed_m_s * self._settings.response_s[0]
+            self._push_to_m = 0.0
         elif self.phase in (Phase.BACK_OFF, Phase.BREAKAWAY):
             self._is_recalled = before is Phase.APPROACH and transition.reason == RED_LIGHT and situation.committed
             if self._passed is not None and self._closure.committed:  # else it did not mean to meet the drogue
@@ -337,6 +344,8 @@ class Guidance:
         if self.phase is Phase.CONTACT:  # slows down so as to stop where it is to hold
             to_go = max(s.limits.take_in_m - self._pushed_in_m, 0.0)
             target[0] += min(s.closure_speed_m_s, s.take_in_gain_1_s * to_go)
+        elif self.phase is Phase.HOLD:
+            target[0] += self._regained_m_s()
         elif self.phase in _RETREATING or (
             self.phase in _WAITING and self._clocks.unusable_s > s.limits.lost_s
         ):  # nobody waits near a drogue that is not seen
@@ -351,6 +360,13 @@ class Guidance:
         if self._is_evading:
             u_dot[2] = _EVADE_GAIN_1_S * (-s.evade_speed_m_s - self._u[2])
         return u_dot
+
+    def _regained_m_s(self) -> float:
+        """Speed along toward the refuelling range by the light; not on for ever into a hose that is not taken up."""
+        if self._light is Light.FLASHING_AMBER:
+            return -self._settings.regain_speed_m_s
+        goes_on = self._light is Light.AMBER and self._pushed_in_m < self._push_to_m
+        return self._settings.regain_speed_m_s if goes_on else 0.0
 
     def _command(self, u_dot: Array) -> ReceiverCommand:
         """Eq. (1) and its rate in body axes, and what the path does."""

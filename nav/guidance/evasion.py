@@ -4,7 +4,7 @@ A hose that nothing takes up at contact (`slack_hose`) will whip: the receiver g
 whose drogue comes off the probe sideways, or out of a view that frames go on to give, whips: as the phase ends in which
 the probe was held or, where the pod's light is red, on the way back from it, before the drogue is ahead of the tip. So
 does one whose drogue has come off by itself and goes out of view before it is seen ahead: it may be thrown aside within
-a frame or two of being believed ahead. On the way back before an amber light it is pulled off, and gusts may take it
+a frame or two of being believed ahead. On the way back under another light it is pulled off, and gusts may take it
 aside as it goes. Where the camera itself stopped it may still be on the probe, and the receiver goes straight back. A
 hose that has whipped once is not tried again (`phases`): nothing says that it will not do so again.
 

@@ -77,6 +77,9 @@ class GuidanceSettings:
     velocity_limit_m_s: float = 3.5
     closure_acceleration_m_s2: float = 0.6  # how fast the closure speed is asked for
     take_in_gain_1_s: float = 0.35  # speed into the refuelling range per metre to go; a third of the next: no overshoot
+    #: In a hold, on into the refuelling range and back from its inner limit: some three times what a drift that is held
+    #: on the probe was seen to err by (0.14 m/s), and 0.3 m until it stands again.
+    regain_speed_m_s: float = 0.4
     course_gain_1_s: float = 1.2  # how fast a course without a view of the drogue is taken up
     #: Down, from a drogue that has come off the probe sideways or out of view: its hose may whip. Breakaway practice is
     #: back and down; how far is assumed: of 18 flights with a dead reel that nobody noticed none met the hose, of 32

@@ -2,6 +2,7 @@
 
 import math
 
+from dockair.messages import Light
 from dockair.nav.guidance.guidance_settings import RelativeState
 from dockair.nav.guidance.phases import Phase, PhaseLimits
 
@@ -27,16 +28,18 @@ class PhaseClocks:
         self.blind_s = 0.0  #: unusable beyond that for which it has been usable
         self.doubtful_s = 0.0  #: the integrity monitor has not claimed that contact may be flown
         self.inside_s = 0.0  #: the tip has been past the ring's plane
+        self.green_s = 0.0  #: the pod's light has been green in the hold
+        self.no_fuel_s = 0.0  #: it has not been, in the hold
         self.frames_stopped = False  #: and none that has come since was used
 
     def begin(self, phase: Phase) -> None:
         """Begin a phase."""
-        self.in_phase_s = 0.0
+        self.in_phase_s = self.green_s = self.no_fuel_s = 0.0
         if phase is Phase.APPROACH:
             self.inside_s = 0.0
 
     def step(
-        self, phase: Phase, state: RelativeState, ring_ahead_m: float, *, steady: bool, sure: bool, light_is_red: bool
+        self, phase: Phase, state: RelativeState, ring_ahead_m: float, *, steady: bool, sure: bool, light: Light
     ) -> None:
         """Advance by one control tick.
 
@@ -46,7 +49,7 @@ class PhaseClocks:
             ring_ahead_m: ring centre ahead of the probe's tip.
             steady: whether the receiver is steady astern of the drogue, as far as it knows.
             sure: whether it knows the drogue's place well.
-            light_is_red: of the pod.
+            light: of the pod.
         """
         dt = self._step_s
         self.time_s += dt
@@ -61,10 +64,14 @@ class PhaseClocks:
             self.steady_s += dt
         if phase not in (Phase.PRE_CONTACT, Phase.APPROACH):
             self.patient_s = 0.0
-        elif not light_is_red:  # who waits for amber has not waited for a calm moment
+        elif light is not Light.RED:  # who waits for amber has not waited for a calm moment
             self.patient_s += dt
         if phase is Phase.APPROACH:
             self.inside_s = self.inside_s + dt if ring_ahead_m <= 0.0 else 0.0
+        elif phase is Phase.HOLD:
+            is_green = light is Light.GREEN
+            self.green_s += dt if is_green else 0.0
+            self.no_fuel_s = 0.0 if is_green else self.no_fuel_s + dt
 
     def _see(self, state: RelativeState) -> None:
         dt = self._step_s

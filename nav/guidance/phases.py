@@ -26,7 +26,7 @@ class Phase(Enum):
 
 
 RED_LIGHT = "red light"  #: the reason to go back from a hose that is dead
-REFUELLED = "refuelled"  #: the reason to end a hold that was flown to its end
+REFUELLED = "refuelled"  #: the reason to end a hold in which the light has been green for long enough
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,7 +57,11 @@ class PhaseLimits:
     slack_before_s: float = 1.0  # and before contact over so long: a third of a swing
     take_in_m: float = 2.5  # inside the refuelling range 0.5-6 m (KDC-10 procedures), 1.5 m from where fuel flows here
     taken_in: float = 0.9  # of that way when holding begins: the receiver comes to rest on the remaining tenth
-    hold_s: float = 5.0  # assumed: long enough to see that the drogue stays on the probe
+    hold_s: float = 5.0  # under a green light; assumed: long enough to see that the drogue stays on the probe
+    #: By how much more, as reckoned, it is pushed in under an amber light since it was green last, or from `take_in_m`
+    #: on: the reckoning errs by 1.1 m over a hold; behind a dead reel that nobody noticed no hose is ever taken up.
+    push_on_m: float = 1.0
+    no_fuel_s: float = 10.0  # assumed: without a green light a hold ends; pushing on by `push_on_m` takes 3 s
     clear_m: float = 3.0  # procedures: pre-contact is 3-5 m behind the drogue
     lost_s: float = 0.5  # breakaway practice: track lost for 0.5 s ...
     lost_range_m: float = 2.0  # ... within 2 m of the ring
@@ -105,6 +109,8 @@ class Situation:
     pushed_in_m: float  #: way flown toward the tanker since the coupling was reached
     attempts: int  #: approaches begun
     light_is_red: bool = False  #: of the pod: the hose is dead
+    green_s: float = 0.0  #: time for which it has been green in this hold
+    no_fuel_s: float = 0.0  #: time for which it has not been, now
     hose_is_slack: bool = False  #: nothing takes it up since contact (`slack_hose`)
     hose_has_whipped: bool = False  #: a drogue has come off the probe as from a hose that nothing takes up
 
@@ -233,7 +239,8 @@ TRANSITIONS: dict[Phase, tuple[Transition, ...]] = {
         Transition(Phase.BREAKAWAY, "hose is slack", lambda limits, s: s.hose_is_slack),
         Transition(Phase.BREAKAWAY, "drogue has left the probe", _left),
         Transition(Phase.DISCONNECT, RED_LIGHT, lambda limits, s: s.light_is_red),
-        Transition(Phase.DISCONNECT, REFUELLED, lambda limits, s: s.in_phase_s >= limits.hold_s),
+        Transition(Phase.DISCONNECT, REFUELLED, lambda limits, s: s.green_s >= limits.hold_s),
+        Transition(Phase.DISCONNECT, "no fuel", lambda limits, s: s.no_fuel_s >= limits.no_fuel_s),
     ),
     Phase.DISCONNECT: (Transition(Phase.CLEAR, "drogue well ahead", _far_enough),),
     Phase.BACK_OFF: _AWAY,

@@ -13,12 +13,12 @@ from typing import Any
 
 import numpy as np
 
-from dockair.messages import ReceiverCommand
+from dockair.messages import Light, ReceiverCommand
 from dockair.parameters import load_parameters
 from dockair.rotations import Array
 from dockair.scenarios.reproduce.driven import PHYSICS_HZ, driven_world
 from dockair.scenarios.reproduce.reference import picture_name
-from dockair.sim.hose.reel import ReelLight, ReelParameters, reel_light
+from dockair.sim.hose.reel import ReelParameters, reel_light
 
 ID = "world/reel"
 TITLE = "reel: tension held while 5 m are pushed in, return to full trail, the pod's lights"
@@ -121,7 +121,7 @@ def _returned(run: Stroke, reel: ReelParameters) -> dict[str, Any]:
         "peak_tension_n": float(run.tension_n[after].max()),
         "end_tension_n": float(run.tension_n[-1]),
         "end_m": float(run.wound_in_m[-1]),
-        "green_s": lights.count(ReelLight.GREEN) / PHYSICS_HZ,
+        "green_s": lights.count(Light.GREEN) / PHYSICS_HZ,
     }
     reference = {"end_tension_n": run.static_n, "end_m": 0.0}
     return {"case": f"let go after a push at {run.speed_m_s} m/s", "ours": ours, "reference": reference}

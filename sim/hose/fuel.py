@@ -1,7 +1,7 @@
 """Fuel that flows through the hose into the held probe.
 
-The pod's valve is open while the coupling holds the probe and the reel stands in its refuelling range, not known to be
-dead: its light is green.
+The pod's valve is open while the coupling holds the probe and the pod's light is green: the reel stands in its
+refuelling range, not known to be dead.
 The flow follows with a first-order lag, of its own for opening and for closing:
 
     tau dQ/dt = Q_v - Q,          Q_v = Q_0 with the valve open, 0 with it shut                           (1)
@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dockair.sim.hose.reel import ReelLight
+from dockair.messages import Light
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,17 +51,17 @@ class Fuel:
         )
         self.flow_kg_s, self.given_kg = 0.0, 0.0
 
-    def step(self, light: ReelLight, latched: bool) -> None:
+    def step(self, light: Light, latched: bool) -> None:
         """Advance by one tick.
 
         Args:
-            light: of the reel.
+            light: of the pod.
             latched: the coupling holds the probe.
         """
         if not latched:
             self.flow_kg_s = 0.0
             return
-        is_open = light is ReelLight.GREEN
+        is_open = light is Light.GREEN
         wanted, (tau, blend) = (self._full_kg_s, self._opening) if is_open else (0.0, self._closing)
         lag = wanted - self.flow_kg_s
         self.given_kg += wanted * self._step_s - lag * tau * blend

@@ -37,12 +37,12 @@ Sources: RflySim/RflySimAAR (gain); limits in assets/parameters/reel.toml; Eq. (
 """
 
 from dataclasses import dataclass
-from enum import Enum
 
 import numpy as np
 
 from dockair.errors import DockairError
 from dockair.kernels import njit
+from dockair.messages import Light
 from dockair.rotations import Array
 from dockair.sim.air.atmosphere import STANDARD_GRAVITY_M_S2
 from dockair.sim.hose.chain import HoseParameters
@@ -76,22 +76,13 @@ class ReelParameters:
     guide_damping_ratio: float
 
 
-class ReelLight(Enum):
-    """What the pod shows the receiver behind it."""
-
-    RED = "red"  #: dead hose
-    AMBER = "amber"  #: ready, or not wound in far enough for fuel
-    GREEN = "green"  #: within the refuelling range: fuel flows
-    FLASHING_AMBER = "flashing amber"  #: beyond the inner limit
-
-
-def reel_light(position_m: float, locked: bool, parameters: ReelParameters) -> ReelLight:
-    """Light for a length of hose wound in."""
-    if locked:
-        return ReelLight.RED
+def reel_light(position_m: float, known_dead: bool, parameters: ReelParameters) -> Light:
+    """Return the light for a length of hose wound in [m]: what the pod shows, and its fuel valve goes by."""
+    if known_dead:
+        return Light.RED
     if position_m < parameters.refuelling_from_m:
-        return ReelLight.AMBER
-    return ReelLight.GREEN if position_m <= parameters.inner_limit_m else ReelLight.FLASHING_AMBER
+        return Light.AMBER
+    return Light.GREEN if position_m <= parameters.inner_limit_m else Light.FLASHING_AMBER
 
 
 class Reel:

@@ -17,6 +17,7 @@ sensor.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from enum import Enum
 from typing import Protocol
 
 import numpy as np
@@ -126,12 +127,21 @@ class TankerAnnouncement:
     climb_rad: float  #: of the way through the air then
 
 
+class Light(Enum):
+    """What the refuelling pod shows the receiver behind it [KDC-10 procedures]. Recordings hold these numbers."""
+
+    AMBER = 0  #: the hose is ready, or not wound in far enough for fuel
+    RED = 1  #: dead hose: no contact is to be made
+    GREEN = 2  #: wound in to within the refuelling range: fuel flows into a probe that is held
+    FLASHING_AMBER = 3  #: wound in beyond the range's inner limit
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PodSignal:
-    """What the light of the refuelling pod begins to show; amber, the hose is ready, until the first of these."""
+    """What the light of the refuelling pod begins to show; amber until the first of these."""
 
     time_stamp_s: float  #: when it was seen
-    red: bool  #: the hose is not ready: no contact is to be made; else amber
+    light: Light
 
 
 class Navigates(Protocol):

@@ -7,14 +7,15 @@ import numpy as np
 import pytest
 
 from dockair.calibration import Camera, Mounting
-from dockair.messages import PodSignal, ReceiverCommand
+from dockair.messages import Light, PodSignal, ReceiverCommand
 from dockair.nav.guidance.approach import Guidance, GuidanceSettings, PhaseLimits, RelativeState
 from dockair.nav.guidance.field_of_view import FieldOfView
 from dockair.nav.guidance.path_plan import PlanSettings
-from dockair.nav.guidance.phases import Phase
+from dockair.nav.guidance.phases import REFUELLED, Phase
 
 RATE_HZ = 50
 DEPTH_M = 0.3  # ring plane to coupling
+RANGE_M = 1.0, 6.0  # hose wound in while fuel flows
 TAKE_IN = PhaseLimits(take_in_m=1.5)  # short flights; what is reckoned errs with the way
 SETTINGS = GuidanceSettings(limits=TAKE_IN)
 PID = GuidanceSettings(controller="pid", limits=TAKE_IN)
@@ -22,7 +23,10 @@ DOCKING = [Phase.PRE_CONTACT, Phase.APPROACH, Phase.CONTACT, Phase.HOLD, Phase.D
 
 
 class Plant:
-    """Drogue on its path unless held by the probe; the receiver's velocity has a bias that nobody knows."""
+    """Drogue on its path unless held by the probe; the receiver's velocity has a bias that nobody knows.
+
+    Held, it is on a hose that is taken up as it is pushed; the light is green within the refuelling range.
+    """
 
     def __init__(
         self, offset=(4.0, 0.3, -0.2), bias=(0.0, 0.0, 0.0), drogue=lambda t: np.zeros(3), holds=True, pushed=None
@@ -64,6 +68,12 @@ class Plant:
         return state(after, rate)
 
     @property
+    def light(self):
+        if not self.latched or self.take_in < RANGE_M[0]:
+            return Light.AMBER
+        return Light.GREEN if self.take_in <= RANGE_M[1] else Light.FLASHING_AMBER
+
+    @property
     def radial_at_contact(self):
         return float(np.hypot(*self.crossings[0][0]))
 
@@ -88,6 +98,7 @@ def fly(plant, seconds=90.0, settings=SETTINGS, seen=lambda s: s):
     phases, take_in = [], []
     now = plant.step(ReceiverCommand())
     for _ in range(int(seconds * RATE_HZ)):
+        guidance.signal(PodSignal(time_stamp_s=plant.t, light=plant.light))
         now = plant.step(guidance.step(seen(now)))
         if not phases or guidance.phase is not phases[-1]:
             phases.append(guidance.phase)
@@ -169,7 +180,7 @@ def test_who_waits_before_a_red_light_has_not_waited_for_a_calm_moment():
     patience = []
     for red in (True, False):
         guidance, plant = Guidance(dataclasses.replace(PID, limits=limits), RATE_HZ), Plant(drogue=_swing)
-        guidance.signal(PodSignal(time_stamp_s=0.0, red=red))
+        guidance.signal(PodSignal(time_stamp_s=0.0, light=Light.RED if red else Light.AMBER))
         now = plant.step(ReceiverCommand())
         for _ in range(40 * RATE_HZ):
             now = plant.step(guidance.step(now))
@@ -427,7 +438,7 @@ def test_from_a_hose_that_contact_leaves_slack_it_goes_down_before_the_drogue_is
         guidance.phase = Phase.APPROACH
     guidance.phase = Phase.CONTACT
     if red:
-        guidance.signal(PodSignal(time_stamp_s=0.0, red=True))
+        guidance.signal(PodSignal(time_stamp_s=0.0, light=Light.RED))
     down = np.array([guidance.step(turned([-DEPTH_M, 0.0, 0.0], degrees)).velocity_m_s[2] for _ in range(RATE_HZ)])
     assert bool(down.min() < -1.0) == evades
     if evades:
@@ -472,7 +483,7 @@ def test_a_receiver_that_a_red_light_called_back_goes_down_from_a_slack_hose_tha
         guidance.step(state([ahead_m, 0.0, 0.0]))
         guidance.phase = Phase.APPROACH
     guidance.phase = Phase.BACK_OFF
-    guidance.signal(PodSignal(time_stamp_s=0.0, red=True))
+    guidance.signal(PodSignal(time_stamp_s=0.0, light=Light.RED))
     down = np.array([guidance.step(turned([-DEPTH_M, 0.0, 0.0], 8.0)).velocity_m_s[2] for _ in range(RATE_HZ)])
     assert guidance.phase is Phase.BACK_OFF and down.min() < -1.0
 
@@ -482,7 +493,7 @@ def gone_down(where_later, **later):
     guidance = Guidance(SETTINGS, RATE_HZ)
     guidance.step(state([-DEPTH_M, 0.01, 0.0]))
     guidance.phase = Phase.CONTACT
-    guidance.signal(PodSignal(time_stamp_s=0.0, red=True))
+    guidance.signal(PodSignal(time_stamp_s=0.0, light=Light.RED))
     for _ in range(RATE_HZ // 2):
         up = guidance.step(state([-DEPTH_M, 0.01, 0.0])).velocity_m_s[2]
     assert guidance.phase is Phase.BACK_OFF and abs(up) < 0.2
@@ -500,9 +511,10 @@ def test_from_a_drogue_that_gusts_take_aside_as_it_is_pulled_off_it_goes_straigh
     guidance = Guidance(SETTINGS, RATE_HZ)
     guidance.step(state([-DEPTH_M, 0.01, 0.0]))
     guidance.phase = Phase.HOLD
+    guidance.signal(PodSignal(time_stamp_s=0.0, light=Light.GREEN))
     while guidance.phase is Phase.HOLD:
         guidance.step(state([-DEPTH_M, 0.01, 0.0]))
-    assert guidance.phase is Phase.DISCONNECT
+    assert (guidance.phase, guidance.phase_reason) == (Phase.DISCONNECT, REFUELLED)
     assert min(guidance.step(state([-0.1, 0.2, 0.3])).velocity_m_s[2] for _ in range(3 * RATE_HZ)) > -0.5
 
 
@@ -832,7 +844,7 @@ def test_who_is_called_back_by_a_red_light_follows_the_drogue_until_it_stands():
     while not (guidance._closure.committed and now.p_PD_B[0] < 1.2):
         now = plant.step(guidance.step(now))
     red_s = plant.t
-    guidance.signal(PodSignal(time_stamp_s=red_s, red=True))
+    guidance.signal(PodSignal(time_stamp_s=red_s, light=Light.RED))
     offsets, ahead = [], []
     for _ in range(4 * RATE_HZ):
         now = plant.step(guidance.step(now))
@@ -851,7 +863,7 @@ def test_who_goes_back_from_contact_does_not_follow_a_drogue_that_has_come_off(r
     while guidance.phase is not Phase.CONTACT:
         now = plant.step(guidance.step(now))
     if red:
-        guidance.signal(PodSignal(time_stamp_s=plant.t, red=True))
+        guidance.signal(PodSignal(time_stamp_s=plant.t, light=Light.RED))
     commands = [guidance.step(state([0.5, 0.2, 0.0])) for _ in range(4 * RATE_HZ // 5)]
     assert guidance.phase is Phase.BACK_OFF and commands[-1].velocity_m_s[0] > 0.0
     assert max(abs(command.velocity_m_s[1]) for command in commands) < 0.05
@@ -910,3 +922,80 @@ def test_the_drogue_is_met_at_the_speed_that_a_scenario_may_ask_for(closure_m_s)
     phases, _ = fly(plant, settings=dataclasses.replace(SETTINGS, closure_speed_m_s=closure_m_s))
     assert phases == DOCKING
     assert plant.crossings[0][1] == pytest.approx(closure_m_s, abs=0.05)
+
+
+class Drifting(Plant):
+    """The receiver's velocity errs by this much more once the probe is held, where nobody sees it."""
+
+    def __init__(self, drift_m_s, **keys):
+        super().__init__(**keys)
+        self.drift_m_s = drift_m_s
+
+    def step(self, command):
+        before, now = self.latched, super().step(command)
+        if self.latched and not before:
+            self.bias = self.bias + [self.drift_m_s, 0.0, 0.0]
+        return now
+
+
+def held(plant, settings=SETTINGS, light=None, seconds=120.0):
+    """Fly to the hold's end; the reason for it, hose in at each of its ticks, whether the light was green there."""
+    guidance, take_in, green = Guidance(settings, RATE_HZ), [], []
+    now = plant.step(ReceiverCommand())
+    while guidance.phase is not Phase.DISCONNECT and plant.t < seconds:
+        guidance.signal(PodSignal(time_stamp_s=plant.t, light=light or plant.light))
+        shown = plant.light
+        now = plant.step(guidance.step(now))
+        if guidance.phase is Phase.HOLD:
+            take_in.append(plant.take_in)
+            green.append(shown is Light.GREEN)
+    return guidance.phase_reason, np.array(take_in), np.array(green)
+
+
+@pytest.mark.parametrize("settings", [SETTINGS, PID])
+def test_a_hold_that_falls_short_of_the_range_pushes_on_until_fuel_has_flowed_for_its_time(settings):
+    """Back by 0.2 m/s more than is held: of 1.5 m as reckoned too little is left for any fuel."""
+    reason, take_in, green = held(Drifting(-0.2), settings)
+    assert take_in[0] < RANGE_M[0] < take_in.max() < RANGE_M[0] + 0.5
+    assert reason == REFUELLED
+    assert green.sum() / RATE_HZ == pytest.approx(settings.limits.hold_s, abs=2.1 / RATE_HZ)
+
+
+def test_a_hold_beyond_the_inner_limit_eases_back_into_the_range():
+    """Forward by 0.2 m/s more than is held, to 5.5 m as reckoned."""
+    settings = dataclasses.replace(SETTINGS, limits=dataclasses.replace(TAKE_IN, take_in_m=5.5))
+    reason, take_in, green = held(Drifting(0.2), settings)
+    assert take_in.max() > RANGE_M[1] + 0.2 and take_in[-1] < RANGE_M[1]
+    assert reason == REFUELLED
+    assert green.sum() / RATE_HZ == pytest.approx(settings.limits.hold_s, abs=2.1 / RATE_HZ)
+
+
+def test_a_hold_under_a_light_that_never_turns_green_goes_a_metre_on_and_is_given_up():
+    """As behind a dead reel that nobody has noticed; it is not tried again."""
+    limits = SETTINGS.limits
+    reason, take_in, _ = held(Plant(), light=Light.AMBER)
+    assert reason == "no fuel"
+    assert len(take_in) / RATE_HZ == pytest.approx(limits.no_fuel_s, abs=2.1 / RATE_HZ)
+    stopping_m = SETTINGS.regain_speed_m_s * (1.0 / SETTINGS.course_gain_1_s + SETTINGS.response_s[0])
+    assert limits.take_in_m + limits.push_on_m < take_in.max() < limits.take_in_m + limits.push_on_m + 1.1 * stopping_m
+    assert abs(take_in[-1] - take_in[-RATE_HZ]) < 0.01
+
+
+def test_a_hold_under_a_green_light_is_no_other_than_one_of_which_the_light_says_nothing():
+    """Of what it commands no bit; it ends at the tick at which its time is over."""
+    commands = []
+    for speed_m_s in (SETTINGS.regain_speed_m_s, 0.0):
+        guidance, plant, flown = (
+            Guidance(dataclasses.replace(SETTINGS, regain_speed_m_s=speed_m_s), RATE_HZ),
+            Plant(),
+            [],
+        )
+        now = plant.step(ReceiverCommand())
+        while guidance.phase is not Phase.DISCONNECT:
+            guidance.signal(PodSignal(time_stamp_s=plant.t, light=plant.light))
+            flown.append((guidance.phase, guidance.step(now).velocity_m_s))
+            now = plant.step(ReceiverCommand(velocity_m_s=flown[-1][1]))
+        commands.append(np.array([u for _, u in flown]))
+        ticks = sum(phase is Phase.HOLD for phase, _ in flown)
+        assert ticks / RATE_HZ == pytest.approx(SETTINGS.limits.hold_s, abs=1.1 / RATE_HZ)
+    assert commands[0].tobytes() == commands[1].tobytes()

@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
+from dockair.messages import Light
 from dockair.nav.guidance.guidance_settings import RelativeState
 from dockair.nav.guidance.phase_clocks import PhaseClocks
 from dockair.nav.guidance.phases import Phase, PhaseLimits
@@ -34,7 +35,7 @@ def after(clocks, *steps):
             keys.get("ring_ahead_m", 4.0),
             steady=keys.get("steady", False),
             sure=keys.get("sure", True),
-            light_is_red=keys.get("light_is_red", False),
+            light=keys.get("light", Light.AMBER),
         )
     return clocks
 
@@ -62,7 +63,7 @@ def test_a_glimpse_ends_what_is_lost_and_takes_back_a_tick_of_what_is_blind():
 
 def test_patience_lasts_through_astern_and_approach_but_not_in_front_of_a_red_light():
     astern, closing = (Phase.PRE_CONTACT, SEEN, {}), (Phase.APPROACH, SEEN, {})
-    clocks = after(PhaseClocks(STEP_S, LIMITS), astern, closing, (Phase.PRE_CONTACT, SEEN, {"light_is_red": True}))
+    clocks = after(PhaseClocks(STEP_S, LIMITS), astern, closing, (Phase.PRE_CONTACT, SEEN, {"light": Light.RED}))
     assert clocks.patient_s == 1.0
     after(clocks, (Phase.BACK_OFF, SEEN, {}))
     assert clocks.patient_s == 0.0
@@ -124,3 +125,15 @@ def test_a_phase_begins_at_zero_and_an_approach_outside(to, inside_s):
 def test_the_time_past_the_ring_s_plane_ends_before_it():
     inside, outside = ((Phase.APPROACH, SEEN, {"ring_ahead_m": x}) for x in (-0.1, 0.1))
     assert after(PhaseClocks(STEP_S, LIMITS), inside, outside).inside_s == 0.0
+
+
+def test_green_counts_in_the_hold_alone_and_stands_still_under_another_light():
+    green, amber = ((Phase.HOLD, SEEN, {"light": light}) for light in (Light.GREEN, Light.AMBER))
+    clocks = after(PhaseClocks(STEP_S, LIMITS), (Phase.CONTACT, SEEN, {"light": Light.GREEN}))
+    clocks.begin(Phase.HOLD)
+    assert after(clocks, green, green).green_s == clocks.in_phase_s == 1.0
+    assert after(clocks, amber, amber).no_fuel_s == clocks.green_s == 1.0
+    after(clocks, green)
+    assert (clocks.green_s, clocks.no_fuel_s, clocks.in_phase_s) == (1.5, 0.0, 2.5)
+    after(clocks, amber).begin(Phase.HOLD)
+    assert clocks.green_s == clocks.no_fuel_s == 0.0

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from dockair.errors import DockairError
-from dockair.nav.guidance.phases import TRANSITIONS, Phase, PhaseLimits, Situation, next_phase
+from dockair.nav.guidance.phases import REFUELLED, TRANSITIONS, Phase, PhaseLimits, Situation, next_phase
 
 DOCS = Path(__file__).parents[2] / "docs" / "guidance.md"
 LIMITS = PhaseLimits()
@@ -91,8 +91,9 @@ OPENING = {"closing_m_s": -1.0}
         ("contact", HELD | {"beside_m": 0.26}, "back_off"),
         ("contact", HELD | {"track_lost_s": 0.6}, "back_off"),
         ("contact", HELD | {"pushed_in_m": 2.26}, "hold"),
-        ("hold", HELD | {"in_phase_s": 4.9}, None),
-        ("hold", HELD | {"in_phase_s": 5.0}, "disconnect"),
+        ("hold", HELD | {"in_phase_s": 40.0, "green_s": 4.9, "no_fuel_s": 9.9}, None),
+        ("hold", HELD | {"in_phase_s": 5.0, "green_s": 5.0}, "disconnect"),
+        ("hold", HELD | {"in_phase_s": 15.0, "green_s": 4.9, "no_fuel_s": 10.0}, "disconnect"),
         ("hold", HELD | {"ahead_m": 0.5}, "breakaway"),
         ("hold", HELD | {"hose_is_slack": True}, "breakaway"),
         ("hold", HELD | {"beside_m": 0.26}, "breakaway"),
@@ -123,6 +124,12 @@ OPENING = {"closing_m_s": -1.0}
 def test_each_row_of_the_table(phase, changes, following):
     transition = next_phase(Phase(phase), LIMITS, dataclasses.replace(CALM, **changes))
     assert (transition.to.value if transition else None) == following
+
+
+@pytest.mark.parametrize(("green_s", "no_fuel_s", "reason"), [(5.0, 0.0, REFUELLED), (4.9, 10.0, "no fuel")])
+def test_a_hold_has_refuelled_by_its_time_under_a_green_light_and_by_no_other(green_s, no_fuel_s, reason):
+    held = dataclasses.replace(CALM, **HELD, in_phase_s=20.0, green_s=green_s, no_fuel_s=no_fuel_s)
+    assert next_phase(Phase.HOLD, LIMITS, held).reason == reason
 
 
 def test_no_approach_is_begun_once_the_time_slot_is_over():

@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 
 from dockair.errors import DockairError, MachineError
-from dockair.messages import NavSolution, PodSignal, TankerAnnouncement
+from dockair.messages import Light, NavSolution, PodSignal, TankerAnnouncement
 from dockair.scenarios import message_log
 from dockair.scenarios.exact_json import decode, encode
 from dockair.scenarios.message_log import (
     MessageLog,
     NavigatorRecipe,
     estimate_row,
+    numbers,
     pixels_from_png,
     png_from_pixels,
     read_estimates,
@@ -71,12 +72,19 @@ def test_announcement_is_read_back_in_the_tick_it_was_made_in_and_in_no_other(ha
     assert [messages.announcement for messages in read_messages(tmp_path)] == [None, None, None, said, None]
 
 
-def test_what_the_light_shows_is_read_back_in_its_tick(hand_made, tmp_path):
-    red = PodSignal(time_stamp_s=0.1 + 0.2, red=True)
+@pytest.mark.parametrize("light", Light)
+def test_what_the_light_shows_is_read_back_in_its_tick(hand_made, tmp_path, light):
+    shown = PodSignal(time_stamp_s=0.1 + 0.2, light=light)
     with MessageLog(tmp_path, NavigatorRecipe(class_name="a:B", sheets=hand_made.sheets)) as log:
         for k, (_, imu, frame, solution) in enumerate(hand_made.ticks(3)):
-            log.append(imu, frame, solution, signal=red if k == 1 else None)
-    assert [messages.signal for messages in read_messages(tmp_path)] == [None, red, None]
+            log.append(imu, frame, solution, signal=shown if k == 1 else None)
+    assert [messages.signal for messages in read_messages(tmp_path)] == [None, shown, None]
+
+
+def test_recordings_of_before_hold_whether_the_light_was_red():
+    """As 1 and 0, of a light that had no other colours."""
+    assert (Light(True), Light(False)) == (Light.RED, Light.AMBER)
+    np.testing.assert_array_equal(numbers(PodSignal(time_stamp_s=1.5, light=Light.RED)), [1.5, 1.0])
 
 
 def test_estimates_are_read_back_to_the_last_bit(hand_made, tmp_path):

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from dockair.messages import ReceiverCommand
+from dockair.messages import Light, ReceiverCommand
 from dockair.parameters import load_parameters
 from dockair.sim.hose.fuel import Fuel, FuelParameters
-from dockair.sim.hose.reel import ReelLight, reel_light
+from dockair.sim.hose.reel import reel_light
 
 SHEET = load_parameters("fuel", FuelParameters)
-GREEN, AMBER, FLASHING, RED = ReelLight.GREEN, ReelLight.AMBER, ReelLight.FLASHING_AMBER, ReelLight.RED
+GREEN, AMBER, FLASHING, RED = Light.GREEN, Light.AMBER, Light.FLASHING_AMBER, Light.RED
 
 
 def run(fuel, light, seconds, step_s, latched=True):

@@ -7,18 +7,10 @@ import numpy as np
 import pytest
 
 from dockair.errors import DockairError
-from dockair.messages import ReceiverCommand
+from dockair.messages import Light, ReceiverCommand
 from dockair.parameters import load_parameters
 from dockair.sim.hose.chain import DrogueParameters, HoseParameters
-from dockair.sim.hose.reel import (
-    Reel,
-    ReelLight,
-    ReelParameters,
-    guide_coefficients,
-    guide_loads,
-    reel_light,
-    set_point_n,
-)
+from dockair.sim.hose.reel import Reel, ReelParameters, guide_coefficients, guide_loads, reel_light, set_point_n
 from dockair.sim.hose.rest import rest_shape
 
 REEL = load_parameters("reel", ReelParameters)
@@ -132,12 +124,12 @@ def test_reel_that_comes_to_life_against_its_buffer_goes_on_with_the_lock_s_forc
 @pytest.mark.parametrize(
     ("position_m", "locked", "light"),
     [
-        (0.0, False, ReelLight.AMBER),
-        (REEL.refuelling_from_m - 1e-6, False, ReelLight.AMBER),
-        (REEL.refuelling_from_m, False, ReelLight.GREEN),
-        (REEL.inner_limit_m, False, ReelLight.GREEN),
-        (REEL.inner_limit_m + 1e-6, False, ReelLight.FLASHING_AMBER),
-        (3.0, True, ReelLight.RED),
+        (0.0, False, Light.AMBER),
+        (REEL.refuelling_from_m - 1e-6, False, Light.AMBER),
+        (REEL.refuelling_from_m, False, Light.GREEN),
+        (REEL.inner_limit_m, False, Light.GREEN),
+        (REEL.inner_limit_m + 1e-6, False, Light.FLASHING_AMBER),
+        (3.0, True, Light.RED),
     ],
 )
 def test_light_says_where_in_its_range_the_reel_is_and_whether_it_is_dead(position_m, locked, light):
