@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dockair.messages import ReceiverCommand, TankerAnnouncement
+from dockair.messages import Light, PodSignal, ReceiverCommand, TankerAnnouncement
 from dockair.nav.guidance.announced_path import AnnouncedPath, AnnouncedPathSettings
 from dockair.nav.guidance.approach import Guidance, GuidanceSettings, PhaseLimits, RelativeState
 from dockair.nav.guidance.phases import Phase
@@ -225,6 +225,8 @@ def test_in_a_turn_that_is_not_quite_the_announced_one_the_probe_meets_the_drogu
     guidance.announce(_said())
     command, across, learnt, late = ReceiverCommand(), [], set(), []
     while guidance.phase is not Phase.DISCONNECT and plant.t < 60.0:
+        if guidance.phase is Phase.HOLD:
+            guidance.signal(PodSignal(time_stamp_s=plant.t, light=Light.GREEN))
         before, command = command, guidance.step(plant.step(command))
         if guidance.phase is Phase.HOLD:  # velocity and its rate go out together
             change = (command.velocity_m_s - before.velocity_m_s) * plant.RATE_HZ
