@@ -52,6 +52,10 @@ class MyNavigator:
             window=None, candidates_px=np.empty((0, 2)), led_pixels_px=np.full((8, 2), np.nan),
         )  # fmt: skip
 
+    def signal(self, signal):
+        """Take what the pod's light begins to show: a hold goes by it."""
+        self.guidance.signal(signal)
+
     def _take(self, seen):
         m, ring_D = self.sheets.mounting, self.sheets.ring.positions_D[seen.led_numbers]
         expected = m.R_BC.T @ self.R_BD, m.R_BC.T @ (self.p + m.p_BP - m.p_BC)
