@@ -236,6 +236,7 @@ class Guidance:
             radius_m=self._late * self._settings.closing.hopeful * self._settings.limits.capture_radius_m,
             waiting_s=self._closure.waiting_s,
             inside_s=clocks.inside_s,
+            came_out=clocks.came_out,
             unusable_s=clocks.unusable_s,
             track_lost_s=clocks.track_lost_s,
             blind_s=clocks.blind_s,

@@ -28,6 +28,7 @@ class PhaseClocks:
         self.blind_s = 0.0  #: unusable beyond that for which it has been usable
         self.doubtful_s = 0.0  #: the integrity monitor has not claimed that contact may be flown
         self.inside_s = 0.0  #: the tip has been past the ring's plane
+        self.came_out = False  #: it was in this approach, and is before it again
         self.green_s = 0.0  #: the pod's light has been green in the hold
         self.no_fuel_s = 0.0  #: it has not been, in the hold
         self.frames_stopped = False  #: and none that has come since was used
@@ -36,7 +37,7 @@ class PhaseClocks:
         """Begin a phase."""
         self.in_phase_s = self.green_s = self.no_fuel_s = 0.0
         if phase is Phase.APPROACH:
-            self.inside_s = 0.0
+            self.inside_s, self.came_out = 0.0, False
 
     def step(
         self, phase: Phase, state: RelativeState, ring_ahead_m: float, *, steady: bool, sure: bool, light: Light
@@ -67,6 +68,7 @@ class PhaseClocks:
         elif light is not Light.RED:  # who waits for amber has not waited for a calm moment
             self.patient_s += dt
         if phase is Phase.APPROACH:
+            self.came_out = ring_ahead_m > 0.0 and (self.came_out or self.inside_s > 0.0)
             self.inside_s = self.inside_s + dt if ring_ahead_m <= 0.0 else 0.0
         elif phase is Phase.HOLD:
             is_green = light is Light.GREEN

@@ -92,6 +92,7 @@ class Situation:
     radius_m: float  #: what that may be, after so much waiting
     waiting_s: float  #: time for which the approach has stood still for want of a good moment
     inside_s: float  #: time for which the tip has been past the ring's plane
+    came_out: bool  #: it was in this approach, and is before it again
     unusable_s: float  #: time for which the relative state has been unusable, from the start on
     track_lost_s: float  #: the same, or since the newest frame that was used, whichever is longer
     blind_s: float  #: time for which it has been unusable beyond that for which it has been usable
@@ -141,8 +142,11 @@ def _is_recalled(limits: PhaseLimits, s: Situation) -> bool:
 
 
 def _beside(limits: PhaseLimits, s: Situation) -> bool:
-    """Past the plane inside the rim is in the basket, whatever a belief says that the blow on it has unsettled."""
-    return s.entered_m > limits.rim_m
+    """Past the plane inside the rim is in the basket, whatever a belief says that the blow on it has unsettled.
+
+    A tip that has come out of it again over the rim is beside it, too.
+    """
+    return s.entered_m > limits.rim_m or (s.came_out and s.lateral_m > limits.rim_m)
 
 
 def is_off_the_probe(limits: PhaseLimits, ahead_m: float, beside_m: float) -> bool:

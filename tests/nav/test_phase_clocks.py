@@ -114,6 +114,16 @@ def test_frames_that_come_and_are_not_used_or_that_nobody_counts_have_not_stoppe
         assert not after(PhaseClocks(STEP_S, LIMITS), *unused).frames_stopped
 
 
+def test_a_tip_has_come_out_of_the_basket_from_when_it_is_before_the_plane_again_until_it_is_past_it():
+    clocks, came_out = PhaseClocks(STEP_S, LIMITS), []
+    for ring_ahead_m in (0.5, 0.01, 0.0, -0.1, 0.01, 0.3, -0.01, 0.2):
+        after(clocks, (Phase.APPROACH, SEEN, {"ring_ahead_m": ring_ahead_m}))
+        came_out.append(clocks.came_out)
+    assert came_out == [False, False, False, False, True, True, False, True]
+    clocks.begin(Phase.APPROACH)
+    assert not after(clocks, (Phase.APPROACH, SEEN, {"ring_ahead_m": 0.2})).came_out
+
+
 @pytest.mark.parametrize(("to", "inside_s"), [(Phase.APPROACH, 0.0), (Phase.CONTACT, 1.0)])
 def test_a_phase_begins_at_zero_and_an_approach_outside(to, inside_s):
     clocks = after(PhaseClocks(STEP_S, LIMITS), *[(Phase.APPROACH, SEEN, {"ring_ahead_m": 0.0})] * 2)
