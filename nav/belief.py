@@ -27,8 +27,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numba import njit
 
+from dockair.kernels import njit
 from dockair.nav.belief_frame import Explanation, explanations
 from dockair.nav.belief_motion import (
     CALIBRATION,

@@ -5,8 +5,8 @@ sums run over what is not zero, and Cholesky's factor serves for solution, deter
 """
 
 import numpy as np
-from numba import njit
 
+from dockair.kernels import njit
 from dockair.rotations import Array
 
 _MOST_STEPS, _MOST_HALVINGS = 30, 8

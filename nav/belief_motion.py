@@ -36,8 +36,8 @@ swing's axes turning with the tanker, a formation that speeds up (walk of c).
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from dockair.kernels import njit
 from dockair.rotations import Array
 
 PHI, PLACE, VELOCITY = slice(0, 3), slice(3, 6), slice(6, 9)

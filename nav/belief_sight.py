@@ -15,10 +15,10 @@ Not modelled: LEDs out of the ring's plane, which are seen at the sine of the ti
 from dataclasses import dataclass, field
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from dockair.calibration import Camera, Mounting
+from dockair.kernels import njit
 from dockair.nav.belief_frame import Seen
 from dockair.nav.belief_motion import CALIBRATION, RING, B, S, V
 from dockair.nav.pose.measurement import LinesOfSight

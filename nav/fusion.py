@@ -20,11 +20,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from scipy.stats import chi2
 
 from dockair.calibration import NavigationSheets
 from dockair.errors import DockairError
+from dockair.kernels import njit
 from dockair.messages import ImuSample
 from dockair.nav import belief_motion as motion
 from dockair.nav.belief import Correction, begun_again, corrected, felt_first, mixture, rolled, widened

@@ -23,9 +23,10 @@ A gyro's bias that is not known yet turns c away by b g t, until it is known or 
 """
 
 import numpy as np
-from numba import njit
 
+from dockair.kernels import njit
 from dockair.rotations import Array
+from dockair.triples import cross
 from dockair.vectors import is_finite
 
 _LEVEL_S = 10.0  # of gravity felt: the mean over a shorter time is as much the gust's and the joining-up's
@@ -82,8 +83,8 @@ class TipMotion:
 def _felt(c, J, f, before, w, r, step, time):  # type: ignore[no-untyped-def]
     """(3,) Eq. (1) over a step, from one rate to the next; c (3,), J (3, 3) go on by Eqs. (2), (3), T being `time`."""
     _carry(c, J, step, before, w)
-    out, whirl = np.empty(3), _cross(w, _cross(w, r))
-    lever = _cross((w[0] - before[0], w[1] - before[1], w[2] - before[2]), r)
+    out, whirl = np.empty(3), cross(w, cross(w, r))
+    lever = cross((w[0] - before[0], w[1] - before[1], w[2] - before[2]), r)
     for i in range(3):
         felt = f[i] + c[i]
         c[i] -= step / time * felt
@@ -115,12 +116,7 @@ def _turn(c, seconds, before, w):  # type: ignore[no-untyped-def]
     else:
         angle = np.sqrt(angle2)
         a, b = np.sin(angle) / angle, (1.0 - np.cos(angle)) / angle2
-    once = _cross(phi, c)
-    twice = _cross(phi, once)
+    once = cross(phi, c)
+    twice = cross(phi, once)
     for i in range(3):
         c[i] += a * once[i] + b * twice[i]
-
-
-@njit(cache=True)
-def _cross(a, b):  # type: ignore[no-untyped-def]
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]

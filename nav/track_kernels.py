@@ -1,8 +1,8 @@
 """Kernels of `track`: the ring after a turn of the camera, process noise, the gate, and the ring of the next window."""
 
 import numpy as np
-from numba import njit
 
+from dockair.kernels import njit
 from dockair.rotations import Array
 
 _NEAREST_M = 0.1  # depth of a ring that a turn has brought to the lens

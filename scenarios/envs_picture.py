@@ -5,8 +5,9 @@ factor at which the frame fits. A mean would drown an LED of three pixels; the b
 """
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from dockair.kernels import njit
 
 #: (rows, columns) of the picture by view: a window is about square, and the sensor has 1088 x 2048 pixels.
 PICTURE = {"ring": (128, 128), "sensor": (136, 256)}

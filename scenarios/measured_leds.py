@@ -34,9 +34,9 @@ from typing import Any, Protocol
 
 import mujoco
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from dockair.kernels import njit
 from dockair.messages import LedObservation, Window
 from dockair.rotations import Array
 from dockair.sim.as_built import AsBuilt

@@ -10,8 +10,8 @@ does to the acceleration in between is nothing (`scene`).
 
 import mujoco
 import numpy as np
-from numba import njit
 
+from dockair.kernels import njit
 from dockair.rotations import Array
 from dockair.sim.addresses import Addresses
 from dockair.sim.aircraft.tanker import TankerPath

@@ -11,7 +11,8 @@ nearer by the margin m. Not modelled: a receiver beside what it could touch, whi
 
 import mujoco
 import numpy as np
-from numba import njit
+
+from dockair.kernels import njit
 
 _MARGIN_M = 0.5  # at 1000 Hz: 500 m/s
 

@@ -26,9 +26,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from scipy.signal import cont2discrete
 
+from dockair.kernels import njit
 from dockair.rotations import Array
 
 _BLOCK = 64  # samples whose random numbers are drawn at a time, at least

@@ -24,10 +24,10 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from numba import njit
 
 from dockair.clock import Clock
 from dockair.errors import DockairError
+from dockair.kernels import njit
 from dockair.messages import ReceiverCommand
 from dockair.rotations import Array, quaternion_from_matrix
 from dockair.sim import truth as layout

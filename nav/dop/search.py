@@ -7,9 +7,9 @@ trace of the last `wanted` rows and columns of the inverse of their sum; inf whe
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from dockair.kernels import njit
 from dockair.rotations import Array
 
 _PIVOT = 1e-13  # of N at unit diagonal: nothing but rounding is left

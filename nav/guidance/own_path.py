@@ -28,8 +28,8 @@ drogue.
 """
 
 import numpy as np
-from numba import njit
 
+from dockair.kernels import njit
 from dockair.rotations import Array
 
 

@@ -26,8 +26,8 @@ Source: [Stellato 2020, OSQP: an operator splitting solver for quadratic program
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from dockair.kernels import njit
 from dockair.rotations import Array
 
 _UNTIL = 2.0  # widths after t_c: the way to the coupling is flown by then

@@ -18,8 +18,8 @@ Not modelled: that N itself turns, by up to phi / T, while the swing is predicte
 import math
 
 import numpy as np
-from numba import njit
 
+from dockair.kernels import njit
 from dockair.rotations import Array
 from dockair.vectors import cross
 

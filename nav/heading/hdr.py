@@ -23,9 +23,9 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
-from numba import njit
 
 from dockair.errors import DockairError
+from dockair.kernels import njit
 from dockair.rotations import Array
 
 __all__ = ["HeuristicDriftReduction", "HeuristicDriftSettings"]

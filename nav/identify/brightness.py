@@ -22,9 +22,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from dockair.kernels import njit
 from dockair.rotations import Array
 
 _STEP_SIGMAS = 0.5  # of the integral of Eq. (1): good to a thousandth

@@ -12,7 +12,8 @@ map in, as POSIT does (DeMenthon & Davis 1995), for both signs where it matters.
 """
 
 import numpy as np
-from numba import njit
+
+from dockair.kernels import njit
 
 SLOTS = 8
 _ANGLE = 2.0 * np.pi * np.arange(SLOTS) / SLOTS

@@ -10,7 +10,8 @@ eight LEDs dropped, a look about, twice, then five dropped), and seldom more tha
 """
 
 import numpy as np
-from numba import njit
+
+from dockair.kernels import njit
 
 SLOTS = 8
 _ANGLE = 2.0 * np.pi * np.arange(SLOTS) / SLOTS

@@ -20,9 +20,9 @@ from functools import lru_cache
 from itertools import combinations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from dockair.kernels import njit
 from dockair.rotations import Array
 
 RADIUS_GATE = 0.10  # [Yoon 2018, III.2]: candidates within 10 % of the radius are the LEDs

@@ -11,7 +11,8 @@ that keeps small ones (stereographic); what perspective does to large ones is le
 """
 
 import numpy as np
-from numba import njit
+
+from dockair.kernels import njit
 
 _LOOSE = 0.9  # of the least ratio of axes: what perspective may do to it
 

@@ -18,10 +18,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from dockair.errors import DockairError
+from dockair.kernels import njit
 
 Image = NDArray[np.integer[Any]]
 Mask = NDArray[np.bool_]

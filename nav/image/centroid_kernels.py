@@ -1,7 +1,8 @@
 """The loops of `centroid`, whose symbols and equation numbers they use."""
 
 import numpy as np
-from numba import njit
+
+from dockair.kernels import njit
 
 _MIN_BACKGROUND_PIXELS = 12  # fewer say less about b than the whole frame does
 _WINDOW_RADII = 1.9  # R in equivalent radii of the blob: least error from 2 m to 30 m

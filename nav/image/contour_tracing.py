@@ -7,9 +7,9 @@ Sources: [Yoon 2018, Fig 9]; Chang, Chen & Lu 2004.
 """
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from dockair.kernels import njit
 from dockair.nav.image.binarise import Mask
 from dockair.nav.image.segments import SEGMENT, busy_segments, checked_mask
 

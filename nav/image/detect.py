@@ -19,10 +19,10 @@ from functools import lru_cache
 from typing import Literal
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from dockair.errors import DockairError
+from dockair.kernels import njit
 from dockair.messages import Window
 from dockair.nav.image.binarise import Image, adaptive_threshold, check_image, frame_statistics
 from dockair.nav.image.centroid import BlobMeasurements, NoiseModel, measure_blobs

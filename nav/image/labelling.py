@@ -16,10 +16,10 @@ background.
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from dockair.errors import DockairError
+from dockair.kernels import njit
 from dockair.nav.image.binarise import Image, Mask
 from dockair.nav.image.contour_tracing import label_contour_tracing
 from dockair.nav.image.segments import SEGMENT, busy_segments, checked_mask

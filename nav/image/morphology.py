@@ -18,10 +18,10 @@ one by one is the opening of the image, and costs nothing where the frame is dar
 
 import cv2
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from dockair.errors import DockairError
+from dockair.kernels import njit
 from dockair.nav.image.binarise import Mask
 from dockair.nav.image.labelling import Runs
 

@@ -1,10 +1,10 @@
 """Which parts of a binary image hold anything: most of a frame is background, and is passed over 64 pixels at once."""
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from dockair.errors import DockairError
+from dockair.kernels import njit
 
 SEGMENT = 64  #: pixels
 

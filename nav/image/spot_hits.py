@@ -6,7 +6,9 @@ whole numbers: 3/16 x is 0 up to 5, 1 from 6 and 2 from 14 on. Rows with no pixe
 """
 
 import numpy as np
-from numba import njit
+
+from dockair.kernels import njit
+from dockair.nav.image.spot_kernels import grown
 
 _SEGMENT = 64  # pixels that are passed over at once
 
@@ -85,7 +87,7 @@ def find_hits(image, reaches, row_steps, contrasts, wide):  # type: ignore[no-un
         for f in range(_segments(image, brightest, reach, row_steps[k], image.dtype.type(contrast), found)):
             i, first = found[f, 0], found[f, 1]
             while n + _SEGMENT > len(hits):
-                hits = _grown(hits)
+                hits = grown(hits)
             end = min(first + _SEGMENT, columns - reach)
             n = _look_at(image, i, first, end, k, reach, contrast, beside, above, hits, n)
     return hits[:n]
@@ -111,11 +113,3 @@ def _look_at(image, i, first, end, k, reach, contrast, beside, above, hits, n): 
         hits[n, 0], hits[n, 1], hits[n, 2], hits[n, 3] = k, i, j, second
         n += 1
     return n
-
-
-@njit(cache=True)
-def _grown(table):  # type: ignore[no-untyped-def]
-    """A copy with twice the rows."""
-    longer = np.empty((2 * len(table), table.shape[1]), table.dtype)
-    longer[: len(table)] = table
-    return longer

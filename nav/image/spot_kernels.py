@@ -1,8 +1,9 @@
 """From hits to spots: the loops of `spots`, whose symbols and equation numbers they use."""
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from dockair.kernels import njit
 
 REACHES_PX = (4, 2, 8, 14)  #: in the order in which they are tried
 ROW_STEPS = (2, 1, 3, 4)  #: rows that are looked at: the smallest spots of a reach cover so many
@@ -30,7 +31,7 @@ _RING_STARTS = tuple(sum(len(ring_steps(reach)) for reach in REACHES_PX[:k]) for
 
 
 @njit(cache=True)
-def _grown(table):  # type: ignore[no-untyped-def]
+def grown(table):  # type: ignore[no-untyped-def]
     """A copy with twice the rows."""
     longer = np.empty((2 * len(table), table.shape[1]), table.dtype)
     longer[: len(table)] = table
@@ -218,7 +219,7 @@ def _inside_earlier(i, j, head, spots, runs):  # type: ignore[no-untyped-def]
 def _append_runs(patch, top, left, size, runs, n):  # type: ignore[no-untyped-def]
     """Runs of a patch behind the n that there are; the table and its new length."""
     while n + size * (size + 1) // 2 > len(runs):
-        runs = _grown(runs)
+        runs = grown(runs)
     for u in range(size):
         v = 0
         while v < size:
@@ -264,7 +265,7 @@ def grow(image, hits, contrasts, model):  # type: ignore[no-untyped-def]
         if level < 0:
             continue
         if count == len(spots):
-            spots, backgrounds = _grown(spots), _grown(backgrounds)
+            spots, backgrounds = grown(spots), grown(backgrounds)
         spots[count, 0], spots[count, 3], backgrounds[count, 0] = n, level, b
         runs, n = _append_runs(patch, i - reach, j - reach, 2 * reach + 1, runs, n)
         spots[count, 1], spots[count, 2] = n, head[i // CELL_PX + 1, j // CELL_PX + 1]

@@ -110,6 +110,7 @@ def _distance(pose: PoseEstimate, other: PoseEstimate) -> Array:
 
 def _levels(bounds: Array, pose: PoseEstimate, sight: LinesOfSight, alone: bool) -> ProtectionLevels:
     along, across, turn = (float(bound) for bound in bounds)
-    mirror = pose_difference(*mirrored(pose.R_CD, pose.p_CD, sight.points_D), pose.R_CD, pose.p_CD)
+    R_CD, p_CD = mirrored(pose.R_CD, pose.p_CD, sight.points_D)
+    mirror = pose_difference(R_CD, p_CD, pose.R_CD, pose.p_CD)
     linear = bool(turn < 0.5 * np.sqrt(mirror[:3] @ mirror[:3]))
     return ProtectionLevels(range_m=along, lateral_m=across, attitude_rad=turn if alone and linear else np.inf)

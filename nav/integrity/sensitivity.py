@@ -23,8 +23,8 @@ networks, 1968 (local test); a GPS satellite has one axis, an LED two.
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from dockair.kernels import njit
 from dockair.nav.pose.estimate import PoseEstimate
 from dockair.nav.pose.measurement import LinesOfSight
 from dockair.rotations import Array

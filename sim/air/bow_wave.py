@@ -21,9 +21,9 @@ Source: potential flow, as [Dai, Wei & Quan 2016] with one source in place of th
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from dockair.errors import DockairError
+from dockair.kernels import njit
 from dockair.rotations import Array
 
 

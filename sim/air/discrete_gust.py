@@ -17,9 +17,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from dockair.errors import DockairError
+from dockair.kernels import njit
 from dockair.rotations import Array
 
 

@@ -21,9 +21,9 @@ Not modelled: gradients along the vertical; the wake's effect on the gusts; the 
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from numba import njit
 
 from dockair.errors import DockairError
+from dockair.kernels import njit
 from dockair.rotations import Array
 from dockair.sim.air.bow_wave import write_bow_wave_velocity
 from dockair.sim.air.wake import write_wake_velocity

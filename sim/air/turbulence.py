@@ -32,10 +32,10 @@ from dataclasses import dataclass
 from math import exp, expm1, floor, pi, sqrt
 
 import numpy as np
-from numba import njit
 from scipy.special import gammainc
 
 from dockair.errors import DockairError
+from dockair.kernels import njit
 from dockair.rotations import Array
 
 _METRES_PER_FOOT = 0.3048

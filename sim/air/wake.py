@@ -27,9 +27,9 @@ Sources: Eq. (3) Squire 1965 with a of Bhagwat & Leishman 2002; tail as in RflyS
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from dockair.errors import DockairError
+from dockair.kernels import njit
 from dockair.rotations import Array
 from dockair.sim.air.atmosphere import STANDARD_GRAVITY_M_S2, Air
 

@@ -8,8 +8,8 @@ Source: Stevens, Lewis & Johnson, Aircraft Control and Simulation, chapters 4 an
 """
 
 import numpy as np
-from numba import njit
 
+from dockair.kernels import njit
 from dockair.rotations import Array
 from dockair.sim.aircraft.airframe import AirframeData
 from dockair.sim.aircraft.engine import engine_lag_1_s

@@ -12,8 +12,8 @@ Not modelled: wind; the path is one in the air mass.
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from dockair.kernels import njit
 from dockair.rotations import Array
 from dockair.sim.air.atmosphere import STANDARD_GRAVITY_M_S2
 

@@ -9,8 +9,8 @@ Not modelled: Schuler oscillation, noise of the accelerometers, correlation betw
 """
 
 import numpy as np
-from numba import njit
 
+from dockair.kernels import njit
 from dockair.rotations import Array
 
 KNOT_S = 1.0

@@ -11,9 +11,9 @@ Not modelled: biases (they act like a drift of the inertial velocity), scale fac
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from dockair.kernels import njit
 from dockair.rotations import Array
 
 SAMPLE_S = 0.01

@@ -6,8 +6,8 @@ with the drift of an inertial navigation and gets no position, and everything th
 """
 
 import numpy as np
-from numba import njit
 
+from dockair.kernels import njit
 from dockair.messages import ReceiverCommand
 from dockair.rotations import Array
 from dockair.sim.air.atmosphere import Air

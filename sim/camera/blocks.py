@@ -17,11 +17,11 @@ Not modelled: vignetting beyond cos^4, blur by the lens.
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.interpolate import RectBivariateSpline
 
 from dockair.calibration import Camera
+from dockair.kernels import njit
 from dockair.messages import Window
 from dockair.rotations import Array
 from dockair.sim.camera.coarse_grid import CoarseGrid

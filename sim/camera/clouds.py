@@ -34,9 +34,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from scipy.special import ndtr, ndtri
 
+from dockair.kernels import njit
 from dockair.rotations import Array
 
 _OCTAVES = 12  # 4096:1; the footprint ends the sum earlier

@@ -16,17 +16,16 @@ Source: do Carmo, Differential Geometry of Curves and Surfaces, section 3-3 (cur
 
 import math
 
-from numba import njit
-
+from dockair.kernels import njit
 from dockair.rotations import Array
 from dockair.sim.camera.mirrors import Balls
+from dockair.triples import Vector, dot, plus, tangents, turned, turned_back, unit
 
 _STEPS, _CLOSE_RAD = 40, 1e-10
 _LONGEST_TURN_RAD = 0.5  # of the normal in one step
 _EVERYWHERE = 1e9  # [m], for surfaces without edges
 _SKIN_M = 1e-3  # a ray that starts on a surface starts this far off it
 
-Vector = tuple[float, float, float]
 Torus = tuple[Vector, Vector, float, float]  # centre, axis, R, r
 
 
@@ -42,11 +41,11 @@ def ellipsoid_spots(
             if axes[0] == axes[1] == axes[2]:
                 continue
             M, at = xmat[g], (xpos[g, 0], xpos[g, 1], xpos[g, 2])
-            light = _into(M, _add((lights[j, 0], lights[j, 1], lights[j, 2]), -point, at))
-            found, p, n, t1, t2, c = _on_ellipsoid(axes, light, point, _into(M, _add(eye, -1.0, at)))
+            light = turned_back(M, plus((lights[j, 0], lights[j, 1], lights[j, 2]), -point, at))
+            found, p, n, t1, t2, c = _on_ellipsoid(axes, light, point, turned_back(M, plus(eye, -1.0, at)))
             if found and abs(n[balls.thin[i]]) <= balls.most_cos[i]:
                 out = spots[count]
-                _write(out, _add(at, 1.0, _out_of(M, p)), _out_of(M, n), _out_of(M, t1), _out_of(M, t2), c)
+                _write(out, plus(at, 1.0, turned(M, p)), turned(M, n), turned(M, t1), turned(M, t2), c)
                 out[19], out[20], out[21], out[22] = balls.material[i], _SKIN_M, j, g
                 count += 1
     return count
@@ -81,60 +80,10 @@ def _write(row: Array, p: Vector, n: Vector, t1: Vector, t2: Vector, c: Vector) 
 
 
 @njit(cache=True)
-def _dot(a: Vector, b: Vector) -> float:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-@njit(cache=True)
-def _cross(a: Vector, b: Vector) -> Vector:
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-@njit(cache=True)
-def _add(a: Vector, k: float, b: Vector) -> Vector:
-    return a[0] + k * b[0], a[1] + k * b[1], a[2] + k * b[2]
-
-
-@njit(cache=True)
-def _unit(a: Vector) -> tuple[Vector, float]:
-    length = math.sqrt(_dot(a, a))
-    k = 1.0 / max(length, 1e-300)
-    return (k * a[0], k * a[1], k * a[2]), length
-
-
-@njit(cache=True)
-def _out_of(M: Array, a: Vector) -> Vector:
-    """M a, with M (9,) by rows."""
-    return (
-        M[0] * a[0] + M[1] * a[1] + M[2] * a[2],
-        M[3] * a[0] + M[4] * a[1] + M[5] * a[2],
-        M[6] * a[0] + M[7] * a[1] + M[8] * a[2],
-    )
-
-
-@njit(cache=True)
-def _into(M: Array, a: Vector) -> Vector:
-    """M' a."""
-    return (
-        M[0] * a[0] + M[3] * a[1] + M[6] * a[2],
-        M[1] * a[0] + M[4] * a[1] + M[7] * a[2],
-        M[2] * a[0] + M[5] * a[1] + M[8] * a[2],
-    )
-
-
-@njit(cache=True)
-def _frame(n: Vector) -> tuple[Vector, Vector]:
-    """Unit tangents with t2 = n x t1."""
-    helper = (1.0, 0.0, 0.0) if abs(n[0]) < 0.7 else (0.0, 1.0, 0.0)
-    t1, _ = _unit(_cross(n, helper))
-    return t1, _cross(n, t1)
-
-
-@njit(cache=True)
 def _bisector(p: Vector, light: Vector, point: float, eye: Vector) -> tuple[Vector, float]:
-    s, _ = _unit(_add(light, -point, p))
-    v, _ = _unit(_add(eye, -1.0, p))
-    h, twice = _unit(_add(s, 1.0, v))
+    s, _ = unit(plus(light, -point, p))
+    v, _ = unit(plus(eye, -1.0, p))
+    h, twice = unit(plus(s, 1.0, v))
     return h, 0.5 * twice
 
 
@@ -143,15 +92,15 @@ def _move(
     p: Vector, n: Vector, t1: Vector, t2: Vector, c: Vector, light: Vector, point: float, eye: Vector
 ) -> tuple[float, float, float]:
     """Eq. (1): x1, x2 and the slope m."""
-    s, d1 = _unit(_add(light, -point, p))
-    v, d = _unit(_add(eye, -1.0, p))
-    h, twice = _unit(_add(s, 1.0, v))
+    s, d1 = unit(plus(light, -point, p))
+    v, d = unit(plus(eye, -1.0, p))
+    h, twice = unit(plus(s, 1.0, v))
     k, near = 1.0 / max(twice, 1e-9), point / d1
-    s1, s2, v1, v2 = _dot(s, t1), _dot(s, t2), _dot(v, t1), _dot(v, t2)
+    s1, s2, v1, v2 = dot(s, t1), dot(s, t2), dot(v, t1), dot(v, t2)
     b11 = c[0] + k * ((1.0 - v1 * v1) / d + (1.0 - s1 * s1) * near)
     b12 = c[1] - k * (v1 * v2 / d + s1 * s2 * near)
     b22 = c[2] + k * ((1.0 - v2 * v2) / d + (1.0 - s2 * s2) * near)
-    h1, h2, hn = _dot(h, t1), _dot(h, t2), _dot(h, n)
+    h1, h2, hn = dot(h, t1), dot(h, t2), dot(h, n)
     angle = math.atan2(math.sqrt(h1 * h1 + h2 * h2), hn)
     size = min(angle, _LONGEST_TURN_RAD) / max(math.sqrt(h1 * h1 + h2 * h2), 1e-300)
     m1, m2, det = size * h1, size * h2, b11 * b22 - b12 * b12
@@ -168,18 +117,18 @@ def _on_ellipsoid(
     a2, b2, c2 = axes[0] ** 2, axes[1] ** 2, axes[2] ** 2
     h, _ = _bisector((0.0, 0.0, 0.0), light, point, eye)
     p = (a2 * h[0], b2 * h[1], c2 * h[2])
-    k = 1.0 / math.sqrt(max(_dot(p, h), 1e-300))
+    k = 1.0 / math.sqrt(max(dot(p, h), 1e-300))
     p, angle = (k * p[0], k * p[1], k * p[2]), 1.0
     n, t1, t2, c = h, h, h, h
     for _ in range(_STEPS):
-        n, slope = _unit((p[0] / a2, p[1] / b2, p[2] / c2))
-        t1, t2 = _frame(n)
+        n, slope = unit((p[0] / a2, p[1] / b2, p[2] / c2))
+        t1, t2 = tangents(n)
         w = (t1[0] / a2, t1[1] / b2, t1[2] / c2)
-        c = (_dot(t1, w) / slope, _dot(t2, w) / slope, (t2[0] ** 2 / a2 + t2[1] ** 2 / b2 + t2[2] ** 2 / c2) / slope)
+        c = (dot(t1, w) / slope, dot(t2, w) / slope, (t2[0] ** 2 / a2 + t2[1] ** 2 / b2 + t2[2] ** 2 / c2) / slope)
         x1, x2, angle = _move(p, n, t1, t2, c, light, point, eye)
         if angle < _CLOSE_RAD:
             break
-        p = _add(_add(p, x1, t1), x2, t2)
+        p = plus(plus(p, x1, t1), x2, t2)
         k = 1.0 / math.sqrt(p[0] ** 2 / a2 + p[1] ** 2 / b2 + p[2] ** 2 / c2)
         p = (k * p[0], k * p[1], k * p[2])
     return angle < _CLOSE_RAD, p, n, t1, t2, c
@@ -191,23 +140,23 @@ def _on_torus(
 ) -> tuple[bool, Vector, Vector, Vector, Vector, Vector]:
     """Found, point, normal, tangents along ring and tube circle, C11 C12 C22, Eqs. (1) and (3)."""
     centre, axis, radius, tube = torus
-    y, z = _frame(axis)
+    y, z = tangents(axis)
     start, _ = _bisector(centre, light, point, eye)
     if point > 0.0:
-        start = _add(light, -1.0, centre)
-    f = math.atan2(side * _dot(start, z), side * _dot(start, y))
-    e = _add(_add((0.0, 0.0, 0.0), math.cos(f), y), math.sin(f), z)
-    h, _ = _bisector(_add(centre, radius, e), light, point, eye)
-    g, angle = math.atan2(_dot(h, axis), _dot(h, e)), 1.0
+        start = plus(light, -1.0, centre)
+    f = math.atan2(side * dot(start, z), side * dot(start, y))
+    e = plus(plus((0.0, 0.0, 0.0), math.cos(f), y), math.sin(f), z)
+    h, _ = _bisector(plus(centre, radius, e), light, point, eye)
+    g, angle = math.atan2(dot(h, axis), dot(h, e)), 1.0
     p, n, t1, t2, c = e, e, e, e, e
     for _ in range(_STEPS):
-        e = _add(_add((0.0, 0.0, 0.0), math.cos(f), y), math.sin(f), z)
+        e = plus(plus((0.0, 0.0, 0.0), math.cos(f), y), math.sin(f), z)
         cos_g, sin_g = math.cos(g), math.sin(g)
-        n = _add((cos_g * e[0], cos_g * e[1], cos_g * e[2]), sin_g, axis)
-        t1 = _add(_add((0.0, 0.0, 0.0), -math.sin(f), y), math.cos(f), z)
-        t2 = _add((-sin_g * e[0], -sin_g * e[1], -sin_g * e[2]), cos_g, axis)
+        n = plus((cos_g * e[0], cos_g * e[1], cos_g * e[2]), sin_g, axis)
+        t1 = plus(plus((0.0, 0.0, 0.0), -math.sin(f), y), math.cos(f), z)
+        t2 = plus((-sin_g * e[0], -sin_g * e[1], -sin_g * e[2]), cos_g, axis)
         arm = radius + tube * cos_g
-        p, c = _add(_add(centre, radius, e), tube, n), (cos_g / arm, 0.0, 1.0 / tube)
+        p, c = plus(plus(centre, radius, e), tube, n), (cos_g / arm, 0.0, 1.0 / tube)
         x1, x2, angle = _move(p, n, t1, t2, c, light, point, eye)
         if angle < _CLOSE_RAD:
             break

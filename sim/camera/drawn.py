@@ -23,9 +23,9 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from dockair.kernels import njit
 from dockair.rotations import Array
 from dockair.sim.camera.meshes import Meshes
 from dockair.sim.camera.pieces import Frustum, Table, set_pieces, set_planes

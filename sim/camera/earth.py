@@ -10,9 +10,9 @@ Source: Rozenberg 1966 (air mass at the horizon).
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from dockair.kernels import njit
 from dockair.rotations import Array
 
 Interval = NDArray[np.int64]  # (rows, 2) first column and one past the last

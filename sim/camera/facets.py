@@ -14,11 +14,13 @@ Sources: as of `lobes`.
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from dockair.kernels import njit
 from dockair.rotations import Array
-from dockair.sim.camera.mirrors import Facets, Vector
+from dockair.sim.camera.lobes import reflectance
+from dockair.sim.camera.mirrors import Facets
+from dockair.triples import Vector, turned_back, unit
 
 _GAIN = 4.0
 _LEAST_COS = 1e-3  # of v.n - b
@@ -50,17 +52,17 @@ def facets_that_may_shine(
     (xpos, xmat), planes, frame, half = poses, facets.planes, facets.frame, facets.half
     out, count = np.empty(len(facets.geom) + 1, dtype=np.int64), 0
     for g, start, stop in facets.runs:
-        s = _into(xmat[g], sun[0])
-        e = _into(xmat[g], (eye[0] - xpos[g, 0], eye[1] - xpos[g, 1], eye[2] - xpos[g, 2]))
-        facing, first, axis = _facing(planes, start, stop, s, e, out[count:]), count, _into(xmat[g], ahead)
+        s = turned_back(xmat[g], sun[0])
+        e = turned_back(xmat[g], (eye[0] - xpos[g, 0], eye[1] - xpos[g, 1], eye[2] - xpos[g, 2]))
+        facing, first, axis = _facing(planes, start, stop, s, e, out[count:]), count, turned_back(xmat[g], ahead)
         for at in range(first, first + facing):
             i = out[at]
             px, py, pz, reach = frame[i, 0, 0], frame[i, 0, 1], frame[i, 0, 2], half[i, 0] + half[i, 1]
             depth = axis[0] * (px - e[0]) + axis[1] * (py - e[1]) + axis[2] * (pz - e[2])
             if depth < -reach * (1.0 + facets.bend[i]):
                 continue
-            v, d = _unit((e[0] - px, e[1] - py, e[2] - pz))
-            h, twice = _unit((v[0] + s[0], v[1] + s[1], v[2] + s[2]))
+            v, d = unit((e[0] - px, e[1] - py, e[2] - pz))
+            h, twice = unit((v[0] + s[0], v[1] + s[1], v[2] + s[2]))
             x, y, z = planes[0, i], planes[1, i], planes[2, i]
             hn, vn = x * h[0] + y * h[1] + z * h[2], x * v[0] + y * v[1] + z * v[2]
             if hn < _STEEPEST:
@@ -70,8 +72,8 @@ def facets_that_may_shine(
             lacking = max(math.sqrt(max(1.0 / hn**2 - 1.0, 0.0)) - bend, 0.0)
             if lacking > _MOST_SIGMAS * (rough + disc):
                 continue
-            reflectance = _reflectance(0.5 * twice, finishes[facets.material[i]])
-            most = _GAIN * reflectance / (8.0 * hn**4 * max(vn - bend, _LEAST_COS) * rough**2)
+            share = reflectance(0.5 * twice, finishes[facets.material[i]])
+            most = _GAIN * share / (8.0 * hn**4 * max(vn - bend, _LEAST_COS) * rough**2)
             if most * math.exp(-0.5 * lacking**2 / (rough**2 + disc**2)) >= faintest:
                 out[count] = i
                 count += 1
@@ -88,32 +90,3 @@ def _facing(planes: Array, start: int, stop: int, s: Vector, e: Vector, out: NDA
         toward, ahead = x * s[0] + y * s[1] + z * s[2], x * e[0] + y * e[1] + z * e[2]
         count += (toward > 0.0) & (ahead > planes[3, i])
     return count
-
-
-@njit(cache=True)
-def _into(M: Array, a: Vector) -> Vector:
-    """M' a, with M (9,) by rows."""
-    return (
-        M[0] * a[0] + M[3] * a[1] + M[6] * a[2],
-        M[1] * a[0] + M[4] * a[1] + M[7] * a[2],
-        M[2] * a[0] + M[5] * a[1] + M[8] * a[2],
-    )
-
-
-@njit(cache=True)
-def _unit(a: Vector) -> tuple[Vector, float]:
-    length = math.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
-    k = 1.0 / max(length, 1e-300)
-    return (k * a[0], k * a[1], k * a[2]), length
-
-
-@njit(cache=True)
-def _reflectance(cos_i: float, finish: Array) -> float:
-    """As of `lobes`."""
-    index, metal, share = finish[0], finish[1], finish[2]
-    if index == 0.0:
-        return share * (metal + (1.0 - metal) * (1.0 - cos_i) ** 5)
-    cos_r = math.sqrt(1.0 - (1.0 - cos_i * cos_i) / (index * index))
-    across = (cos_i - index * cos_r) / (cos_i + index * cos_r)
-    along = (cos_r - index * cos_i) / (cos_r + index * cos_i)
-    return 0.5 * share * (across * across + along * along)

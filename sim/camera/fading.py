@@ -4,9 +4,9 @@ Stretches of a row that hold a solid are worked out whole, the others not at all
 """
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from dockair.kernels import njit
 from dockair.rotations import Array
 
 _F = np.float32

@@ -13,10 +13,10 @@ Sources: EMVA 1288 release 4.0 (PRNU, DSNU and their column parts); hash: Steele
 """
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
+from dockair.kernels import njit
 from dockair.sim.camera.sheets import SensorParameters
 
 _STEPS = 29.0  # per standard deviation: 4.3 of them fill a byte

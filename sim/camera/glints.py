@@ -17,18 +17,19 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from dockair.kernels import njit
 from dockair.rotations import Array
 from dockair.sim.camera.curved_mirrors import ellipsoid_spots, rim_spots
 from dockair.sim.camera.facets import facets_that_may_shine
 from dockair.sim.camera.lobes import MOST_PIECES, ROW, SPOT, facet_rows, spot_rows
-from dockair.sim.camera.mirrors import Mirrors, Vector, finishes, vector
+from dockair.sim.camera.mirrors import Mirrors, finishes, vector
 from dockair.sim.camera.obstacles import Obstacles
 from dockair.sim.camera.occlusion import first_hits, is_clear
 from dockair.sim.camera.round_mirrors import round_spots
 from dockair.sim.camera.sheets import LightParameters, SurfaceParameters
+from dockair.triples import Vector
 
 _TINY_M = 1e-300  # keeps a direction finite
 

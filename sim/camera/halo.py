@@ -23,9 +23,9 @@ was found again in measurements of camera lenses: Ritt et al., Sensors 20 (2020)
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from dockair.kernels import njit
 from dockair.rotations import Array
 from dockair.sim.camera.coarse_grid import SPACING_PX
 

@@ -19,18 +19,19 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from dockair.kernels import njit
 from dockair.rotations import Array
 from dockair.sim.camera.curved_mirrors import ellipsoid_spots, rim_spots
 from dockair.sim.camera.glints import starts_of_seen
 from dockair.sim.camera.lobes import ROW, SPOT, Poses, spot_rows
-from dockair.sim.camera.mirrors import Balls, Mirrors, Tubes, Vector, finishes, vector
+from dockair.sim.camera.mirrors import Balls, Mirrors, Tubes, finishes, vector
 from dockair.sim.camera.obstacles import Obstacles
 from dockair.sim.camera.occlusion import is_clear
 from dockair.sim.camera.round_mirrors import round_spots
 from dockair.sim.camera.sheets import SurfaceParameters
+from dockair.triples import Vector, dot
 
 _CLOSEST_M = 1e-3  # to a surface, in the bound (2)
 
@@ -119,8 +120,8 @@ def _reflect(
     for i in range(len(rows)):
         j = int(rows[i, 9])
         ray = (rows[i, 0] - leds_W[j, 0], rows[i, 1] - leds_W[j, 1], rows[i, 2] - leds_W[j, 2])
-        d2 = _dot(ray, ray)
-        cos_psi = max(_dot(ray, axis) / math.sqrt(d2), 0.0)
+        d2 = dot(ray, ray)
+        cos_psi = max(dot(ray, axis) / math.sqrt(d2), 0.0)
         reflected = intensity_w_sr[j] * max(cos_psi ** pattern[0], pattern[1]) * rows[i, 6] / d2
         if reflected > 0.0 and reflected >= limit:
             rows[count], out[count] = rows[i], reflected
@@ -178,8 +179,8 @@ def _bound_of_balls(
         )
         for j in range(len(row)):
             p = (centre[0] - x[j], centre[1] - y[j], centre[2] - z[j])
-            d = max(math.sqrt(_dot(p, p)) - radius, _CLOSEST_M)
-            row[j] = (1.0 if _dot(p, axis) + radius > 0.0 else side) * most / d**2
+            d = max(math.sqrt(dot(p, p)) - radius, _CLOSEST_M)
+            row[j] = (1.0 if dot(p, axis) + radius > 0.0 else side) * most / d**2
 
 
 @njit(cache=True, error_model="numpy")
@@ -190,20 +191,15 @@ def _bound_of_tubes(
     for i in range(len(tubes.geom)):
         g, radius, half = tubes.geom[i], tubes.radius[i], tubes.half_length[i]
         a, row = (xmat[g, 2], xmat[g, 5], xmat[g, 8]), bound[i]
-        reach, most = half * abs(_dot(a, axis)) + radius, 0.5 * finish[tubes.material[i], 2] * radius
+        reach, most = half * abs(dot(a, axis)) + radius, 0.5 * finish[tubes.material[i], 2] * radius
         for j in range(len(row)):
             p = (xpos[g, 0] - x[j], xpos[g, 1] - y[j], xpos[g, 2] - z[j])
-            along = _dot(p, a)
-            across2 = max(_dot(p, p) - along**2, 0.0)
+            along = dot(p, a)
+            across2 = max(dot(p, p) - along**2, 0.0)
             d = max(math.sqrt(across2 + max(abs(along) - half, 0.0) ** 2) - radius, _CLOSEST_M)
             sight = (eye[0] - x[j], eye[1] - y[j], eye[2] - z[j])
-            sin2_c = max(1.0 - _dot(sight, a) ** 2 / _dot(sight, sight), _CLOSEST_M**2)
-            row[j] = (1.0 if _dot(p, axis) + reach > 0.0 else side) * most / (math.sqrt(sin2_c) * d)
-
-
-@njit(cache=True)
-def _dot(a: Vector, b: Vector) -> float:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+            sin2_c = max(1.0 - dot(sight, a) ** 2 / dot(sight, sight), _CLOSEST_M**2)
+            row[j] = (1.0 if dot(p, axis) + reach > 0.0 else side) * most / (math.sqrt(sin2_c) * d)
 
 
 def is_lit(obstacles: Obstacles, data: mujoco.MjData, start: Array, led_W: Array, seat_m: float) -> bool:

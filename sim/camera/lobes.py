@@ -28,11 +28,12 @@ techniques in electromagnetics, Proc. IEEE 60, 1972 (curvature of reflected wave
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from dockair.kernels import njit
 from dockair.rotations import Array
 from dockair.sim.camera.mirrors import Facets
+from dockair.triples import Vector, dot, plus, turned, unit
 
 SPOT = 23  #: columns: p, n, t1, t2 (3 each), C11 C12 C22, bounds of x1 and of x2 (4), material, skin, light, geom
 ROW = 11  #: columns: p (3), n (3), A, size, skin, which light, geom
@@ -45,7 +46,6 @@ _FAINTEST_SHARE = 1e-9  # of a lobe
 _ALL_SIGMAS = 9.0  # what lies beyond is lost in rounding
 _DARK = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
-Vector = tuple[float, float, float]
 Spot = tuple[Vector, Vector, Vector, Vector, Vector]  # p, n, t1, t2, C11 C12 C22
 Light = tuple[Vector, float, float]  # direction or place, 0 or 1 for which of them, a^2/4
 Lamp = tuple[Light, Vector, Array]  # light, lens, finish of the surface
@@ -98,7 +98,7 @@ def spot_rows(
 def _pieces(spot: Spot, box: Box, lamp: Lamp, limits: Limits, lobe: Lobe, row: Array, rows: Array, count: int) -> int:
     """Append a lobe, cut across t1 into pieces as long as it is wide."""
     light, eye, finish = lamp
-    step = limits[3] * _unit(_add(eye, -1.0, spot[0]))[1]
+    step = limits[3] * unit(plus(eye, -1.0, spot[0]))[1]
     half, width = _HALF_STREAK * math.sqrt(lobe[4]), max(math.sqrt(12.0 * lobe[6]), step)
     first, last = max(lobe[2] - half, box[0]), min(lobe[2] + half, box[1])
     streak = math.sqrt(12.0 * lobe[4]) >= 1.5 * width
@@ -129,8 +129,8 @@ def facet_rows(
     xpos, xmat = poses
     for i in which:
         g, frame, half, finish = facets.geom[i], facets.frame[i], facets.half[i], finishes[facets.material[i]]
-        p, n = _add(_vector(xpos[g], 0), 1.0, _turned(xmat[g], frame[0])), _turned(xmat[g], frame[1])
-        spot = (p, n, _turned(xmat[g], frame[2]), _turned(xmat[g], frame[3]), _vector(facets.curvature[i], 0))
+        p, n = plus(_vector(xpos[g], 0), 1.0, turned(xmat[g], frame[0])), turned(xmat[g], frame[1])
+        spot = (p, n, turned(xmat[g], frame[2]), turned(xmat[g], frame[3]), _vector(facets.curvature[i], 0))
         box = (-half[0], half[0], -half[1], half[1])
         lobe = _lobe(spot, box, light, eye, finish, limits[0])
         if lobe[0] == 0.0:
@@ -149,8 +149,8 @@ def _write(row: Array, spot: Spot, lobe: Lobe, labels: Vector) -> None:
     p, n, t1, t2, c = spot
     area, _, x1, x2, var1, _, var2 = lobe
     m1, m2 = c[0] * x1 + c[1] * x2, c[1] * x1 + c[2] * x2
-    middle = _add(_add(_add(p, x1, t1), x2, t2), -0.5 * (m1 * x1 + m2 * x2), n)
-    normal, _ = _unit(_add(_add(n, m1, t1), m2, t2))
+    middle = plus(plus(plus(p, x1, t1), x2, t2), -0.5 * (m1 * x1 + m2 * x2), n)
+    normal, _ = unit(plus(plus(n, m1, t1), m2, t2))
     for k in range(3):
         row[k], row[3 + k] = middle[k], normal[k]
     row[6], row[7] = area, math.sqrt(6.0 * (var1 + var2))
@@ -166,10 +166,10 @@ def _nearer(spot: Spot, box: Box, light: Light, eye: Vector) -> tuple[Spot, Box]
     x1 = min(max((b22 * m1 - b12 * m2) / det, box[0]), box[1])
     x2 = min(max((b11 * m2 - b12 * m1) / det, box[2]), box[3])
     c1, c2 = c[0] * x1 + c[1] * x2, c[1] * x1 + c[2] * x2
-    p = _add(_add(_add(p, x1, t1), x2, t2), -0.5 * (c1 * x1 + c2 * x2), n)
-    n, _ = _unit(_add(_add(n, c1, t1), c2, t2))
-    t1, _ = _unit(_add(t1, -_dot(t1, n), n))
-    t2, _ = _unit(_add(_add(t2, -_dot(t2, n), n), -_dot(t2, t1), t1))
+    p = plus(plus(plus(p, x1, t1), x2, t2), -0.5 * (c1 * x1 + c2 * x2), n)
+    n, _ = unit(plus(plus(n, c1, t1), c2, t2))
+    t1, _ = unit(plus(t1, -dot(t1, n), n))
+    t2, _ = unit(plus(plus(t2, -dot(t2, n), n), -dot(t2, t1), t1))
     return (p, n, t1, t2, c), (box[0] - x1, box[1] - x1, box[2] - x2, box[3] - x2)
 
 
@@ -187,39 +187,12 @@ def _along_patch(spot: Spot, lobe: Lobe) -> Spot:
 
 
 @njit(cache=True)
-def _dot(a: Vector, b: Vector) -> float:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-@njit(cache=True)
-def _add(a: Vector, k: float, b: Vector) -> Vector:
-    return a[0] + k * b[0], a[1] + k * b[1], a[2] + k * b[2]
-
-
-@njit(cache=True)
-def _unit(a: Vector) -> tuple[Vector, float]:
-    length = math.sqrt(_dot(a, a))
-    k = 1.0 / max(length, 1e-300)
-    return (k * a[0], k * a[1], k * a[2]), length
-
-
-@njit(cache=True)
 def _vector(row: Array, first: int) -> Vector:
     return row[first], row[first + 1], row[first + 2]
 
 
 @njit(cache=True)
-def _turned(M: Array, a: Array) -> Vector:
-    """M a, with M (9,) by rows."""
-    return (
-        M[0] * a[0] + M[1] * a[1] + M[2] * a[2],
-        M[3] * a[0] + M[4] * a[1] + M[5] * a[2],
-        M[6] * a[0] + M[7] * a[1] + M[8] * a[2],
-    )
-
-
-@njit(cache=True)
-def _reflectance(cos_i: float, finish: Array) -> float:
+def reflectance(cos_i: float, finish: Array) -> float:
     """R of Eq. (4): Fresnel's for unpolarised light on a dielectric, Schlick's form on metal."""
     index, metal, share = finish[0], finish[1], finish[2]
     if index == 0.0:
@@ -259,15 +232,15 @@ def _strip(low: float, high: float, mean: float, sd: float) -> tuple[float, floa
 def _slopes(spot: Spot, light: Light, eye: Vector) -> tuple[float, float, float, float, float]:
     """Eq. (2): m1, m2, B11, B12, B22."""
     p, n, t1, t2, c = spot
-    s, d1 = _unit(_add(light[0], -light[1], p))
-    v, d = _unit(_add(eye, -1.0, p))
-    h, twice = _unit(_add(s, 1.0, v))
-    k, near, hn = 1.0 / twice, light[1] / d1, _dot(h, n)
-    s1, s2, v1, v2 = _dot(s, t1), _dot(s, t2), _dot(v, t1), _dot(v, t2)
+    s, d1 = unit(plus(light[0], -light[1], p))
+    v, d = unit(plus(eye, -1.0, p))
+    h, twice = unit(plus(s, 1.0, v))
+    k, near, hn = 1.0 / twice, light[1] / d1, dot(h, n)
+    s1, s2, v1, v2 = dot(s, t1), dot(s, t2), dot(v, t1), dot(v, t2)
     b11 = c[0] + k * ((1.0 - v1 * v1) / d + (1.0 - s1 * s1) * near)
     b12 = c[1] - k * (v1 * v2 / d + s1 * s2 * near)
     b22 = c[2] + k * ((1.0 - v2 * v2) / d + (1.0 - s2 * s2) * near)
-    return _dot(h, t1) / hn, _dot(h, t2) / hn, b11, b12, b22
+    return dot(h, t1) / hn, dot(h, t2) / hn, b11, b12, b22
 
 
 @njit(cache=True)
@@ -277,14 +250,14 @@ def _lobe(spot: Spot, box: Box, light: Light, eye: Vector, finish: Array, cos_gr
     The radiance is the patch's middle's, over a white Lambertian surface's in normal sunlight.
     """
     p, n, t1, t2, _ = spot
-    s, _ = _unit(_add(light[0], -light[1], p))
-    v, _ = _unit(_add(eye, -1.0, p))
-    h, twice = _unit(_add(s, 1.0, v))
-    hn, vn = _dot(h, n), _dot(v, n)
-    if _dot(s, n) <= 0.0 or vn <= 0.0 or 0.5 * twice < cos_grazing or hn < _STEEPEST:
+    s, _ = unit(plus(light[0], -light[1], p))
+    v, _ = unit(plus(eye, -1.0, p))
+    h, twice = unit(plus(s, 1.0, v))
+    hn, vn = dot(h, n), dot(v, n)
+    if dot(s, n) <= 0.0 or vn <= 0.0 or 0.5 * twice < cos_grazing or hn < _STEEPEST:
         return _DARK
     m1, m2, b11, b12, b22 = _slopes(spot, light, eye)
-    s1, s2, q, rough = _dot(s, t1), _dot(s, t2), light[2] / (twice * twice), finish[3] ** 2
+    s1, s2, q, rough = dot(s, t1), dot(s, t2), light[2] / (twice * twice), finish[3] ** 2
     v11, v12, v22 = rough + q * (1.0 - s1 * s1), -q * s1 * s2, rough + q * (1.0 - s2 * s2)
     det, det_v = b11 * b22 - b12 * b12, v11 * v22 - v12 * v12
     if abs(det) < 1e-20:
@@ -296,7 +269,7 @@ def _lobe(spot: Spot, box: Box, light: Light, eye: Vector, finish: Array, cos_gr
     part1, mean1, var1 = _strip(box[0], box[1], x1, math.sqrt(p11))
     rest = math.sqrt(max(p22 - ratio * p12, 1e-12 * p22))
     part2, mean2, var2 = _strip(box[2], box[3], x2 + ratio * (mean1 - x1), rest)
-    reflected = _reflectance(0.5 * twice, finish) / hn**4
+    reflected = reflectance(0.5 * twice, finish) / hn**4
     e1, e2 = m1 - b11 * mean1 - b12 * mean2, m2 - b12 * mean1 - b22 * mean2
     exponent = 0.5 * (v22 * e1 * e1 - 2.0 * v12 * e1 * e2 + v11 * e2 * e2) / det_v
     radiance = reflected / (8.0 * vn * math.sqrt(det_v)) * math.exp(-exponent)

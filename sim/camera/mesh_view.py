@@ -8,18 +8,18 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from dockair.kernels import njit
 from dockair.rotations import Array
 from dockair.sim.camera.meshes import Meshes
+from dockair.triples import Vector
 
 _SHALLOW_M = 1e-3  # depth that tangents are worked out for at least
 _AVERTED_M = 1e-9  # depth of the lens under a triangle's plane from which on its back is seen: far more than rounding
 
 Frame = tuple[Array, Array]  # R_WC and p_WC of the camera
 Poses = tuple[Array, Array]  # places (ngeom, 3) and attitudes (ngeom, 9) of the model's geoms
-Vector = tuple[float, float, float]
 
 
 class MeshView(NamedTuple):

@@ -27,6 +27,7 @@ from dockair.sim.camera.meshes import mesh_of
 from dockair.sim.camera.sheets import SurfaceParameters
 from dockair.sim.camera.solids import VISIBLE_GROUPS
 from dockair.sim.camera.tiles import EDGE_COS, Tile, ellipsoid_tiles, face, is_flat, mesh_tiles
+from dockair.triples import Vector
 
 PAINT, METAL, RUBBER, GLASS = range(4)
 RIM_GEOMS = "basket_rim"  #: how the names of the rim's pieces begin
@@ -36,7 +37,6 @@ _NEAR_LEDS = ("basket_rib", "coupling_", "probe_")  # what the LEDs shine on fro
 _SKIN_M = 1e-3  # a ray that starts on a surface starts this far off it
 
 _G = mujoco.mjtGeom
-Vector = tuple[float, float, float]
 
 
 class Balls(NamedTuple):

@@ -29,13 +29,13 @@ from dockair.rotations import Array
 from dockair.sim.camera.meshes import Meshes
 from dockair.sim.camera.obstacles import Obstacles
 from dockair.sim.camera.solids import BALL, BOX, CAPSULE
+from dockair.triples import Vector, cross, dot, turned_back
 
 _ALONG = 1e-300  # least squared component across a tube, of a ray that does not run along it
 _ROUNDING = 1e-9  # of distances to boxes, relative and in metres
 _SPARE_M = 1e-6  # between a solid's ball and a cone of rays: far more than rounding
 _NOWHERE = (math.inf, -math.inf)
 
-Vector = tuple[float, float, float]
 Part = tuple[float, float]  # of a ray: from one distance to another; nothing where the second is less
 Cone = tuple[Vector, float, float]  # axis, cosine and sine of the half angle, less than a right one
 _ALL_AROUND: Cone = ((0.0, 0.0, 0.0), 0.0, 0.0)
@@ -138,8 +138,8 @@ def _cone_around(directions: Array) -> Cone:
 def _is_beside(p: Vector, radius: float, cone: Cone) -> bool:
     """Whether a plane through the cone's tip parts it from a ball about p."""
     axis, cosine, sine = cone
-    along = _dot(p, axis)
-    return cosine * math.sqrt(max(_dot(p, p) - along * along, 0.0)) - sine * along > radius + _SPARE_M
+    along = dot(p, axis)
+    return cosine * math.sqrt(max(dot(p, p) - along * along, 0.0)) - sine * along > radius + _SPARE_M
 
 
 @njit(cache=True)
@@ -158,7 +158,9 @@ def _cast(obstacles: Obstacles, xpos: Array, xmat: Array, p: Array, directions: 
             along = x * d[0] + y * d[1] + z * d[2]
             if square - along * along > radius * radius or along + radius < 0.0 or along - radius > nearest[i]:
                 continue
-            start, stop = _inside(obstacles.kinds[k], (h[0], h[1], h[2]), _into(M, (-x, -y, -z)), _into(M, d))
+            start, stop = _inside(
+                obstacles.kinds[k], (h[0], h[1], h[2]), turned_back(M, (-x, -y, -z)), turned_back(M, d)
+            )
             at = start if start >= 0.0 else stop
             if start <= stop and 0.0 <= at < nearest[i]:
                 nearest[i] = at
@@ -172,13 +174,13 @@ def _cast_at_meshes(
     for k in range(len(meshes.geoms)):
         g, radius = meshes.geoms[k], meshes.radii_m[k]
         M, m = xmat[g], meshes.centres_m[k]
-        o = _into(M, (p[0] - xpos[g, 0], p[1] - xpos[g, 1], p[2] - xpos[g, 2]))
+        o = turned_back(M, (p[0] - xpos[g, 0], p[1] - xpos[g, 1], p[2] - xpos[g, 2]))
         x, y, z = m[0] - o[0], m[1] - o[1], m[2] - o[2]
-        if _is_beside((x, y, z), radius, (_into(M, cone[0]), cone[1], cone[2])):
+        if _is_beside((x, y, z), radius, (turned_back(M, cone[0]), cone[1], cone[2])):
             continue
         square = x * x + y * y + z * z
         for i in range(len(nearest)):
-            ray = _into(M, (directions[i, 0], directions[i, 1], directions[i, 2]))
+            ray = turned_back(M, (directions[i, 0], directions[i, 1], directions[i, 2]))
             along = x * ray[0] + y * ray[1] + z * ray[2]
             if square - along * along > radius * radius or along + radius < 0.0 or along - radius > nearest[i]:
                 continue
@@ -211,32 +213,12 @@ def _meets_triangle(meshes: Meshes, t: int, o: Vector, d: Vector) -> float:
     )
     p, q = (b[0] - a[0], b[1] - a[1], b[2] - a[2]), (c[0] - a[0], c[1] - a[1], c[2] - a[2])
     from_a = (o[0] - a[0], o[1] - a[1], o[2] - a[2])
-    across, turned = _cross(d, q), _cross(from_a, p)
-    det = _dot(p, across)
+    across, turned = cross(d, q), cross(from_a, p)
+    det = dot(p, across)
     if det == 0.0:
         return math.inf
-    u, v, at = _dot(from_a, across) / det, _dot(d, turned) / det, _dot(q, turned) / det
+    u, v, at = dot(from_a, across) / det, dot(d, turned) / det, dot(q, turned) / det
     return at if u >= 0.0 and v >= 0.0 and u + v <= 1.0 and at >= 0.0 else math.inf
-
-
-@njit(cache=True)
-def _cross(a: Vector, b: Vector) -> Vector:
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-@njit(cache=True)
-def _dot(a: Vector, b: Vector) -> float:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-@njit(cache=True)
-def _into(M: Array, a: Vector) -> Vector:
-    """M' a, with M (9,) by rows."""
-    return (
-        M[0] * a[0] + M[3] * a[1] + M[6] * a[2],
-        M[1] * a[0] + M[4] * a[1] + M[7] * a[2],
-        M[2] * a[0] + M[5] * a[1] + M[8] * a[2],
-    )
 
 
 @njit(cache=True)

@@ -14,10 +14,10 @@ from dataclasses import replace
 from typing import Final
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from dockair.calibration import Camera
+from dockair.kernels import njit
 from dockair.rotations import Array
 from dockair.sim.camera.point_spread import Spread, airy_px, blur_px, core, transfer
 from dockair.sim.camera.sheets import LensParameters, SensorParameters

@@ -10,9 +10,9 @@ import math
 from typing import Final
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from dockair.kernels import njit
 from dockair.rotations import Array
 
 REACH: Final = 5.0  #: standard deviations beyond which nothing is added: 1e-6 of the light

@@ -15,11 +15,12 @@ fits made for this module.
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit, types
+from numba import types
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 from scipy.stats import poisson
 
+from dockair.kernels import njit
 from dockair.rotations import Array
 
 Reals = NDArray[np.float32]

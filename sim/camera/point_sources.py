@@ -16,19 +16,20 @@ from typing import TYPE_CHECKING
 
 import mujoco
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from dockair.kernels import njit
 from dockair.rotations import Array
 from dockair.sim.as_built import AsBuilt
 from dockair.sim.camera.glints import glint_rows, starts_of_seen
 from dockair.sim.camera.led_reflections import led_reflection_rows
 from dockair.sim.camera.lobes import ROW
-from dockair.sim.camera.mirrors import Mirrors, Vector, vector
+from dockair.sim.camera.mirrors import Mirrors, vector
 from dockair.sim.camera.obstacles import Obstacles
 from dockair.sim.camera.occlusion import hidden, rays_are_clear
 from dockair.sim.camera.radiometry import Responses, led_electrons
 from dockair.sim.camera.sun_view import SunView
+from dockair.triples import Vector
 
 if TYPE_CHECKING:  # the camera imports this module
     from dockair.sim.camera.sheets import CameraSheets

@@ -38,11 +38,11 @@ from functools import cache
 from importlib.resources import files
 
 import numpy as np
-from numba import njit
 from scipy import constants
 
 from dockair.calibration import Camera
 from dockair.errors import DockairError
+from dockair.kernels import njit
 from dockair.rotations import Array
 from dockair.sim.camera.sheets import (
     CameraSheets,

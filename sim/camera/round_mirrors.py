@@ -17,11 +17,12 @@ to none do is left out before. Everything here is in W. Source: law of reflectio
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from dockair.kernels import njit
 from dockair.rotations import Array
 from dockair.sim.camera.mirrors import Balls, Tubes
+from dockair.triples import Vector, cross, dot, plus, tangents, unit
 
 _NEWTON_STEPS = 30
 _SMALL = 0.01  # angles [rad] whose series end within 1e-15
@@ -31,7 +32,6 @@ _SKIN_M = 1e-3  # a ray that starts on a surface starts this far off it
 _STEEPEST = 1.765  # slope along a tube from which h.n < 1/2 around it, the limit of `lobes`
 _MOST_SIGMAS = 7.0  # of slopes: less than 1e-9 of the facets lean farther, `lobes` leaves out such shares
 
-Vector = tuple[float, float, float]
 Spread = tuple[float, float]  # rms slope of a finish; of the light, half the Sun's angular radius [rad]
 
 
@@ -72,10 +72,15 @@ def round_spots(
             if not (wanted[j, i] and radius == balls.axes[i, 1] == balls.axes[i, 2]):
                 continue
             z = (xmat[g, 2], xmat[g, 5], xmat[g, 8])
-            centre = _add((xpos[g, 0], xpos[g, 1], xpos[g, 2]), balls.at_z[i], z)
+            centre = plus((xpos[g, 0], xpos[g, 1], xpos[g, 2]), balls.at_z[i], z)
             found, n = _on_ball(centre, z, balls.side[i], radius, toward, point, eye)
             if found:
-                p, (t1, t2), c, endless = _add(centre, radius, n), _frame(n), 1.0 / radius, (-_EVERYWHERE, _EVERYWHERE)
+                p, (t1, t2), c, endless = (
+                    plus(centre, radius, n),
+                    tangents(n),
+                    1.0 / radius,
+                    (-_EVERYWHERE, _EVERYWHERE),
+                )
                 _write(spots, count, (p, n, t1, t2), (c, c), endless, (balls.material[i], j, g))
                 count += 1
         for i in range(len(tubes.geom)):
@@ -83,13 +88,13 @@ def round_spots(
                 continue
             g, radius, half, material = tubes.geom[i], tubes.radius[i], tubes.half_length[i], tubes.material[i]
             axis, centre = (xmat[g, 2], xmat[g, 5], xmat[g, 8]), (xpos[g, 0], xpos[g, 1], xpos[g, 2])
-            to_light, to_eye = _add(toward, -point, centre), _add(eye, -1.0, centre)
+            to_light, to_eye = plus(toward, -point, centre), plus(eye, -1.0, centre)
             if _is_steep(to_light, point, to_eye, axis, half + radius, (finishes[material, 3], disc)):
                 continue
             found, n, x = _on_tube(centre, axis, radius, half, toward, point, eye)
             if found:
-                p, bounds = _add(_add(centre, x, axis), radius, n), (-half - x, half - x)
-                _write(spots, count, (p, n, axis, _cross(axis, n)), (0.0, 1.0 / radius), bounds, (material, j, g))
+                p, bounds = plus(plus(centre, x, axis), radius, n), (-half - x, half - x)
+                _write(spots, count, (p, n, axis, cross(axis, n)), (0.0, 1.0 / radius), bounds, (material, j, g))
                 count += 1
     return count
 
@@ -99,24 +104,24 @@ def _on_ball(
     centre: Vector, z: Vector, side: float, radius: float, toward: Vector, point: float, eye: Vector
 ) -> tuple[bool, Vector]:
     """Whether there is a mirror point on the ball, or on its half toward z or -z, and its normal."""
-    to_light, to_eye = _add(toward, -point, centre), _add(eye, -1.0, centre)
-    if side * _dot(to_light, z) < 0.0 and side * _dot(to_eye, z) < 0.0:
+    to_light, to_eye = plus(toward, -point, centre), plus(eye, -1.0, centre)
+    if side * dot(to_light, z) < 0.0 and side * dot(to_eye, z) < 0.0:
         return False, z  # for so is the normal, which stands between them
     found, n = _on_sphere(to_light, point, to_eye, radius)
-    return found and side * _dot(n, z) >= 0.0, n
+    return found and side * dot(n, z) >= 0.0, n
 
 
 @njit(cache=True)
 def _is_steep(to_light: Vector, point: float, to_eye: Vector, axis: Vector, reach: float, spread: Spread) -> bool:
     """Whether a facet would have to lean along a tube's axis farther than any does, wherever on it."""
-    s, ds = _unit(to_light)
-    v, dc = _unit(to_eye)
-    h, twice = _unit(_add(s, 1.0, v))
+    s, ds = unit(to_light)
+    v, dc = unit(to_eye)
+    h, twice = unit(plus(s, 1.0, v))
     if dc <= reach or point * ds < point * reach or twice == 0.0:
         return False
     turn = reach / (dc - reach) + (point * reach / (ds - reach) if point > 0.0 else 0.0)  # of s + v along the tube
     slope = min(_MOST_SIGMAS * (spread[0] + spread[1] / twice), _STEEPEST)
-    return abs(_dot(h, axis)) - 2.0 * turn / twice > slope / math.sqrt(1.0 + slope * slope)
+    return abs(dot(h, axis)) - 2.0 * turn / twice > slope / math.sqrt(1.0 + slope * slope)
 
 
 @njit(cache=True)
@@ -135,36 +140,6 @@ def _write(
     row[12], row[13], row[14] = curvature[0], 0.0, curvature[1]
     row[15], row[16], row[17], row[18] = bounds[0], bounds[1], -_EVERYWHERE, _EVERYWHERE
     row[19], row[20], row[21], row[22] = labels[0], _SKIN_M, labels[1], labels[2]
-
-
-@njit(cache=True)
-def _dot(a: Vector, b: Vector) -> float:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-@njit(cache=True)
-def _cross(a: Vector, b: Vector) -> Vector:
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-@njit(cache=True)
-def _add(a: Vector, k: float, b: Vector) -> Vector:
-    return a[0] + k * b[0], a[1] + k * b[1], a[2] + k * b[2]
-
-
-@njit(cache=True)
-def _unit(a: Vector) -> tuple[Vector, float]:
-    length = math.sqrt(_dot(a, a))
-    k = 1.0 / max(length, 1e-300)
-    return (k * a[0], k * a[1], k * a[2]), length
-
-
-@njit(cache=True)
-def _frame(n: Vector) -> tuple[Vector, Vector]:
-    """Unit tangents with t2 = n x t1."""
-    helper = (1.0, 0.0, 0.0) if abs(n[0]) < 0.7 else (0.0, 1.0, 0.0)
-    t1, _ = _unit(_cross(n, helper))
-    return t1, _cross(n, t1)
 
 
 @njit(cache=True)
@@ -209,21 +184,21 @@ def _circle_normal(
 
     `spare` is a second axis of the plane for when light and eye stand in one direction.
     """
-    e, ds = _unit(to_light)
-    f, dc = _unit(to_eye)
+    e, ds = unit(to_light)
+    f, dc = unit(to_eye)
     if ds < 1e-9 or point * radius >= ds or radius >= dc:
         return False, e, ds
-    cos_gamma = _dot(e, f)
-    g, sin_gamma = _unit(_add(f, -cos_gamma, e))
+    cos_gamma = dot(e, f)
+    g, sin_gamma = unit(plus(f, -cos_gamma, e))
     if sin_gamma < 1e-12:
         g = spare
     cos_x, sin_x = _mirror_angle(point * radius / ds, radius / dc, cos_gamma, sin_gamma)
-    return True, _add((cos_x * e[0], cos_x * e[1], cos_x * e[2]), sin_x, g), ds
+    return True, plus((cos_x * e[0], cos_x * e[1], cos_x * e[2]), sin_x, g), ds
 
 
 @njit(cache=True)
 def _on_sphere(to_light: Vector, point: float, to_eye: Vector, radius: float) -> tuple[bool, Vector]:
-    spare, _ = _frame(_unit(to_light)[0])
+    spare, _ = tangents(unit(to_light)[0])
     found, n, _ = _circle_normal(to_light, point, to_eye, radius, spare)
     return found, n
 
@@ -233,16 +208,16 @@ def _on_tube(
     centre: Vector, axis: Vector, radius: float, half: float, toward: Vector, point: float, eye: Vector
 ) -> tuple[bool, Vector, float]:
     """Normal and place along the axis, Eq. (2)."""
-    to_light, to_eye = _add(toward, -point, centre), _add(eye, -1.0, centre)
-    z_s, z_c = _dot(to_light, axis), _dot(to_eye, axis)
-    flat_s, flat_c = _add(to_light, -z_s, axis), _add(to_eye, -z_c, axis)
-    found, n, ds = _circle_normal(flat_s, point, flat_c, radius, _cross(axis, _unit(flat_s)[0]))
+    to_light, to_eye = plus(toward, -point, centre), plus(eye, -1.0, centre)
+    z_s, z_c = dot(to_light, axis), dot(to_eye, axis)
+    flat_s, flat_c = plus(to_light, -z_s, axis), plus(to_eye, -z_c, axis)
+    found, n, ds = _circle_normal(flat_s, point, flat_c, radius, cross(axis, unit(flat_s)[0]))
     if not found:
         return False, n, 0.0
-    l_c = _unit(_add(flat_c, -radius, n))[1]
+    l_c = unit(plus(flat_c, -radius, n))[1]
     if point == 0.0:
         z = z_c + l_c * z_s / ds
     else:
-        l_s = _unit(_add(flat_s, -radius, n))[1]
+        l_s = unit(plus(flat_s, -radius, n))[1]
         z = (z_s * l_c + z_c * l_s) / (l_s + l_c)
     return True, n, min(max(z, -half), half)

@@ -72,7 +72,7 @@ def place(
     """
     geoms, xpos, xmat = poses
     corners, points, sides = np.empty((8, 3)), np.empty((_MOST_POINTS, 2)), np.empty((2, y.shape[0]))
-    rows, columns, count, used = _even(y), _even(x), 0, 0
+    rows, columns, count, used = even(y), even(x), 0, 0
     for g in range(kinds.shape[0]):
         h, c, M = half_sizes[g], out.centre_C[count], out.axes_C[count]
         length = h[2] + h[0] if kinds[g] == CAPSULE else h[2]
@@ -218,7 +218,8 @@ def _mark(sides: Array, a: Point, b: Point, y: Array, rows: Even) -> None:
 
 
 @njit(cache=True)
-def _even(tangents: Array) -> Even:
+def even(tangents: Array) -> Even:
+    """What evenly spaced tangents are counted by."""
     n = tangents.shape[0]
     return tangents[0], (n - 1) / (tangents[-1] - tangents[0]) if n > 1 else 1.0, n
 

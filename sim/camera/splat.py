@@ -18,9 +18,9 @@ import math
 from typing import TypeAlias
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from dockair.kernels import njit
 from dockair.rotations import Array
 
 POINT = 6  #: columns: place u, v [px], electrons of the whole blob, depth [levels], smear du, dv [px]

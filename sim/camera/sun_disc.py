@@ -17,10 +17,10 @@ Sources: Steiner's formula for parallel bodies; Cox, Allen's Astrophysical Quant
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from dockair.calibration import Camera
+from dockair.kernels import njit
 from dockair.rotations import Array
 
 _STEP_RAD = 1e-4  # of the differences that make J; pixels are smooth over a thousand times that

@@ -16,9 +16,9 @@ import numpy as np
 
 from dockair.rotations import Array
 from dockair.sim.camera.meshes import Mesh
+from dockair.triples import Vector
 from dockair.vectors import cross
 
-Vector = tuple[float, float, float]
 #: Frame (4, 3): centre [m], normal, two tangents along the sides; half sides [m]; 11, 12, 22 of C, positive for convex.
 Tile = tuple[Array, tuple[float, float], Vector]
 

@@ -29,6 +29,7 @@ from dockair.sim.camera.meshes import Meshes
 from dockair.sim.camera.solids import BALL, BOX, CAPSULE, CYLINDER, Haze, Lighting, Solids, depth_limits_m
 from dockair.sim.camera.spans import Placed, place
 from dockair.sim.camera.traced_meshes import trace_meshes
+from dockair.triples import Vector, cross
 
 _F = np.float32
 _ZERO, _ONE, _MISS = _F(0.0), _F(1.0), _F(np.nan)
@@ -38,7 +39,6 @@ _LANES = 16  # rays that are taken at once
 Row = NDArray[np.float32]
 Picture = NDArray[np.float32]  # (rows, columns)
 Where = tuple[np.uint64, np.uint64, np.uint64]  # row, first column, one past the last
-Triple = tuple[float, float, float]
 Single = tuple[np.float32, np.float32, np.float32]
 #: Of one row, in a solid's axes and units: o; d = a + x b; w = p + x q.
 Rays = tuple[Single, Single, Single, Single, Single]
@@ -130,7 +130,7 @@ def _trace(
         unit = (h[0], h[0], h[0]) if kind in (CAPSULE, CYLINDER) else (h[0], h[1], h[2])
         o = _to_unit(-c[0], -c[1], -c[2], M, unit)
         ahead, across = _to_unit(1.0, 0.0, 0.0, M, unit), _to_unit(0.0, -1.0, 0.0, M, unit)
-        down, q = _to_unit(0.0, 0.0, -1.0, M, unit), _cross(o, across)
+        down, q = _to_unit(0.0, 0.0, -1.0, M, unit), cross(o, across)
         sun = _single(_to_unit(sun_C[0], sun_C[1], sun_C[2], M, (1.0, 1.0, 1.0)))
         half, inverse = _F(h[2] / h[0]), _single((1.0 / h[0], 1.0 / h[1], 1.0 / h[2]))
         row, stop, run = placed.rows[k]
@@ -141,7 +141,7 @@ def _trace(
             right = min(left + (right - left + _LANES - 1) // _LANES * _LANES, len(x))
             reach[i, 0], reach[i, 1] = min(reach[i, 0], left), max(reach[i, 1], right)
             a = (ahead[0] + y[i] * down[0], ahead[1] + y[i] * down[1], ahead[2] + y[i] * down[2])
-            rays = _single(o), _single(a), _single(across), _single(_cross(o, a)), _single(q)
+            rays = _single(o), _single(a), _single(across), _single(cross(o, a)), _single(q)
             shade, where = (
                 (_F(reflectances[g]), _F(light[0]), _F(light[1]), _F(near)),
                 (np.uint64(i), np.uint64(left), np.uint64(right)),
@@ -157,7 +157,7 @@ def _trace(
 
 
 @njit(cache=True)
-def _to_unit(a: float, b: float, c: float, M: Array, unit: Triple) -> Triple:
+def _to_unit(a: float, b: float, c: float, M: Array, unit: Vector) -> Vector:
     """Turn a vector of C into a solid's axes and scale it to units of its size."""
     return (
         (M[0, 0] * a + M[1, 0] * b + M[2, 0] * c) / unit[0],
@@ -167,12 +167,7 @@ def _to_unit(a: float, b: float, c: float, M: Array, unit: Triple) -> Triple:
 
 
 @njit(cache=True)
-def _cross(a: Triple, b: Triple) -> Triple:
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-@njit(cache=True)
-def _single(a: Triple) -> Single:
+def _single(a: Vector) -> Single:
     return _F(a[0]), _F(a[1]), _F(a[2])
 
 

@@ -20,12 +20,14 @@ Source: Olano & Greer 1997 (triangle scan conversion using 2D homogeneous coordi
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from dockair.kernels import njit
 from dockair.rotations import Array
 from dockair.sim.camera.mesh_view import MeshView
 from dockair.sim.camera.meshes import Meshes
+from dockair.sim.camera.spans import even
+from dockair.triples import Vector, cross
 
 _F = np.float32
 _ZERO, _ONE = _F(0.0), _F(1.0)
@@ -33,7 +35,6 @@ _SLACK = 0.01  # blocks by which a triangle's rows and columns may be off: far m
 _LANES = 16  # rays that are taken at once
 
 Row = NDArray[np.float32]
-Vector = tuple[float, float, float]
 Side = tuple[float, float, float, float]
 Even = tuple[float, float, int]  # evenly spaced tangents: the first, how many there are in 1, their number
 Line = tuple[np.float32, np.float32]  # value at x = 0 and slope; or volume and near plane
@@ -64,7 +65,7 @@ def trace_meshes(
         y: (rows,) evenly spaced tangents below it.
         near: depth of the near plane.
     """
-    tangents, columns, rows = x.astype(np.float32), _even(x), _even(y)
+    tangents, columns, rows = x.astype(np.float32), even(x), even(y)
     triangles, places, lit = meshes.triangles, view.places, view.radiances
     for k in range(count):
         t = view.triangles[k]
@@ -74,11 +75,6 @@ def trace_meshes(
         if max(depths) < near or (not is_cut and (_is_missed(t_x, columns) or _is_missed(t_y, rows))):
             continue
         _draw_triangle((a, b, c), is_cut, places, lit, out, nearest, reach, tangents, columns, rows, y, near)
-
-
-@njit(cache=True)
-def _cross(a: Vector, b: Vector) -> Vector:
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 @njit(cache=True)
@@ -105,7 +101,7 @@ def _draw_triangle(
 ) -> None:
     i, j, k = corners
     a, b, c = _place(places, i), _place(places, j), _place(places, k)
-    e = _cross(c, b), _cross(a, c), _cross(b, a)
+    e = cross(c, b), cross(a, c), cross(b, a)
     volume = a[0] * e[0][0] + a[1] * e[0][1] + a[2] * e[0][2]  # -a.(b x c)
     if not volume > 0.0:
         return
@@ -157,12 +153,6 @@ def _clipped(a: Vector, b: Vector, c: Vector, near: float) -> tuple[float, float
             at = -(p[2] + (near - p[0]) / (q[0] - p[0]) * (q[2] - p[2])) / near
             low, high = min(low, at), max(high, at)
     return low, high
-
-
-@njit(cache=True)
-def _even(tangents: Array) -> Even:
-    n = tangents.shape[0]
-    return tangents[0], (n - 1) / (tangents[-1] - tangents[0]) if n > 1 else 1.0, n
 
 
 @njit(cache=True)

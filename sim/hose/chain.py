@@ -11,9 +11,9 @@ Source: the ball-and-rod chain of Ro and Kamman, J. Guidance 33(5), 2010, as in 
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from dockair.errors import DockairError
+from dockair.kernels import njit
 from dockair.rotations import Array
 
 

@@ -25,8 +25,8 @@ RflySim/RflySimAAR `hose3D_n_air_Fv_correction.m`; the canopy's in assets/parame
 """
 
 import numpy as np
-from numba import njit
 
+from dockair.kernels import njit
 from dockair.rotations import Array
 from dockair.sim.hose.chain import DrogueParameters, HoseParameters
 

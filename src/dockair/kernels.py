@@ -1,9 +1,9 @@
-"""numba's `njit` for kernels that use constants of other files: their values are part of the key in the cache.
+"""numba's `njit` with a cache that sees edits of other files: of constants, and of the kernels that a kernel calls.
 
-numba freezes globals into the machine code that it keeps on disk, but looks for it by source file, bytecode and closure
-alone: after an edit of a constant in another file a kernel would go on with the old value, and say nothing.
+numba freezes both into the machine code that it keeps on disk, but looks for it by source file, bytecode and closure
+alone: after an edit of another file a kernel would go on with the old value or code, and say nothing.
 
-Not seen: an edit of a kernel of another file, which `tests/test_kernels.py` therefore refuses.
+Not seen: what stands behind a module's name, and intrinsics; `tests/test_kernels.py` refuses both.
 """
 
 import pickle
@@ -20,7 +20,7 @@ def njit(*, cache: bool, **options: object) -> Callable[[Callable[..., Any]], An
     """Compile a function as `numba.njit` does.
 
     Args:
-        cache: whether to keep the machine code on disk, found again by the values of `constants` as well.
+        cache: whether to keep the machine code on disk, found again by its `ingredients` as well.
         options: as of `numba.njit`.
     """
 
@@ -34,8 +34,11 @@ def njit(*, cache: bool, **options: object) -> Callable[[Callable[..., Any]], An
     return compiled
 
 
-def constants(function: FunctionType) -> dict[str, object]:
-    """Return name, with its module's, -> value of the globals that a kernel uses, itself or in the kernels it calls."""
+def ingredients(function: FunctionType) -> dict[str, object]:
+    """Return name, with its module's, -> what a kernel uses of its globals, itself or in the kernels it calls.
+
+    Constants stand with their values, kernels with their options and code, named tuples with their fields' names.
+    """
     found: dict[str, object] = {}
     pending, seen = [function], {function}
     while pending:
@@ -43,9 +46,13 @@ def constants(function: FunctionType) -> dict[str, object]:
         for name in user.__globals__.keys() & set(_names(user.__code__)):
             value = user.__globals__[name]
             called = getattr(value, "py_func", None)
-            if called is not None and called not in seen:
-                seen.add(called)
-                pending.append(called)
+            if called is not None:
+                found[f"{called.__module__}.{called.__qualname__}"] = _options(value), _content(called.__code__)
+                if called not in seen:
+                    seen.add(called)
+                    pending.append(called)
+            elif isinstance(value, type) and (fields := getattr(value, "_fields", None)) is not None:
+                found[f"{value.__module__}.{value.__qualname__}"] = fields
             elif not callable(value) and not isinstance(value, ModuleType):
                 found[f"{user.__module__}.{name}"] = value
     return found
@@ -59,12 +66,22 @@ def _names(code: CodeType) -> Iterator[str]:
             yield from _names(inner)
 
 
+def _options(kernel: Any) -> str:
+    return repr(sorted((name, repr(value)) for name, value in kernel.targetoptions.items()))
+
+
+def _content(code: CodeType) -> tuple[object, ...]:
+    """What a function does, wherever it stands: neither its file's name nor its lines'."""
+    constants = (_content(value) if isinstance(value, CodeType) else repr(value) for value in code.co_consts)
+    return code.co_code, code.co_names, code.co_varnames, code.co_freevars, *constants
+
+
 class _Cache(FunctionCache):
-    """numba's cache of one kernel, with the values of its constants in the key."""
+    """numba's cache of one kernel, with its ingredients in the key."""
 
     def _index_key(self, sig: object, codegen: object) -> tuple[object, ...]:
         digest = sha256()
-        for name, value in sorted(constants(self._py_func).items()):
+        for name, value in sorted(ingredients(self._py_func).items(), key=lambda item: item[0]):
             digest.update(name.encode())
             digest.update(pickle.dumps(value))  # one by one: what they share in memory makes no difference
         key: tuple[object, ...] = super()._index_key(sig, codegen)  # type: ignore[no-untyped-call]

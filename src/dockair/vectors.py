@@ -1,8 +1,8 @@
 """Kernels on vectors and small matrices; apart from `rotations`, which quick commands load without numba."""
 
 import numpy as np
-from numba import njit
 
+from dockair.kernels import njit
 from dockair.rotations import Array
 
 

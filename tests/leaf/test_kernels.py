@@ -1,4 +1,4 @@
-"""Kernels found again in numba's cache by the values of their constants too, compiled and loaded from a folder."""
+"""Kernels found again in numba's cache by what they are made of elsewhere too, compiled and loaded from a folder."""
 
 import sys
 from importlib.util import module_from_spec, spec_from_file_location
@@ -7,7 +7,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from dockair.kernels import constants, njit
+from dockair.kernels import ingredients, njit
 
 SOURCE = """
 import numpy as np
@@ -29,22 +29,54 @@ def sum_of_both():
     return code() + first()
 """
 
+CALLED = """
+from dockair.kernels import njit
+
+@njit(cache=True{options})
+def ratio(a, b):
+    return a / b {more}
+"""
+
+CALLING = """
+from called_by_the_test import ratio
+from dockair.kernels import njit
+
+@njit(cache=True, error_model="numpy")
+def through(a, b):
+    return ratio(a, b)
+
+@njit(cache=True, error_model="numpy")
+def through_another(a, b):
+    return through(a, b)
+"""
+
 
 @pytest.fixture
-def load(tmp_path, monkeypatch):
-    """Function that imports the kernels anew, as another process would, where CODE is what it says."""
+def load_source(tmp_path, monkeypatch):
+    """Function that writes a module, unless it stands there, and imports it anew, as another process would."""
+
+    def load(name: str, source: str) -> ModuleType:
+        path = tmp_path / f"{name}.py"
+        if not (path.exists() and path.read_text() == source):
+            path.write_text(source)
+        spec = spec_from_file_location(name, path)
+        module = module_from_spec(spec)
+        monkeypatch.setitem(sys.modules, name, module)
+        spec.loader.exec_module(module)
+        return module
+
+    return load
+
+
+@pytest.fixture
+def load(load_source, monkeypatch):
+    """Function that imports the kernels anew where CODE is what it says."""
 
     def load(code: int) -> ModuleType:
         codes = ModuleType("codes_of_the_test")
         codes.CODE = code
         monkeypatch.setitem(sys.modules, codes.__name__, codes)
-        path = tmp_path / "kernels_of_the_test.py"
-        path.write_text(SOURCE)
-        spec = spec_from_file_location(path.stem, path)
-        module = module_from_spec(spec)
-        monkeypatch.setitem(sys.modules, path.stem, module)
-        spec.loader.exec_module(module)
-        return module
+        return load_source("kernels_of_the_test", SOURCE)
 
     return load
 
@@ -64,12 +96,63 @@ def test_a_kernel_is_compiled_once_for_each_value(load):
     assert hits == [0, 1, 0, 1, 1]
 
 
-def test_the_constants_of_a_kernel_are_its_own_and_those_of_the_kernels_that_it_calls(load):
+def test_the_ingredients_of_a_kernel_are_its_own_and_those_of_the_kernels_that_it_calls(load):
     module = load(7)
-    assert constants(module.code.py_func) == {"kernels_of_the_test.CODE": 7}
-    found = constants(module.sum_of_both.py_func)
-    assert found.keys() == {"kernels_of_the_test.CODE", "kernels_of_the_test._TABLE"}
+    assert ingredients(module.code.py_func) == {"kernels_of_the_test.CODE": 7}
+    found = ingredients(module.sum_of_both.py_func)
+    assert found.keys() == {f"kernels_of_the_test.{name}" for name in ("CODE", "_TABLE", "code", "first")}
     np.testing.assert_array_equal(found["kernels_of_the_test._TABLE"], [7, 7, 7])
+
+
+@pytest.mark.parametrize("name", ["through", "through_another"])
+def test_a_kernel_goes_by_the_kernels_of_other_files_as_they_are_today(load_source, name):
+    for more, expected in (("", 1.5), ("+ 1.0", 2.5), ("- 1.0", 0.5), ("", 1.5)):
+        load_source("called_by_the_test", CALLED.format(options="", more=more))
+        assert getattr(load_source("calling_for_the_test", CALLING), name)(3.0, 2.0) == expected
+
+
+def test_a_kernel_goes_by_the_options_of_the_kernels_that_it_calls(load_source):
+    load_source("called_by_the_test", CALLED.format(options=', error_model="python"', more=""))
+    with pytest.raises(ZeroDivisionError):
+        load_source("calling_for_the_test", CALLING).through(1.0, 0.0)
+    load_source("called_by_the_test", CALLED.format(options=', error_model="numpy"', more=""))
+    assert load_source("calling_for_the_test", CALLING).through(1.0, 0.0) == np.inf
+
+
+def test_a_kernel_goes_by_the_fields_of_named_tuples_as_they_are_today(load_source):
+    calling = """
+from called_by_the_test import Pair, ratio
+from dockair.kernels import njit
+
+@njit(cache=True)
+def of_pair(a, b):
+    return ratio(Pair(a, b))
+"""
+    called = """
+from typing import NamedTuple
+from dockair.kernels import njit
+
+class Pair(NamedTuple):
+    {0}: float
+    {1}: float
+
+@njit(cache=True)
+def ratio(pair):
+    return pair.above / pair.below
+"""
+    for fields, expected in ((("above", "below"), 1.5), (("below", "above"), 1.0 / 1.5)):
+        load_source("called_by_the_test", called.format(*fields))
+        assert load_source("calling_for_the_test", calling).of_pair(3.0, 2.0) == expected
+
+
+def test_a_kernel_is_compiled_once_for_all_places_of_the_kernels_that_it_calls(load_source):
+    hits = []
+    for comment in ("", "# moved down by a line\n", ""):
+        load_source("called_by_the_test", comment + CALLED.format(options="", more=""))
+        kernel = load_source("calling_for_the_test", CALLING).through
+        kernel(3.0, 2.0)
+        hits.append(sum(kernel.stats.cache_hits.values()))
+    assert hits == [0, 1, 1]
 
 
 def test_what_is_not_to_be_kept_is_not():
