@@ -1,11 +1,11 @@
-"""One descent to a minimum of the pose's cost: what goes in, what comes out, and the call of the loop in `model`."""
+"""One descent to a minimum of the pose's cost: what goes in, what comes out, and the call of the loop."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
 from dockair.errors import DockairError
-from dockair.nav.pose import model
+from dockair.nav.pose import descent_kernels, model
 from dockair.nav.pose.measurement import LinesOfSight
 from dockair.nav.pose.prior import NO_PRIOR, Prior
 from dockair.nav.pose.prior import PosePrior as PosePrior
@@ -19,7 +19,9 @@ class DescentSettings:
     """Which member of the source's descent family, eqs (62)-(65), when it stops, and its loss."""
 
     coordinates: int  #: model.SOURCE or model.LOCAL
-    damping: int  #: model.UNDAMPED, model.IDENTITY, model.DIAGONAL or model.GRADIENT
+    damping: (
+        int  #: descent_kernels.UNDAMPED, descent_kernels.IDENTITY, descent_kernels.DIAGONAL or descent_kernels.GRADIENT
+    )
     first_damping: float  #: mu at the start
     tolerance_sigma: float  #: length of the last step, in its own standard deviations
     max_iterations: int
@@ -30,7 +32,7 @@ class DescentSettings:
 class Descent:
     """Where a descent ended."""
 
-    outcome: int  #: model.CONVERGED, NOT_CONVERGED, BEHIND or SINGULAR
+    outcome: int  #: descent_kernels.CONVERGED, NOT_CONVERGED, BEHIND or SINGULAR
     R_CD: Array  #: (3, 3)
     p_CD: Array  #: (3,) [m]
     covariance: Array  #: (6, 6) of (phi, delta) in camera axes, the prior included; NaN unless converged
@@ -43,7 +45,7 @@ class Descent:
     @property
     def converged(self) -> bool:
         """True at a minimum."""
-        return self.outcome == model.CONVERGED
+        return self.outcome == descent_kernels.CONVERGED
 
 
 def descend(
@@ -75,7 +77,7 @@ def descend(
         measured, weights, lens = sight.rays, sight.weights, _NO_LENS
     else:
         measured, weights, lens = sight.pixels, _pixel_weights(sight.sigma_px), sight.lens
-    outcome, iterations, R, p, led_chi2, chi2, cost, covariance, information = model.descend(
+    outcome, iterations, R, p, led_chi2, chi2, cost, covariance, information = descent_kernels.descend(
         measured,
         weights,
         sight.points_D,

@@ -1,8 +1,8 @@
 """How far one pose is from another, in the coordinates of every covariance here."""
 
 import numpy as np
-from numba import njit
 
+from dockair.kernels import njit
 from dockair.rotations import Array, log
 
 _NEAR_HALF_TURN = -0.9  # cosine below which the sine no longer gives the axis well

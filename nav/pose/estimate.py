@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from dockair.calibration import Camera
 from dockair.errors import DockairError
-from dockair.nav.pose import model
+from dockair.nav.pose import descent_kernels
 from dockair.nav.pose.descent import Descent, DescentSettings, descend
 from dockair.nav.pose.difference import pose_difference
 from dockair.nav.pose.glsdc import GLSDC
@@ -49,10 +49,10 @@ class PoseStatus(Enum):
 
 
 STATUS = {
-    model.CONVERGED: PoseStatus.CONVERGED,
-    model.NOT_CONVERGED: PoseStatus.NOT_CONVERGED,
-    model.BEHIND: PoseStatus.BEHIND_CAMERA,
-    model.SINGULAR: PoseStatus.DEGENERATE,
+    descent_kernels.CONVERGED: PoseStatus.CONVERGED,
+    descent_kernels.NOT_CONVERGED: PoseStatus.NOT_CONVERGED,
+    descent_kernels.BEHIND: PoseStatus.BEHIND_CAMERA,
+    descent_kernels.SINGULAR: PoseStatus.DEGENERATE,
 }
 
 
@@ -227,15 +227,17 @@ def _from_start(
 ) -> list[Descent]:
     """Where a start leads, and where the mirror image of that does."""
     first = descend(sight, *start, settings, prior)
-    if first.outcome == model.BEHIND and not (np.isfinite(start[0]).all() and np.isfinite(start[1]).all()):
+    if first.outcome == descent_kernels.BEHIND and not (np.isfinite(start[0]).all() and np.isfinite(start[1]).all()):
         raise DockairError("initial", expected="finite numbers", got=start)
-    if first.outcome == model.NOT_CONVERGED:  # a range far off leads astray; the attitude alone gives a better one
+    if (
+        first.outcome == descent_kernels.NOT_CONVERGED
+    ):  # a range far off leads astray; the attitude alone gives a better one
         again = start[0], position_for_attitude(sight.rays, sight.points_D, np.ascontiguousarray(start[0]))
         first = descend(sight, *again, settings, prior)
     if not (first.converged and mirror):
         return [first]
-    other = mirrored(first.R_CD, first.p_CD, sight.points_D)
-    return [first, descend(sight, *other, settings, prior)]
+    R_CD, p_CD = mirrored(first.R_CD, first.p_CD, sight.points_D)
+    return [first, descend(sight, R_CD, p_CD, settings, prior)]
 
 
 def no_pose(status: PoseStatus, count: int) -> PoseEstimate:

@@ -9,8 +9,9 @@ LED comes behind the camera. Kept as the reference of the source and to count it
 """
 
 from dockair.nav.pose.descent import Descent, DescentSettings, descend
+from dockair.nav.pose.descent_kernels import UNDAMPED
 from dockair.nav.pose.measurement import LinesOfSight
-from dockair.nav.pose.model import SOURCE, UNDAMPED
+from dockair.nav.pose.model import SOURCE
 from dockair.rotations import Array
 
 GLSDC = DescentSettings(

@@ -10,8 +10,8 @@ condition number of H'WH, 1e4 to 1e6 here: it creeps, and mostly does not arrive
 """
 
 from dockair.nav.pose.descent import Descent, DescentSettings, descend
+from dockair.nav.pose.descent_kernels import GRADIENT as GRADIENT_STEP
 from dockair.nav.pose.measurement import LinesOfSight
-from dockair.nav.pose.model import GRADIENT as GRADIENT_STEP
 from dockair.nav.pose.model import SOURCE
 from dockair.rotations import Array
 

@@ -10,8 +10,9 @@ rest: it seldom diverges, but arrives late. For the reproduction; it takes no pr
 """
 
 from dockair.nav.pose.descent import Descent, DescentSettings, descend
+from dockair.nav.pose.descent_kernels import IDENTITY
 from dockair.nav.pose.measurement import LinesOfSight
-from dockair.nav.pose.model import IDENTITY, SOURCE
+from dockair.nav.pose.model import SOURCE
 from dockair.rotations import Array
 
 LEVENBERG = DescentSettings(

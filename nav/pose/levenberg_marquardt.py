@@ -2,7 +2,7 @@
 
     X <- X + (H'WH + mu diag(H'WH))^-1 H'W (b - h)          [Yoon 2018, eq 65, sign mended]
 
-The source leaves schedule and stop rule open; here, as `model.descend` says: mu falls tenfold after a step as good as
+The source leaves schedule and stop rule open; here, as `descent_kernels` says: mu falls tenfold after a step as good as
 promised, rises after a bad one, and the descent has converged when the undamped step is a thousandth of its own
 standard deviation. Steps are taken in local coordinates (phi, delta): in the source's own (attitude, camera in drogue
 axes) every tilt drags the camera along an arc of the range's radius, a valley that straight steps follow slowly. One
@@ -14,8 +14,9 @@ A prior may join as one more measurement; then a frontal ring or a single LED is
 from dataclasses import replace
 
 from dockair.nav.pose.descent import Descent, DescentSettings, descend
+from dockair.nav.pose.descent_kernels import DIAGONAL
 from dockair.nav.pose.measurement import LinesOfSight
-from dockair.nav.pose.model import DIAGONAL, LOCAL, SOURCE
+from dockair.nav.pose.model import LOCAL, SOURCE
 from dockair.nav.pose.prior import Prior
 from dockair.rotations import Array
 

@@ -20,8 +20,8 @@ Source: D. Oberkampf, D. DeMenthon, L. Davis, Iterative pose estimation using co
 """
 
 import numpy as np
-from numba import njit
 
+from dockair.kernels import njit
 from dockair.rotations import Array
 
 

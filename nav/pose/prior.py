@@ -1,4 +1,4 @@
-"""What is known about the pose beside the frame; each enters the cost as one more measurement, Eqs (3)-(4) of `model`.
+"""What is known about the pose beside the frame; each enters as one more measurement, `normal_equations` (1)-(2).
 
 A belief about the whole pose, about the attitude (a gyro's, carried on), or about one direction of the drogue: its x
 axis lies along the hose, whose direction is known better than its roll. Angles are errors phi in camera axes,
@@ -17,7 +17,7 @@ _UNIT, _ZERO, _NOTHING = np.eye(3), np.zeros(3), np.zeros((0, 0))
 _UNIT_LENGTH = 1e-6  # error of a unit vector's length that is taken for rounding
 
 Terms = tuple[Array, Array, Array, Array, Array, float]
-NO_PRIOR: Terms = (_UNIT, _ZERO, _NOTHING, _ZERO, _ZERO, 0.0)  #: what `model.descend` takes for no prior
+NO_PRIOR: Terms = (_UNIT, _ZERO, _NOTHING, _ZERO, _ZERO, 0.0)  #: what `descent_kernels.descend` takes for no prior
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -30,7 +30,7 @@ class PosePrior:
 
     @property
     def terms(self) -> Terms:
-        """What `model.descend` takes.
+        """What `descent_kernels.descend` takes.
 
         Raises:
             DockairError: wrong shapes, a singular covariance.
@@ -76,7 +76,7 @@ class AttitudePrior:
 
     @property
     def terms(self) -> Terms:
-        """What `model.descend` takes."""
+        """What `descent_kernels.descend` takes."""
         information = np.zeros((6, 6))
         information[:3, :3] = self.information
         return np.ascontiguousarray(self.R_CD, dtype=float), _ZERO, information, _ZERO, _ZERO, 0.0
@@ -104,7 +104,7 @@ class DirectionPrior:
 
     @property
     def terms(self) -> Terms:
-        """What `model.descend` takes."""
+        """What `descent_kernels.descend` takes."""
         axis_D, axis_C = np.ascontiguousarray(self.axis_D, dtype=float), np.ascontiguousarray(self.axis_C, dtype=float)
         return _UNIT, _ZERO, _NOTHING, axis_D, axis_C, 1.0 / self.sigma_rad**2
 

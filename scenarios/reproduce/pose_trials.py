@@ -21,8 +21,9 @@ from scipy.spatial.transform import Rotation
 
 from dockair.calibration import Camera, LedRing
 from dockair.nav.pose.descent import DescentSettings, descend
+from dockair.nav.pose.descent_kernels import DIAGONAL
 from dockair.nav.pose.measurement import LinesOfSight, isotropic_weights
-from dockair.nav.pose.model import DIAGONAL, LOCAL
+from dockair.nav.pose.model import LOCAL
 from dockair.rotations import Array
 
 TO_THE_MINIMUM = DescentSettings(

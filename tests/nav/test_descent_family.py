@@ -7,7 +7,7 @@ import pytest
 
 from dockair.calibration import Camera, LedRing
 from dockair.errors import DockairError
-from dockair.nav.pose import model
+from dockair.nav.pose import descent_kernels, model
 from dockair.nav.pose.descent import DescentSettings, PosePrior, descend
 from dockair.nav.pose.glsdc import GLSDC, glsdc
 from dockair.nav.pose.gradient import GRADIENT, gradient
@@ -88,7 +88,7 @@ def test_gradient_creeps_and_says_that_it_has_not_arrived():
     least = levenberg_marquardt(seen, *start).cost
     first = gradient(seen, *start, settings=replace(GRADIENT, max_iterations=0)).cost
     end = gradient(seen, *start)
-    assert end.outcome == model.NOT_CONVERGED and end.iterations == GRADIENT.max_iterations
+    assert end.outcome == descent_kernels.NOT_CONVERGED and end.iterations == GRADIENT.max_iterations
     assert np.isnan(end.covariance).all() and np.isnan(end.information).all()
     assert 5.0 * least < end.cost < first / 5.0
 

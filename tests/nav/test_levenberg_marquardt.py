@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import least_squares
 
 from dockair.calibration import Camera, LedRing
-from dockair.nav.pose import model
+from dockair.nav.pose import descent_kernels
 from dockair.nav.pose.descent import Descent
 from dockair.nav.pose.levenberg_marquardt import LEVENBERG_MARQUARDT, levenberg_marquardt
 from dockair.nav.pose.measurement import LinesOfSight, lines_of_sight_from_pixels
@@ -96,13 +96,13 @@ def test_poor_starts_lead_to_the_minimum_or_its_mirror_image():
 def test_start_behind_the_camera_is_a_status():
     R, p = np.eye(3), np.array([8.0, 0.0, 0.0])
     end = levenberg_marquardt(seen(R, p), R, -p)
-    assert end.outcome == model.BEHIND
+    assert end.outcome == descent_kernels.BEHIND
     assert np.isnan(end.covariance).all()
 
 
 def test_iteration_limit_is_a_status():
     R, p = np.eye(3), np.array([8.0, 0.0, 0.0])
     end = levenberg_marquardt(seen(R, p), exp(np.full(3, 0.3)), 1.5 * p, settings=replace(PATIENT, max_iterations=2))
-    assert end.outcome == model.NOT_CONVERGED
+    assert end.outcome == descent_kernels.NOT_CONVERGED
     assert end.iterations == 2
     assert np.isnan(end.covariance).all()
