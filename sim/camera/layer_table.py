@@ -15,7 +15,7 @@ the camera moves and turns; what it fades into changes with the key by less than
 key the next one's tiles are made bit by bit, so that no frame has to wait for them; and, where there is time between
 frames, before anything looks at them. Rays that skim past the layer are taken to the farthest it reaches.
 
-Source: Praun & Hoppe 2003 (octahedral maps), as `sky_table`.
+The directions are unfolded onto a square as in `octahedron`.
 """
 
 from collections.abc import Callable
@@ -29,9 +29,9 @@ from dockair.rotations import Array
 from dockair.sim.camera.earth import Interval
 from dockair.sim.camera.layer_keys import Keys, Place
 from dockair.sim.camera.layer_tiles import SIDE, TILE, LayerTiles
+from dockair.sim.camera.octahedron import STEEPEST, mark_missing
 
 _TILE, _SIDE, _SHIFT = TILE, SIDE, 6  # as of `layer_tiles`; the power of 2
-_STEEPEST = 2.74  # as of `sky_table`
 _STRETCH = 2.0  # most by which Eq. (2) widens the way between two directions
 _KEYS_PER_DEPTH = 3.0
 _LEAST_DEPTH_M = 1.0  # for the keys' distance: a flight may begin on the layer
@@ -140,7 +140,7 @@ class LayerTable:
         """Which tiles a picture looks at that are not known."""
         (R, x, y, below), side, missing = view, self._tiles * _TILE, self._is_missing
         step = max(_step(x), _step(y), 1e-9)
-        stride = max(1, int((_TILE - 1) / (0.5 * (side - 2) * _STEEPEST * _STRETCH * step)))
+        stride = max(1, int((_TILE - 1) / (0.5 * (side - 2) * STEEPEST * _STRETCH * step)))
         if not _mark(R, x, y, below, stride, side, self._geometry(place_m, tiles.key), tiles.is_known, missing):
             return []
         found = [(int(row), int(column)) for row, column in np.argwhere(missing)]
@@ -194,7 +194,7 @@ def _toward(
 
 @njit(cache=True, error_model="numpy", inline="always")
 def _node(x: np.float32, y: np.float32, z: np.float32, half: np.float32) -> tuple[np.float32, np.float32]:
-    """Fractional row and column of a direction of any length, as of `sky_table`; of one that points down, z < 0."""
+    """Fractional row and column of a direction of any length, [octahedron, eq 1]; of one that points down, z < 0."""
     zero = np.float32(0.0)
     scale = half / (abs(x) + abs(y) - z)
     p_y, p_z = y * scale, z * scale
@@ -279,7 +279,7 @@ def _mark(
     missing: NDArray[np.bool_],
 ) -> bool:
     """Mark what is not known of the tiles of every stride-th block and their neighbours; say whether that is any."""
-    tiles, any_missing, g = known.shape[0], False, _single(geometry)
+    any_missing, g = False, _single(geometry)
     last = -1, -1
     half = np.float32(0.5 * (side - 2))
     for line in range(0, len(y) + stride - 1, stride):
@@ -298,13 +298,5 @@ def _mark(
             if (row, column) == last:
                 continue
             last = row, column
-            for a in range(row - 1, row + 2):
-                for b in range(column - 1, column + 2):
-                    r, c = a, b
-                    if a < 0 or a >= tiles:  # the square's edges meet their own mirror images
-                        r, c = min(max(a, 0), tiles - 1), tiles - 1 - c
-                    if b < 0 or b >= tiles:
-                        r, c = tiles - 1 - r, min(max(c, 0), tiles - 1)
-                    if not known[r, c]:
-                        missing[r, c] = any_missing = True
+            any_missing = mark_missing(row, column, known, missing) or any_missing
     return any_missing

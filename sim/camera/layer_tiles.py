@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from dockair.rotations import Array
 from dockair.sim.camera.layer_keys import Place
-from dockair.sim.camera.sky_table import directions_from_nodes
+from dockair.sim.camera.octahedron import directions_from_nodes
 
 TILE = 64  #: nodes a side
 SIDE = TILE + 1  #: of what is kept of a tile: with the next ones' first nodes, so that it is read alone

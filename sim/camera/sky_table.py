@@ -1,17 +1,12 @@
 """A function of direction, tabulated where it is looked at: the sky, read for every block of every frame.
 
-The sphere is unfolded onto a square by way of the octahedron (x is the direction of flight):
-
-    p = (y, z)/(|x| + |y| + |z|);     x < 0:  p <- (sgn p_y (1 - |p_z|), sgn p_z (1 - |p_y|))                    (1)
-
-Nodes stand on an even grid of p, 2/n rad apart straight ahead and up to 2.3 times that elsewhere, with rows of them on
-p_y = 0 and p_z = 0, where the map has a kink; between them the value is bilinear. Tiles of nodes are computed when a
-picture first needs them, and their values do not depend on when.
+Between the nodes of the sphere unfolded onto a square [octahedron] the value is bilinear. Tiles of nodes are computed
+when a picture first needs them, and their values do not depend on when.
 
 A function that is smooth over some milliradians is read where the tangents x and y are whole multiples of 1/256 and
 1/512 alone, and bilinear in between.
 
-A block's value is a function of R and its own x and y alone. Source: Praun & Hoppe 2003 (octahedral maps).
+A block's value is a function of R and its own x and y alone.
 """
 
 import math
@@ -22,11 +17,11 @@ from numpy.typing import NDArray
 
 from dockair.kernels import njit
 from dockair.rotations import Array
+from dockair.sim.camera.octahedron import STEEPEST, directions_from_nodes, mark_missing
 
 _TILE = 64  # nodes a side
 _ROWS_HELD = 3  # of places, of which the first is read when the last is known
 _NODES_TOUCHED = 14  # blocks that surely are no farther apart than the 16 nodes of a line of cache
-_STEEPEST = 2.74  # |dp| <= (1 + sqrt 3) |d direction|, Eq. (1)
 _PER_X, _PER_Y = 256.0, 512.0  # where a smooth function is read: powers of 2, so that these places are exact
 
 
@@ -60,7 +55,7 @@ class DirectionTable:
         """Bilinear between the nodes, which are made where they lack."""
         step = max(_step(x), _step(y), 1e-9)
         cells = self._values.shape[0] - 2  # even, so that the middle is a node; the last row and column serve nothing
-        stride = max(1, int((_TILE - 1) / (0.5 * cells * _STEEPEST * step)))
+        stride = max(1, int((_TILE - 1) / (0.5 * cells * STEEPEST * step)))
         R, columns = np.ascontiguousarray(R_WC, dtype=float), np.asarray(x, dtype=np.float32)
         rows = np.asarray(y, dtype=float)
         if _mark(R, columns, rows, stride, cells, self._is_known, self._is_missing):
@@ -76,17 +71,6 @@ class DirectionTable:
         place = slice(row * _TILE, (row + 1) * _TILE), slice(column * _TILE, (column + 1) * _TILE)
         self._values[place] = values.reshape(_TILE, _TILE)
         self._is_known[row, column] = True
-
-
-def directions_from_nodes(i: NDArray[np.int64], j: NDArray[np.int64], n: int) -> Array:
-    """(m, 3) unit vectors of nodes (row i, column j) of an (n, n) table, the inverse of Eq. (1)."""
-    p_y, p_z = 1.0 - 2.0 * j / (n - 2), 1.0 - 2.0 * i / (n - 2)
-    x = 1.0 - np.abs(p_y) - np.abs(p_z)
-    behind = x < 0.0
-    y = np.where(behind, np.copysign(1.0 - np.abs(p_z), p_y), p_y)
-    z = np.where(behind, np.copysign(1.0 - np.abs(p_y), p_z), p_z)
-    length = np.sqrt(x * x + y * y + z * z)
-    return np.stack([x / length, y / length, z / length], axis=1)
 
 
 def _step(x: Array) -> float:
@@ -128,7 +112,7 @@ def _spread(few: NDArray[np.float32], first_x: int, first_y: int, x: Array, y: A
 
 @njit(cache=True, error_model="numpy")
 def _node(x: np.float32, y: np.float32, z: np.float32, half: np.float32) -> tuple[np.float32, np.float32]:
-    """Fractional row and column of a direction of any length, Eq. (1); half is that of straight ahead."""
+    """Fractional row and column of a direction of any length, [octahedron, eq 1]; half is that of straight ahead."""
     zero = np.float32(0.0)
     scale = half / (abs(x) + abs(y) + abs(z))
     p_y, p_z = y * scale, z * scale
@@ -219,7 +203,7 @@ def _mark(
 
     No block in between lies farther than a tile.
     """
-    tiles, any_missing = known.shape[0], False
+    any_missing = False
     last = -1, -1
     half = np.float32(0.5 * cells)
     for i in range(0, len(y) + stride - 1, stride):
@@ -236,13 +220,5 @@ def _mark(
             if (row, column) == last:
                 continue
             last = row, column
-            for a in range(row - 1, row + 2):
-                for b in range(column - 1, column + 2):
-                    r, c = a, b
-                    if a < 0 or a >= tiles:  # the square's edges meet their own mirror images
-                        r, c = min(max(a, 0), tiles - 1), tiles - 1 - c
-                    if b < 0 or b >= tiles:
-                        r, c = tiles - 1 - r, min(max(c, 0), tiles - 1)
-                    if not known[r, c]:
-                        missing[r, c] = any_missing = True
+            any_missing = mark_missing(row, column, known, missing) or any_missing
     return any_missing

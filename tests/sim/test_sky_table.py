@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from dockair.sim.camera.sky_table import DirectionTable, directions_from_nodes
+from dockair.sim.camera.octahedron import directions_from_nodes
+from dockair.sim.camera.sky_table import DirectionTable
 
 TILES = 4
 
