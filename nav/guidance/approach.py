@@ -1,11 +1,8 @@
 """Guidance: from the drogue as the navigation sees it to the phase of the docking and the command.
 
 Everything is flown in stabilised axes (`stabilised_axes`): a controller (`predictive`, or `pid` for comparison) follows
-the drogue; `closure` says how fast to close, and when to be called back; `phases` says what comes next.
-
-After contact the view says nothing about the way to the tanker: the way pushed in is the integral of what was
-commanded beyond the drogue's drift. Whether that has come into the refuelling range the pod's light says, and a hold
-goes by it: on while it is amber, back while it flashes.
+the drogue; `closure` says how fast to close, and when to be called back; `take_in` how far to push it in; `phases` says
+what comes next.
 
 Where the tanker turns or descends, the receiver's own path does so as announced, and leans on what announced and true
 turn differ by (`announced_path`). None of this is left to the controller: to its u is added the velocity v, level to
@@ -40,6 +37,7 @@ from dockair.nav.guidance.pid import Pid
 from dockair.nav.guidance.predictive import Predictive
 from dockair.nav.guidance.slack_hose import SlackHose
 from dockair.nav.guidance.stabilised_axes import StabilisedAxes
+from dockair.nav.guidance.take_in import TakeIn
 from dockair.rotations import Array
 
 __all__ = ["Guidance", "GuidanceSettings", "PhaseLimits", "RelativeState"]
@@ -81,8 +79,8 @@ class Guidance:
         speeds = settings.closure_speed_m_s, settings.closure_acceleration_m_s2
         self._closure = Closure(settings.closing, *speeds, self._dt)
         self._clocks = PhaseClocks(self._dt, settings.limits)
-        self._attempts, self._pushed_in_m, self._push_to_m = 0, 0.0, 0.0
-        self._light = Light.AMBER
+        self._attempts, self._light = 0, Light.AMBER
+        self._take_in = TakeIn(settings, self._dt)
         self._is_evading = self._is_recalled = False
         self._evasion = Evasion(settings, self._dt)
         self._hose = SlackHose(settings.limits, self._dt)
@@ -191,9 +189,7 @@ class Guidance:
         elif self._entered_m == 0.0 and math.isfinite(lateral_m):
             self._entered_m = lateral_m
         if self.phase in _TOUCHING:
-            self._pushed_in_m += (self._u[0] - self._controller.steady_drift_m_s[0]) * self._dt
-            reckoned_m = self._pushed_in_m if self._light is Light.GREEN else self._settings.limits.take_in_m
-            self._push_to_m = max(self._push_to_m, reckoned_m + self._settings.limits.push_on_m)
+            self._take_in.step(self._u[0] - self._controller.steady_drift_m_s[0], self._light)
 
     def _is_steady(self, ring_ahead_m: float) -> bool:
         """Whether the receiver is where an approach may begin, as far as it knows."""
@@ -251,7 +247,7 @@ class Guidance:
             frames_stopped=clocks.frames_stopped,
             closing_m_s=-float(rate[0]),
             committed=self._closure.committed,
-            pushed_in_m=self._pushed_in_m,
+            pushed_in_m=self._take_in.pushed_in_m,
             attempts=self._attempts,
             light_is_red=self._light is Light.RED,
             green_s=clocks.green_s,
@@ -270,9 +266,8 @@ class Guidance:
         if self.phase is Phase.APPROACH:
             self._attempts, self._passed = self._attempts + 1, None
             self._closure.begin()
-        elif self.phase is Phase.CONTACT:  # what is commanded already will still be flown
-            self._pushed_in_m = self._closure.speed_m_s * self._settings.response_s[0]
-            self._push_to_m = 0.0
+        elif self.phase is Phase.CONTACT:
+            self._take_in.begin(self._closure.speed_m_s)
         elif self.phase in (Phase.BACK_OFF, Phase.BREAKAWAY):
             self._is_recalled = before is Phase.APPROACH and transition.reason == RED_LIGHT and situation.committed
             if self._passed is not None and self._closure.committed:  # else it did not mean to meet the drogue
@@ -341,12 +336,9 @@ class Guidance:
         if touching or about_it:
             target[0] = steady[0]
         if self._path.is_announced and touching:  # the drogue has come along
-            target += self._axes.turned(np.array([self._pushed_in_m, 0.0, 0.0]))
-        if self.phase is Phase.CONTACT:  # slows down so as to stop where it is to hold
-            to_go = max(s.limits.take_in_m - self._pushed_in_m, 0.0)
-            target[0] += min(s.closure_speed_m_s, s.take_in_gain_1_s * to_go)
-        elif self.phase is Phase.HOLD:
-            target[0] += self._regained_m_s()
+            target += self._axes.turned(np.array([self._take_in.pushed_in_m, 0.0, 0.0]))
+        if self.phase in (Phase.CONTACT, Phase.HOLD):
+            target[0] += self._take_in.speed_m_s(self.phase, self._light)
         elif self.phase in _RETREATING or (
             self.phase in _WAITING and self._clocks.unusable_s > s.limits.lost_s
         ):  # nobody waits near a drogue that is not seen
@@ -361,13 +353,6 @@ class Guidance:
         if self._is_evading:
             u_dot[2] = _EVADE_GAIN_1_S * (-s.evade_speed_m_s - self._u[2])
         return u_dot
-
-    def _regained_m_s(self) -> float:
-        """Speed along toward the refuelling range by the light; not on for ever into a hose that is not taken up."""
-        if self._light is Light.FLASHING_AMBER:
-            return -self._settings.regain_speed_m_s
-        goes_on = self._light is Light.AMBER and self._pushed_in_m < self._push_to_m
-        return self._settings.regain_speed_m_s if goes_on else 0.0
 
     def _command(self, u_dot: Array) -> ReceiverCommand:
         """Eq. (1) and its rate in body axes, and what the path does."""

@@ -1,0 +1,60 @@
+"""The way pushed in and the speed with which to go on, by the pod's light."""
+
+import pytest
+
+from dockair.messages import Light
+from dockair.nav.guidance.guidance_settings import GuidanceSettings
+from dockair.nav.guidance.phases import Phase
+from dockair.nav.guidance.take_in import TakeIn
+
+SETTINGS = GuidanceSettings()
+LIMITS, STEP_S = SETTINGS.limits, 0.01
+
+
+def begun(speed_m_s=0.0):
+    take_in = TakeIn(SETTINGS, STEP_S)
+    take_in.begin(speed_m_s)
+    return take_in
+
+
+def flown(take_in, phase, light, seconds):
+    for _ in range(round(seconds / STEP_S)):
+        take_in.step(take_in.speed_m_s(phase, light), light)
+    return take_in.pushed_in_m
+
+
+def test_what_is_commanded_at_the_coupling_is_still_flown():
+    assert begun(1.2).pushed_in_m == pytest.approx(1.2 * SETTINGS.response_s[0])
+
+
+def test_contact_comes_to_rest_where_it_is_to_hold_and_never_goes_back():
+    take_in = begun()
+    first_m_s = min(SETTINGS.closure_speed_m_s, SETTINGS.take_in_gain_1_s * LIMITS.take_in_m)
+    assert take_in.speed_m_s(Phase.CONTACT, Light.AMBER) == first_m_s
+    assert flown(take_in, Phase.CONTACT, Light.GREEN, 60.0) == pytest.approx(LIMITS.take_in_m, abs=1e-3)
+    take_in.step(10.0 / STEP_S, Light.GREEN)
+    assert take_in.speed_m_s(Phase.CONTACT, Light.GREEN) == 0.0
+
+
+def test_a_hold_under_amber_goes_on_by_a_set_way_and_no_further():
+    pushed_m = flown(begun(), Phase.HOLD, Light.AMBER, 60.0)
+    assert pushed_m == pytest.approx(LIMITS.take_in_m + LIMITS.push_on_m, abs=SETTINGS.regain_speed_m_s * STEP_S)
+
+
+def test_from_where_the_light_was_green_last_it_goes_on_again():
+    take_in = begun()
+    take_in.step(7.0 / STEP_S, Light.GREEN)
+    assert take_in.speed_m_s(Phase.HOLD, Light.GREEN) == 0.0
+    assert flown(take_in, Phase.HOLD, Light.AMBER, 60.0) == pytest.approx(7.0 + LIMITS.push_on_m, abs=0.01)
+
+
+def test_under_a_flashing_light_it_eases_back():
+    assert begun().speed_m_s(Phase.HOLD, Light.FLASHING_AMBER) == -SETTINGS.regain_speed_m_s
+
+
+def test_the_next_contact_begins_anew():
+    take_in = begun()
+    flown(take_in, Phase.HOLD, Light.AMBER, 60.0)
+    take_in.begin(0.0)
+    assert take_in.pushed_in_m == 0.0
+    assert flown(take_in, Phase.HOLD, Light.AMBER, 60.0) == pytest.approx(LIMITS.take_in_m + LIMITS.push_on_m, abs=0.01)
