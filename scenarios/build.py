@@ -26,8 +26,8 @@ from dockair.scenarios.build_measured import measured_leds
 from dockair.scenarios.buildable import require_buildable
 from dockair.scenarios.exact_json import name_of
 from dockair.scenarios.measured_leds import MeasuredLeds
-from dockair.scenarios.message_log import NavigatorRecipe
 from dockair.scenarios.mounting_parameters import MountingParameters
+from dockair.scenarios.navigator_recipe import NavigatorRecipe
 from dockair.scenarios.nominal_sheets import nominal_ring, nominal_sheets
 from dockair.scenarios.schema import Scenario
 from dockair.scenarios.truth_navigation import TruthNavigator

@@ -5,23 +5,17 @@
 | messages.parquet   | IMU samples and, if they arrived, the frame (lossless PNG, window, stamp, exposure, gain) and |
 |                    | what the tanker announced, what the pod's light began to show                      |
 | estimates.parquet  | every field of `NavSolution`; all numbers as 64-bit floats                         |
-| navigator.json     | the navigator's class, its calibration sheets and settings, floats to the last bit,      |
-|                    | and a digest of its sources, of `nav` and of the leaves                                  |
+| navigator.json     | of `navigator_recipe`                                                                     |
 
 Frames are encoded in a thread of their own: OpenCV releases the interpreter lock meanwhile, so that the control loop
 waits only when the encoder is more than `QUEUE_TICKS` behind. No truth enters these files.
 """
 
-import json
-import platform
 import queue
-import sys
 import threading
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, fields, is_dataclass
-from hashlib import blake2b
-from importlib.metadata import version
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -32,27 +26,23 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-import dockair
-from dockair.calibration import NavigationSheets
 from dockair.errors import DockairError, MachineError
 from dockair.messages import (
     CameraFrame,
     ImuSample,
     Light,
-    Navigates,
     NavSolution,
     PodSignal,
     TankerAnnouncement,
     Window,
 )
 from dockair.rotations import Array
-from dockair.scenarios.exact_json import decode, encode
-from dockair.scenarios.plug_in import make_navigator, navigator_class_of
+from dockair.scenarios.navigator_recipe import NavigatorRecipe, recorded_file
 
 QUEUE_TICKS = 200  # ticks waiting for the encoder; at 50 frames/s of 2.2 MB full frames at most 220 MB
 ROW_GROUP_TICKS = 100
 _LATER_COLUMNS = {"announcement", "pod_signal"}  # which recordings of before do not have
-MESSAGES, ESTIMATES, NAVIGATOR = "messages.parquet", "estimates.parquet", "navigator.json"
+MESSAGES, ESTIMATES = "messages.parquet", "estimates.parquet"
 #: Sensor noise has no patterns to look back for: Huffman coding alone is smaller and quicker than a search.
 _PNG = [cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PNG_STRATEGY_HUFFMAN_ONLY]
 
@@ -73,71 +63,6 @@ _MESSAGE_SCHEMA = pa.schema(
     ]
 )
 _ESTIMATE_SCHEMA = pa.schema([(f.name, pa.string() if f.type is str else _FLOATS) for f in fields(NavSolution)])
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class NavigatorRecipe:
-    """How to make the navigator that flew."""
-
-    class_name: str  #: "module:Class"
-    sheets: NavigationSheets
-    settings: Any = None  #: second argument of the constructor; None leaves it to the class
-
-    def build(self) -> Navigates:
-        """Return a new navigator in its first state.
-
-        Raises:
-            DockairError: no such class, it is no navigator, or its constructor raises an exception.
-        """
-        given = (self.sheets,) if self.settings is None else (self.sheets, self.settings)
-        return make_navigator(navigator_class_of(self.class_name), *given)
-
-    def write(self, out_dir: Path) -> None:
-        """Write `navigator.json`."""
-        table = {
-            "navigator": self.class_name,
-            "code": code_fingerprint(self.class_name),
-            "sheets": encode(self.sheets),
-            "settings": encode(self.settings),
-        }
-        (out_dir / NAVIGATOR).write_text(json.dumps(table, indent=1, allow_nan=False) + "\n", encoding="utf-8")
-
-    @classmethod
-    def read(cls, out_dir: Path) -> Self:
-        """Read `navigator.json`."""
-        path = _existing(out_dir, NAVIGATOR)
-        try:
-            table = json.loads(path.read_text(encoding="utf-8"))
-            sheets, settings = decode(table["sheets"]), decode(table["settings"])
-            return cls(class_name=table["navigator"], sheets=sheets, settings=settings)
-        except (ValueError, TypeError, KeyError) as error:  # no JSON, or not what was written there
-            got = f"{type(error).__name__}: {error}"
-            raise DockairError(str(path), expected="a navigator as a flight records it", got=got) from None
-
-
-def code_fingerprint(class_name: str) -> str:
-    """Return a digest of a navigator's sources, and of Python's and its libraries' versions.
-
-    The sources are those of `nav`, of the leaves that it stands on, and the file of the navigator's own module.
-
-    Args:
-        class_name: "module:Class", which has been imported.
-    """
-    package, module = Path(dockair.__file__).parent, class_name.partition(":")[0]
-    digest = blake2b(digest_size=16)
-    for path in sorted([*package.glob("*.py"), *package.joinpath("nav").rglob("*.py")]):
-        digest.update(path.relative_to(package).as_posix().encode() + path.read_bytes())
-    own = getattr(sys.modules.get(module), "__file__", None)
-    digest.update(module.encode() + (Path(own).read_bytes() if own else b""))
-    for library in ("numpy", "scipy", "numba", "opencv-python-headless", "filterpy"):
-        digest.update(f"{library} {version(library)}".encode())
-    digest.update(platform.python_version().encode())
-    return digest.hexdigest()
-
-
-def recorded_code(out_dir: str | Path) -> str:
-    """Return the `code_fingerprint` of the recording."""
-    return str(json.loads(_existing(Path(out_dir), NAVIGATOR).read_text(encoding="utf-8")).get("code", ""))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -288,14 +213,6 @@ def _message_row(
     return row
 
 
-def _existing(out_dir: Path, name: str) -> Path:
-    path = out_dir / name
-    if not path.is_file():
-        expected = "a flight by camera, recorded with --record window or full"
-        raise DockairError(str(path), expected=expected, got="no such file")
-    return path
-
-
 def read_messages(out_dir: str | Path, *, pixels: bool = True) -> Iterator[TickMessages]:
     """Yield what each control tick delivered, in order.
 
@@ -311,7 +228,7 @@ def read_messages(out_dir: str | Path, *, pixels: bool = True) -> Iterator[TickM
 
 
 def _rows(out_dir: Path, name: str, needed: set[str]) -> Iterator[dict[str, Any]]:
-    path, expected = _existing(out_dir, name), "a whole table as a flight records it"
+    path, expected = recorded_file(out_dir, name), "a whole table as a flight records it"
     try:
         with path.open("rb") as data, pq.ParquetFile(data) as file:  # Arrow takes no path but of UTF-8
             if missing := sorted(needed - set(file.schema_arrow.names)):

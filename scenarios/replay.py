@@ -24,17 +24,8 @@ import numpy as np
 
 from dockair.errors import DockairError
 from dockair.rotations import Array
-from dockair.scenarios.message_log import (
-    ESTIMATES,
-    MESSAGES,
-    NAVIGATOR,
-    NavigatorRecipe,
-    code_fingerprint,
-    estimate_row,
-    read_estimates,
-    read_messages,
-    recorded_code,
-)
+from dockair.scenarios.message_log import ESTIMATES, MESSAGES, estimate_row, read_estimates, read_messages
+from dockair.scenarios.navigator_recipe import NAVIGATOR, NavigatorRecipe, code_fingerprint, recorded_code
 from dockair.scenarios.plug_in import announce_to, signal_to, step_navigator
 
 FORBIDDEN = ("dockair.sim", "mujoco", "dockair.assets", "dockair.parameters")

@@ -8,11 +8,10 @@ import pytest
 
 from dockair.errors import DockairError, MachineError
 from dockair.messages import Light, NavSolution, PodSignal, TankerAnnouncement
-from dockair.scenarios import message_log
+from dockair.scenarios import message_log, navigator_recipe
 from dockair.scenarios.exact_json import decode, encode
 from dockair.scenarios.message_log import (
     MessageLog,
-    NavigatorRecipe,
     estimate_row,
     numbers,
     pixels_from_png,
@@ -20,6 +19,7 @@ from dockair.scenarios.message_log import (
     read_estimates,
     read_messages,
 )
+from dockair.scenarios.navigator_recipe import NavigatorRecipe
 
 
 @dataclass(frozen=True)
@@ -139,7 +139,7 @@ def test_the_log_holds_no_field_of_the_truth(hand_made, tmp_path):
             for truth, imu, frame, solution in hand_made.ticks(6):
                 truth.p_WD[:] += shift
                 log.append(imu, frame, solution)
-    for file in (message_log.MESSAGES, message_log.ESTIMATES, message_log.NAVIGATOR):
+    for file in (message_log.MESSAGES, message_log.ESTIMATES, navigator_recipe.NAVIGATOR):
         assert (tmp_path / "a" / file).read_bytes() == (tmp_path / "b" / file).read_bytes()
 
 

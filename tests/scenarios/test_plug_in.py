@@ -12,7 +12,7 @@ from dockair.messages import NavSolution, ReceiverCommand, Window
 from dockair.nav.guidance.phases import Phase
 from dockair.nav.navigator import Navigator
 from dockair.scenarios.loop import fly
-from dockair.scenarios.message_log import NavigatorRecipe
+from dockair.scenarios.navigator_recipe import NavigatorRecipe
 from dockair.scenarios.plug_in import announce_to, navigator_class_of, signal_to, step_navigator
 from dockair.scenarios.schema import load_scenario
 

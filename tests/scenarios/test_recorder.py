@@ -7,7 +7,8 @@ import pytest
 
 from dockair.errors import DockairError
 from dockair.scenarios.loop import fly
-from dockair.scenarios.message_log import ESTIMATES, MESSAGES, NAVIGATOR
+from dockair.scenarios.message_log import ESTIMATES, MESSAGES
+from dockair.scenarios.navigator_recipe import NAVIGATOR
 from dockair.scenarios.recorder import summary_of
 from dockair.scenarios.replay import replay
 from dockair.scenarios.schema import load_scenario

@@ -14,7 +14,8 @@ from dockair.messages import Window
 from dockair.rotations import matrix_from_yaw_pitch_roll
 from dockair.scenarios import picture
 from dockair.scenarios.flight_log import FlightLog
-from dockair.scenarios.message_log import MessageLog, NavigatorRecipe, read_messages
+from dockair.scenarios.message_log import MessageLog, read_messages
+from dockair.scenarios.navigator_recipe import NavigatorRecipe
 from dockair.scenarios.picture import picture_of_flight
 from dockair.scenarios.picture_columns import not_valid
 from dockair.scenarios.recording import drawn_ticks, write_episode

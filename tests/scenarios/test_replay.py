@@ -15,14 +15,8 @@ import pytest
 
 import dockair
 from dockair.errors import DockairError
-from dockair.scenarios.message_log import (
-    ESTIMATES,
-    MESSAGES,
-    NAVIGATOR,
-    MessageLog,
-    NavigatorRecipe,
-    code_fingerprint,
-)
+from dockair.scenarios.message_log import ESTIMATES, MESSAGES, MessageLog
+from dockair.scenarios.navigator_recipe import NAVIGATOR, NavigatorRecipe, code_fingerprint
 from dockair.scenarios.replay import FORBIDDEN, replay, replay_in_this_process, same_bits
 
 SUMS = '''
