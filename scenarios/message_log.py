@@ -5,7 +5,7 @@
 | messages.parquet   | IMU samples and, if they arrived, the frame (lossless PNG, window, stamp, exposure, gain) and |
 |                    | what the tanker announced, what the pod's light began to show                      |
 | estimates.parquet  | every field of `NavSolution`; all numbers as 64-bit floats                         |
-| navigator.json     | of `navigator_recipe`                                                                     |
+| navigator.json     | how to make the navigator again, of `navigator_recipe`                             |
 
 Frames are encoded in a thread of their own: OpenCV releases the interpreter lock meanwhile, so that the control loop
 waits only when the encoder is more than `QUEUE_TICKS` behind. No truth enters these files.

@@ -26,7 +26,7 @@ from dockair.kernels import njit
 from dockair.rotations import Array
 from dockair.sim.camera.mesh_view import MeshView
 from dockair.sim.camera.meshes import Meshes
-from dockair.sim.camera.spans import even
+from dockair.sim.camera.spans import Even, even
 from dockair.triples import Vector, cross
 
 _F = np.float32
@@ -36,7 +36,6 @@ _LANES = 16  # rays that are taken at once
 
 Row = NDArray[np.float32]
 Side = tuple[float, float, float, float]
-Even = tuple[float, float, int]  # evenly spaced tangents: the first, how many there are in 1, their number
 Line = tuple[np.float32, np.float32]  # value at x = 0 and slope; or volume and near plane
 
 

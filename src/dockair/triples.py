@@ -10,25 +10,25 @@ Vector = tuple[float, float, float]
 
 @njit(cache=True)
 def dot(a: Vector, b: Vector) -> float:
-    """A' b."""
+    """Scalar product a' b."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @njit(cache=True)
 def cross(a: Vector, b: Vector) -> Vector:
-    """A x b."""
+    """Vector product a x b."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 @njit(cache=True)
 def plus(a: Vector, k: float, b: Vector) -> Vector:
-    """A + k b."""
+    """Sum a + k b."""
     return a[0] + k * b[0], a[1] + k * b[1], a[2] + k * b[2]
 
 
 @njit(cache=True)
 def unit(a: Vector) -> tuple[Vector, float]:
-    """A / |a| and |a|; of zero, zero."""
+    """Direction a / |a| and length |a|; of zero, zero."""
     length = math.sqrt(dot(a, a))
     k = 1.0 / max(length, 1e-300)
     return (k * a[0], k * a[1], k * a[2]), length
