@@ -38,6 +38,7 @@ from dockair.nav.guidance.predictive import Predictive
 from dockair.nav.guidance.slack_hose import SlackHose
 from dockair.nav.guidance.stabilised_axes import StabilisedAxes
 from dockair.nav.guidance.take_in import TakeIn
+from dockair.nav.guidance.trail_position import TrailPosition
 from dockair.rotations import Array
 
 __all__ = ["Guidance", "GuidanceSettings", "PhaseLimits", "RelativeState"]
@@ -84,6 +85,13 @@ class Guidance:
         self._is_evading = self._is_recalled = False
         self._evasion = Evasion(settings, self._dt)
         self._hose = SlackHose(settings.limits, self._dt)
+        self._trail = TrailPosition(
+            gain_m_s=settings.trail_gain_m_s,
+            speed_max_m_s=settings.trail_speed_max_m_s,
+            before_s=settings.trail_before_s,
+            limits=settings.limits,
+            step_s=self._dt,
+        )
 
     def announce(self, announcement: TankerAnnouncement) -> None:
         """Take note of what the tanker is about to do."""
@@ -108,7 +116,9 @@ class Guidance:
         self._observe(state, ring, rate)
         self._reckon(state, ring)
         self._count(state, ring, rate, lateral_m)
-        self._hose.step(self.phase, coupling, coupling - ring, seen=state.usable and not self._coasts(state))
+        seen = state.usable and not self._coasts(state)
+        self._hose.step(self.phase, coupling, coupling - ring, seen=seen)
+        self._trail.step(self.phase, coupling, coupling - ring, seen=seen)
         situation = self._situation(state, ring, rate, coupling, lateral_m)
         before = self.phase
         self._change_phase(situation)
@@ -335,6 +345,8 @@ class Guidance:
         target = self._reckoning.drift_m_s.copy() if lost else self._controller.drift_m_s
         if touching or about_it:
             target[0] = steady[0]
+        if touching:
+            target[1:] += self._trail.across_m_s
         if self._path.is_announced and touching:  # the drogue has come along
             target += self._axes.turned(np.array([self._take_in.pushed_in_m, 0.0, 0.0]))
         if self.phase in (Phase.CONTACT, Phase.HOLD):

@@ -80,6 +80,11 @@ class GuidanceSettings:
     #: In a hold, on into the refuelling range and back from its inner limit: some three times what a drift that is held
     #: on the probe was seen to err by (0.14 m/s), and 0.3 m until it stands again.
     regain_speed_m_s: float = 0.4
+    #: k of `trail_position`, per radian. A drogue held aside turns by 3 to 9 degrees a metre: back within 1 to 3 s, and
+    #: a drift that is held wrongly by 0.15 m/s leaves 0.2 to 0.5 m. Of twice that little more is to be had.
+    trail_gain_m_s: float = 6.0
+    trail_speed_max_m_s: float = 0.6  # v_max: half of what it comes in with
+    trail_before_s: float = 6.0  # two swings
     course_gain_1_s: float = 1.2  # how fast a course without a view of the drogue is taken up
     #: Down, from a drogue that has come off the probe sideways or out of view: its hose may whip. Breakaway practice is
     #: back and down; how far is assumed: of 18 flights with a dead reel that nobody noticed none met the hose, of 32

@@ -461,6 +461,27 @@ def test_from_a_slack_hose_it_goes_down_though_it_holds_already():
     assert min(down) < -1.0
 
 
+@pytest.mark.parametrize("phase", [Phase.CONTACT, Phase.HOLD, Phase.DISCONNECT])
+def test_with_the_drogue_on_the_probe_it_goes_to_where_the_hose_trails_until_it_is_off(phase):
+    """A drogue that points up is held too low."""
+    guidance = Guidance(SETTINGS, RATE_HZ)
+    for _ in range(RATE_HZ):
+        guidance.step(state([-DEPTH_M, 0.0, 0.0]))
+        guidance.phase = Phase.APPROACH
+    up = []
+    for _ in range(3 * RATE_HZ):
+        guidance.phase = phase
+        up.append(guidance.step(turned([-DEPTH_M, 0.0, 0.0], -3.0)).velocity_m_s[2])
+    expected = SETTINGS.trail_gain_m_s * np.radians(3.0)
+    assert (
+        up[-1] == pytest.approx(expected, rel=0.1) and abs(up[round(SETTINGS.limits.slack_to_s * RATE_HZ) - 2]) < 1e-6
+    )
+    for _ in range(3 * RATE_HZ):
+        guidance.phase = Phase.DISCONNECT
+        away = guidance.step(turned([0.1, 0.0, 0.0], -3.0)).velocity_m_s[2]
+    assert abs(away) < 0.1 * expected
+
+
 def test_that_a_drogue_slipped_off_is_forgotten_by_the_next_attempt():
     """It slips off, the camera stops for the whole way back; a later approach that comes back from the coupling."""
     guidance = on_the_probe(Phase.CONTACT)

@@ -15,6 +15,7 @@ from dockair.nav.guidance.phases import PhaseLimits
 from dockair.scenarios.reproduce import (
     guidance_foretelling,
     guidance_path_plan,
+    guidance_release,
     guidance_slack_hose,
     heading_oval,
     heading_pairs,
@@ -200,6 +201,18 @@ def test_the_drogue_turns_its_nose_down_on_a_slack_hose_and_hardly_on_a_taut_one
     assert slack["contacts"] == slack["told_slack"] == taut["contacts"] == 1 and taut["told_slack"] == 0
     assert taut["most_tilt_deg"] < 0.5 * limit_deg and slack["least_tilt_deg"] > 1.1 * limit_deg
     assert slack["least_drop_deg"] > 0.0
+
+
+def test_a_drogue_that_is_brought_back_to_where_it_trails_is_let_go_without_the_tip_leaving_over_the_rim(
+    less, tmp_path
+):
+    """Seed 28471, whose drogue is 2.5 m aside after ten seconds on the probe."""
+    less(guidance_release, _FIRST_SEED=28471, SEEDS=1, GAINS_M_S=(0.0, 6.0))
+    left, brought_back = (row["ours"] for row in made("guidance/release", tmp_path).values())
+    assert left["released"] == brought_back["released"] == 1
+    assert left["most_aside_m"] > 2.0 and left["most_speed_m_s"] > 3.0 and left["most_off_axis_m"] > 0.25
+    assert brought_back["most_aside_m"] < 0.8 and brought_back["most_speed_m_s"] < 1.5
+    assert brought_back["most_off_axis_m"] < 0.22
 
 
 def test_a_pair_of_pictures_shows_the_pixels_of_a_degree_that_the_lens_makes(anew, less, tmp_path):
