@@ -26,10 +26,9 @@ MADE_BY = {
     "test_reproduce_pose.py": ("pose/divergence", "pose/efficiency", "pose/frontal", "pose/opencv"),
     "test_reproduce_small.py": (
         "guidance/foretelling", "guidance/path-plan", "guidance/release", "guidance/slack-hose", "heading/fig2",
-        "heading/fig8", "heading/fig9-11", "image/frames", "image/identification", "measurement-model/fit", "pose/fig21",
-        "pose/fig22",
-        "pose/fig23-25", "pose/table3", "world/contact", "world/large-swing", "world/reel", "world/velocity-hold",
-        "world/whip",
+        "heading/fig8", "heading/fig9-11", "image/frames", "image/identification", "measurement-model/fit",
+        "pose/fig21", "pose/fig22", "pose/fig23-25", "pose/table3", "world/contact", "world/large-swing", "world/reel",
+        "world/velocity-hold", "world/whip",
     ),
     "test_reproduce_world_air.py": ("world/bow-wave", "world/wake"),
     "test_reproduce_world_gusts.py": ("world/excursions", "world/gusts"),
