@@ -55,6 +55,7 @@ class PhaseLimits:
     slack_over_s: float = 0.12  # ... for so long at least, ...
     slack_to_s: float = 0.5  # ... until then: half of the time that it takes to be torn off
     slack_before_s: float = 1.0  # and before contact over so long: a third of a swing
+    slack_far_rad: float = 0.28  # 16 degrees: turned by more than this later, for `slack_over_s`, it is slack, too
     take_in_m: float = 2.5  # inside the refuelling range 0.5-6 m (KDC-10 procedures), 1.5 m from where fuel flows here
     taken_in: float = 0.9  # of that way when holding begins: the receiver comes to rest on the remaining tenth
     hold_s: float = 5.0  # under a green light; assumed: long enough to see that the drogue stays on the probe

@@ -14,6 +14,10 @@ medians are a blow's that has lasted, it has come back meanwhile.
 
 Nothing is said where the drogue has not been seen on the probe for half of that time.
 
+Some slack hoses lie straight for all of it. Later, as long as the drogue is pushed in or held, it is told by a drogue
+that stays turned by more than any taut hose turns it once the receiver goes back to where it trails
+(`trail_position`).
+
 Not modelled: a reel that takes up late or slowly; a coupling that does not let the drogue turn.
 """
 
@@ -25,6 +29,7 @@ from dockair.nav.guidance.phases import Phase, PhaseLimits, is_off_the_probe, is
 from dockair.rotations import Array
 
 _BEFORE = (Phase.JOIN_UP, Phase.PRE_CONTACT, Phase.APPROACH)
+_HOLDING = (Phase.CONTACT, Phase.HOLD)
 
 
 class SlackHose:
@@ -40,6 +45,7 @@ class SlackHose:
         self._before: deque[Array] = deque(maxlen=round(limits.slack_before_s / step_s))
         self._contact_s = -np.inf  # since contact; -inf before it
         self._turns_rad: list[tuple[float, float]] = []  # since the blow was over, where it was seen on the probe
+        self._far_s = 0.0  # for which the drogue has been turned far, later
         self.is_slack = False  #: nothing takes up the hose
 
     def step(self, phase: Phase, coupling: Array, along: Array, *, seen: bool) -> None:
@@ -53,7 +59,7 @@ class SlackHose:
         """
         self._contact_s += self._step_s
         if phase in _BEFORE:
-            self._contact_s, self.is_slack = -np.inf, False
+            self._contact_s, self._far_s, self.is_slack = -np.inf, 0.0, False
             self._turns_rad.clear()
             if seen:
                 self._before.append(along)
@@ -61,10 +67,21 @@ class SlackHose:
         limits, ahead_m, beside_m = self._limits, float(coupling[0]), float(np.hypot(coupling[1], coupling[2]))
         if self._contact_s == -np.inf and (phase is Phase.CONTACT or is_reached(limits, ahead_m, beside_m)):
             self._contact_s = 0.0
-        if self.is_slack or not limits.slack_from_s <= self._contact_s <= limits.slack_to_s:
+        if self.is_slack or self._contact_s < limits.slack_from_s:
             return
-        if seen and self._before and not is_off_the_probe(limits, ahead_m, beside_m):
-            self._turns_rad.append(turn_rad(along, np.sum(self._before, axis=0)))
+        on_the_probe = seen and bool(self._before) and not is_off_the_probe(limits, ahead_m, beside_m)
+        turn = turn_rad(along, np.sum(self._before, axis=0)) if on_the_probe else None
+        if self._contact_s <= limits.slack_to_s:
+            self._look(turn)
+        elif phase in _HOLDING and turn is not None:
+            self._far_s = self._far_s + self._step_s if turn[1] > limits.slack_far_rad else 0.0
+            self.is_slack = self._far_s >= limits.slack_over_s
+
+    def _look(self, turn: tuple[float, float] | None) -> None:
+        """Eq. (1), and whether it says that the hose is slack."""
+        limits = self._limits
+        if turn is not None:
+            self._turns_rad.append(turn)
         looked = round((self._contact_s - limits.slack_from_s) / self._step_s) + 1
         if looked >= round(limits.slack_over_s / self._step_s) and len(self._turns_rad) >= 0.5 * looked:
             drop_rad, tilt_rad = np.median(self._turns_rad, axis=0)

@@ -93,6 +93,46 @@ def test_the_drogue_s_own_attitude_of_the_last_second_is_what_it_turns_from():
     assert told(lambda t: 0.0, before=lambda t: -8.0).any()
 
 
+FAR_DEG = np.degrees(LIMITS.slack_far_rad)
+
+
+@pytest.mark.parametrize("phase", [Phase.CONTACT, Phase.HOLD])
+@pytest.mark.parametrize("to", [DOWN, UP, LEFT])
+def test_a_hose_that_lay_straight_at_first_is_told_later_by_a_drogue_that_stays_turned_far(phase, to):
+    """As 27935 of dead_reel_drawn_hoses, turned by 19 degrees from 0.8 s on."""
+    assert late(lambda t: FAR_DEG + 1.0 if t > 0.8 else 0.0, phase=phase, to=to) == pytest.approx(
+        0.8 + LIMITS.slack_over_s, abs=2 * STEP_S
+    )
+    assert late(lambda t: FAR_DEG - 1.0, phase=phase, to=to) is None
+
+
+def test_of_a_drogue_that_turns_far_for_a_moment_nothing_is_said():
+    assert late(lambda t: FAR_DEG + 10.0 if t % 0.2 < LIMITS.slack_over_s - 2 * STEP_S else 0.0) is None
+
+
+def test_frames_that_are_missing_meanwhile_neither_count_nor_begin_it_anew():
+    gap_s = 0.2
+    told_s = late(lambda t: FAR_DEG + 5.0 if t > 0.8 else 0.0, seen=lambda t: not 0.85 < t <= 0.85 + gap_s)
+    assert told_s == pytest.approx(0.8 + LIMITS.slack_over_s + gap_s, abs=2 * STEP_S)
+
+
+@pytest.mark.parametrize("phase", [Phase.DISCONNECT, Phase.BACK_OFF, Phase.BREAKAWAY])
+def test_on_the_way_back_a_drogue_may_turn_far(phase):
+    assert late(lambda t: FAR_DEG + 5.0 if t > 0.8 else 0.0, phase=phase) is None
+
+
+def late(degrees, *, phase=Phase.HOLD, seen=lambda t: True, to=DOWN):
+    """When the hose was told slack after `slack_to_s`, up to which the drogue lay as before; None: never."""
+    hose = SlackHose(LIMITS, STEP_S)
+    for t in np.arange(-BEFORE_S, 3.0, STEP_S):
+        flown = Phase.APPROACH if t < 0.0 else Phase.CONTACT if t <= LIMITS.slack_to_s else phase
+        turn_deg = degrees(t) if t > LIMITS.slack_to_s + STEP_S else 0.0
+        hose.step(flown, np.array([max(-t, 0.0), 0.0, 0.0]), turned(turn_deg, to), seen=t < 0.0 or seen(t))
+        if hose.is_slack:
+            return t
+    return None
+
+
 def test_nothing_is_said_of_a_drogue_that_was_hardly_seen_or_was_not_on_the_probe():
     half_s = LIMITS.slack_from_s + 0.5 * LIMITS.slack_over_s
     assert told(lambda t: 10.0, seen=lambda t: t < half_s + STEP_S).any()
