@@ -21,15 +21,14 @@ Not modelled: that a long hose's overtones are lower by more than its swing is; 
 felt. On hoses and drogues drawn at random each of these would leave up to 7 % less unforeseen.
 """
 
-from collections.abc import Callable
-
 import numpy as np
 
+from dockair.kernels import njit
 from dockair.nav.guidance.drogue_motion import DrogueMotion
 from dockair.nav.guidance.swing_model import SwingSettings
 from dockair.rotations import Array
 
-_LEAST = 1e-3  # of all weight: a filter with less than this is followed, but not asked
+_LEAST = 1e-3  # of all weight: a filter with less than this is followed, but has no say
 
 
 class MultipleModels:
@@ -44,7 +43,8 @@ class MultipleModels:
 
     def __init__(self, settings: SwingSettings, step_s: float, lead_s: Array, node_s: float) -> None:
         ratios = np.array(settings.frequency_ratios)
-        self._filters = [DrogueMotion(settings.stiffened(r), step_s, lead_s, node_s) for r in settings.frequency_ratios]
+        hoses = [settings.stiffened(r) for r in settings.frequency_ratios]
+        self._filters = DrogueMotion(hoses, step_s, lead_s, node_s)
         self._usual_rad_s = 2.0 * np.pi * np.array([mode.frequency_hz for mode in settings.modes])  # (modes, 3)
         self._prior = 0.5 * (np.log(ratios) / settings.ratio_sigma) ** 2
         self._kept, self._counts = np.exp(-step_s / settings.ratio_memory_s), step_s / settings.unforeseen_s
@@ -62,7 +62,6 @@ class MultipleModels:
         weights[weights < _LEAST * weights.sum()] = 0.0
         weights /= weights.sum()
         self._weights: Array = weights
-        self._asked = [(float(w), motion) for w, motion in zip(weights, self._filters, strict=True) if w > 0.0]
 
     @property
     def frequency_ratio(self) -> float:
@@ -71,13 +70,11 @@ class MultipleModels:
 
     def start(self, place_m: Array, velocity_m_s: Array) -> None:
         """Begin anew, at rest but for the swing; (3,) each. The hose is the one it was."""
-        for motion in self._filters:
-            motion.start(place_m, velocity_m_s)
+        self._filters.start(place_m, velocity_m_s)
 
     def resume(self, place_m: Array) -> None:
         """Begin anew at a place (3,) where it comes into view again, whatever the swing; the drift stays as learnt."""
-        for motion in self._filters:
-            motion.resume(place_m)
+        self._filters.resume(place_m)
 
     def step(self, place_m: Array | None, push_m_s2: Array, blown_m_s: Array) -> None:
         """Advance by one control period.
@@ -87,26 +84,27 @@ class MultipleModels:
             push_m_s2: (3,) b.
             blown_m_s: (3,) dw over the period.
         """
-        for motion in self._filters:
-            motion.step(place_m, push_m_s2, blown_m_s)
-        if place_m is not None and len(self._filters) > 1:
-            unforeseen = np.array([motion.unforeseen[:, 1:] for motion in self._filters])
+        self._filters.step(place_m, push_m_s2, blown_m_s)
+        if place_m is not None and len(self._weights) > 1:
             self._count = self._kept * self._count + self._counts  # (1)
-            self._sums = self._kept * self._sums + self._counts * unforeseen
+            self._sums = self._kept * self._sums + self._counts * self._filters.unforeseen[..., 1:]
             self._weigh()
 
-    def _mean(self, ask: Callable[[DrogueMotion], Array]) -> Array:
-        return np.asarray(sum(weight * ask(motion) for weight, motion in self._asked))
+    def _mean(self, of_each: Array) -> Array:
+        """Mean of (hoses, ...) by the weights."""
+        out = np.zeros(of_each.shape[1:])
+        _add_weighted(self._weights, of_each.reshape(len(of_each), -1), out.reshape(-1))
+        return out
 
     @property
     def drift_m_s(self) -> Array:
         """(3,) velocity without the swing."""
-        return self._mean(lambda motion: motion.drift_m_s)
+        return self._mean(self._filters.drift_m_s)
 
     @property
     def middle_m(self) -> Array:
         """(3,) m: the place without the swing."""
-        return self._mean(lambda motion: motion.middle_m)
+        return self._mean(self._filters.middle_m)
 
     @property
     def swing_m_s2(self) -> Array:
@@ -114,7 +112,7 @@ class MultipleModels:
 
         By its own frequencies a slow swing would ask for less; but on a long hose gusts do more that nobody foresees.
         """
-        return self._mean(lambda motion: motion.swing_m_s2(self._usual_rad_s))
+        return self._mean(self._filters.swing_m_s2(self._usual_rad_s))
 
     def ahead(self, push_m_s2: Array, push_then_m_s2: Array) -> Array:
         """(3, 3) place [m], velocity [m/s] and acceleration [m/s^2] after the lead time, a row each.
@@ -123,7 +121,7 @@ class MultipleModels:
             push_m_s2: (3,) b now; until then it changes steadily, and the swing does not answer to it yet.
             push_then_m_s2: (3,) b after the lead time.
         """
-        return self._mean(lambda motion: motion.ahead(push_m_s2, push_then_m_s2))
+        return self._mean(self._filters.ahead(push_m_s2, push_then_m_s2))
 
     def path(self, push_m_s2: Array) -> Array:
         """(n, 3) places [m] at the nodes after the lead time.
@@ -131,12 +129,21 @@ class MultipleModels:
         Args:
             push_m_s2: (n + 2, 3) b now, after the lead time and at the nodes; in between it changes steadily.
         """
-        return self._mean(lambda motion: motion.path(push_m_s2))
+        return self._mean(self._filters.path(push_m_s2))
 
     def mean_path(self, nodes: int) -> Array:
         """(nodes, 3) the same without the swing: drift alone."""
-        return self._mean(lambda motion: motion.mean_path(nodes))
+        return self._mean(self._filters.mean_path(nodes))
 
     def mean_ahead(self) -> Array:
         """(3, 3) place, velocity and acceleration after the lead time without the swing: drift alone."""
-        return self._mean(lambda motion: motion.mean_ahead())
+        return self._mean(self._filters.mean_ahead())
+
+
+@njit(cache=True)
+def _add_weighted(weights: Array, values: Array, out: Array) -> None:
+    """Add (n, m) times weights (n,) to (m,)."""
+    for k in range(len(weights)):
+        if weights[k] > 0.0:
+            for i in range(len(out)):
+                out[i] += weights[k] * values[k, i]

@@ -27,6 +27,7 @@ import numpy as np
 
 from dockair.nav.guidance.phases import Phase, PhaseLimits, is_off_the_probe, is_reached
 from dockair.rotations import Array
+from dockair.vectors import cross
 
 _BEFORE = (Phase.JOIN_UP, Phase.PRE_CONTACT, Phase.APPROACH)
 _HOLDING = (Phase.CONTACT, Phase.HOLD)
@@ -43,6 +44,7 @@ class SlackHose:
     def __init__(self, limits: PhaseLimits, step_s: float) -> None:
         self._limits, self._step_s = limits, step_s
         self._before: deque[Array] = deque(maxlen=round(limits.slack_before_s / step_s))
+        self._rest: Array | None = None  # their sum, made once they are all there
         self._contact_s = -np.inf  # since contact; -inf before it
         self._turns_rad: list[tuple[float, float]] = []  # since the blow was over, where it was seen on the probe
         self._far_s = 0.0  # for which the drogue has been turned far, later
@@ -63,14 +65,17 @@ class SlackHose:
             self._turns_rad.clear()
             if seen:
                 self._before.append(along)
+                self._rest = None
             return
         limits, ahead_m, beside_m = self._limits, float(coupling[0]), float(np.hypot(coupling[1], coupling[2]))
         if self._contact_s == -np.inf and (phase is Phase.CONTACT or is_reached(limits, ahead_m, beside_m)):
             self._contact_s = 0.0
         if self.is_slack or self._contact_s < limits.slack_from_s:
             return
-        on_the_probe = seen and bool(self._before) and not is_off_the_probe(limits, ahead_m, beside_m)
-        turn = turn_rad(along, np.sum(self._before, axis=0)) if on_the_probe else None
+        if self._rest is None:
+            self._rest = np.sum(self._before, axis=0) if self._before else None
+        on_the_probe = seen and not is_off_the_probe(limits, ahead_m, beside_m)
+        turn = turn_rad(along, self._rest) if on_the_probe and self._rest is not None else None
         if self._contact_s <= limits.slack_to_s:
             self._look(turn)
         elif phase in _HOLDING and turn is not None:
@@ -97,7 +102,8 @@ def turn_rad(along: Array, before: Array) -> tuple[float, float]:
         along: (3,) the axis, forward, of any length; z up.
         before: (3,) the same before contact.
     """
-    angle_rad = np.arctan2(np.linalg.norm(np.cross(along, before)), along @ before)
+    across = cross(along, before)
+    angle_rad = np.arctan2(np.sqrt(across @ across), along @ before)
     return _elevation_rad(before) - _elevation_rad(along), float(angle_rad)
 
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from dockair.nav.guidance.drogue_motion import DrogueMotion
+from dockair.nav.guidance.multiple_models import MultipleModels
 from dockair.nav.guidance.path_plan import PathPlan, PlanSettings
 from dockair.nav.guidance.swing_model import HoseMode, SwingSettings
 from dockair.rotations import Array
@@ -35,6 +35,7 @@ _SIZE_IN, _DPI = (7.0, 4.6), 110
 SWING = HoseMode(frequency_hz=(0.44, 0.31, 0.45), damping=(0.5, 0.05, 0.12), gust_density=(0.7, 1.3, 3.0))
 GUST_TIME_S = (1.2, 0.7, 1.2)
 _SETTINGS = SwingSettings(
+    frequency_ratios=(1.0,),  # the hose is known here
     modes=(SWING,),
     gust_time_s=GUST_TIME_S,
     rattle_density=(0.0,) * 3,
@@ -74,7 +75,7 @@ def missed(way: Way, seed: int) -> Array:
     places, rates = drogue(rng)
     seen = places + _PLACE_SIGMA_M * rng.standard_normal(places.shape)
     plan = PlanSettings(half_way_s=0.0)  # the moment is all that is asked for here
-    motion = DrogueMotion(_SETTINGS, _STEP_S, _RESPONSE_S, plan.node_s)
+    motion = MultipleModels(_SETTINGS, _STEP_S, _RESPONSE_S, plan.node_s)
     motion.start(seen[0], rates[0])
     plans = [PathPlan(plan, a, j) for a, j in zip(way.acceleration_m_s2, way.jerk_m_s3, strict=True)]
     contacts_s = np.arange(_FIRST_S, _FLIGHT_S, _EVERY_S)

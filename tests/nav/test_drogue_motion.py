@@ -21,9 +21,24 @@ SWING = SwingSettings(  # alone, for what has a closed form for one mode only
 )
 
 
+class OneHose:
+    """The filter of a single hose."""
+
+    def __init__(self, settings, *rest):
+        self._of_hoses = DrogueMotion((settings,), *rest)
+
+    def __getattr__(self, name):
+        found = getattr(self._of_hoses, name)
+        return found[0] if isinstance(found, np.ndarray) else lambda *given: _first(found(*given))
+
+
+def _first(of_hoses):
+    return None if of_hoses is None else of_hoses[0]
+
+
 def follow(path, rate, seconds):
     """Feed exact places, and the rate at the start; return time and filter at the end."""
-    motion = DrogueMotion(SwingSettings(), STEP_S, LEAD_S, 0.1)
+    motion = OneHose(SwingSettings(), STEP_S, LEAD_S, 0.1)
     motion.start(path(0.0), rate(0.0))
     for k in range(1, round(seconds / STEP_S) + 1):
         motion.step(path(k * STEP_S), CALM, STILL)
@@ -36,7 +51,7 @@ def test_known_modes_are_continued_by_their_closed_form():
     omega = 2.0 * np.pi * np.array([mode.frequency_hz for mode in settings.modes])
     zeta = np.array([mode.damping for mode in settings.modes])
     pole = -zeta * omega + 1j * omega * np.sqrt(1.0 - zeta**2)
-    motion = DrogueMotion(settings, STEP_S, LEAD_S, 0.1)
+    motion = OneHose(settings, STEP_S, LEAD_S, 0.1)
     for n in (0, 1):
         motion._x[:, 2 + n : -1 : 2] = (0.1 * pole**n * np.exp(pole * t)).real.T
     for n, predicted in enumerate(motion.ahead(CALM, CALM)):
@@ -49,7 +64,7 @@ def test_the_path_of_known_modes_is_their_sum():
     omega = 2.0 * np.pi * np.array([mode.frequency_hz for mode in settings.modes])
     zeta = np.array([mode.damping for mode in settings.modes])
     pole = -zeta * omega + 1j * omega * np.sqrt(1.0 - zeta**2)
-    motion = DrogueMotion(settings, STEP_S, LEAD_S, node_s)
+    motion = OneHose(settings, STEP_S, LEAD_S, node_s)
     for n in (0, 1):
         motion._x[:, 2 + n : -1 : 2] = (0.1 * pole**n * np.exp(pole * t)).real.T
     nodes = t + LEAD_S + node_s * np.arange(1, 6)[:, np.newaxis]
@@ -61,7 +76,7 @@ def test_what_was_known_of_the_drift_stays_known_where_the_swing_is_begun_anew()
     """At rest for 20 s, then seen again in a swing of 2 m: as a drift that is not known, 0.8 m/s were learnt."""
     omega, up, most = 2.0 * np.pi * SwingSettings().modes[0].frequency_hz[2], np.array([0.0, 0.0, 1.0]), {}
     for sigma_m_s in (SwingSettings().drift_kept_sigma_m_s, SwingSettings().drift_sigma_m_s):
-        motion = DrogueMotion(replace(SwingSettings(), drift_kept_sigma_m_s=sigma_m_s), STEP_S, LEAD_S, 0.1)
+        motion = OneHose(replace(SwingSettings(), drift_kept_sigma_m_s=sigma_m_s), STEP_S, LEAD_S, 0.1)
         motion.start(CALM, CALM)
         for _ in range(2000):
             motion.step(CALM, CALM, STILL)
@@ -95,20 +110,20 @@ def test_the_middle_of_a_swing_is_where_it_swings_about():
 
 def test_a_push_that_is_known_is_part_of_the_prediction():
     """From rest, b growing from 1 to 3 m/s^2 over the lead: tau^2 (1/3 + 3/6) of way, tau 2 of velocity."""
-    motion = DrogueMotion(SwingSettings(), STEP_S, LEAD_S, 0.1)
+    motion = OneHose(SwingSettings(), STEP_S, LEAD_S, 0.1)
     place, velocity, acceleration = motion.ahead(np.full(3, 1.0), np.full(3, 3.0))
     np.testing.assert_allclose(place, LEAD_S**2 * (1.0 / 3.0 + 0.5), rtol=1e-12)
     np.testing.assert_allclose(velocity, 2.0 * LEAD_S, rtol=1e-12)
     np.testing.assert_allclose(acceleration, 3.0, rtol=1e-12)
     node_s = 1e-6  # the path begins there
     pushes = np.repeat([1.0, 3.0, 3.0, 3.0], 3).reshape(-1, 3)
-    path = DrogueMotion(SwingSettings(), STEP_S, LEAD_S, node_s).path(pushes)
+    path = OneHose(SwingSettings(), STEP_S, LEAD_S, node_s).path(pushes)
     np.testing.assert_allclose(path[0], place, rtol=1e-4)
     np.testing.assert_allclose((path[1] - path[0]) / node_s, velocity, rtol=1e-4)
 
 
 def test_a_steady_push_bends_the_swing_by_its_own_stiffness():
-    motion = DrogueMotion(SwingSettings(), STEP_S, LEAD_S, 0.1)
+    motion = OneHose(SwingSettings(), STEP_S, LEAD_S, 0.1)
     push = np.array([0.0, 0.5, -0.3])
     for _ in range(12_000):
         motion.step(None, push, STILL)
@@ -137,7 +152,7 @@ def test_prediction_is_as_good_as_its_own_covariance_says():
         for _ in range(lead[axis]):
             P = F[-1] @ P @ F[-1].T + Q
         expected.append(place @ P @ place)
-    x, true, motion, predicted = np.zeros((3, states)), [], DrogueMotion(settings, STEP_S, LEAD_S, 0.1), []
+    x, true, motion, predicted = np.zeros((3, states)), [], OneHose(settings, STEP_S, LEAD_S, 0.1), []
     for _ in range(ticks):
         kick = np.sqrt(STEP_S) * densities * rng.standard_normal((3, states))
         x = np.stack([F[i] @ x[i] for i in range(3)]) + kick
@@ -154,7 +169,7 @@ def test_prediction_is_as_good_as_its_own_covariance_says():
 def test_what_the_tip_feels_is_part_of_the_prediction():
     """Up, each mode's rate changes at once by its share of what was felt, and a gust that goes on, by its own."""
     settings, felt = SwingSettings(), np.array([0.3, 0.2, 0.1])
-    motion, axis = DrogueMotion(settings, STEP_S, np.full(3, 0.3), 0.1), 2
+    motion, axis = OneHose(settings, STEP_S, np.full(3, 0.3), 0.1), 2
     motion.step(None, CALM, felt)
     omega = np.array([2.0 * np.pi * mode.frequency_hz[axis] for mode in settings.modes])
     zeta = np.array([mode.damping[axis] for mode in settings.modes])
@@ -199,7 +214,7 @@ def test_it_learns_a_large_drift_within_two_swings():
 
 
 def test_unseen_it_goes_on_by_the_model():
-    motion = DrogueMotion(SwingSettings(), STEP_S, LEAD_S, 0.1)
+    motion = OneHose(SwingSettings(), STEP_S, LEAD_S, 0.1)
     motion._x[:, 0], motion._x[:, 1] = 1.0, 0.1
     for _ in range(100):
         motion.step(None, CALM, STILL)
@@ -211,7 +226,7 @@ def test_unseen_it_goes_on_by_the_model():
 def test_the_path_goes_on_from_the_prediction_by_the_swing_s_own_equation():
     """Against scipy's integration of Eq. (1) with a push that changes steadily between the nodes."""
     settings, node_s, axis = SWING, 0.1, 1
-    motion = DrogueMotion(settings, STEP_S, LEAD_S, node_s)
+    motion = OneHose(settings, STEP_S, LEAD_S, node_s)
     motion.start(np.array([4.0, 0.1, -0.2]), np.array([0.0, 0.4, 0.3]))
     for k in range(300):
         t = k * STEP_S
@@ -233,7 +248,7 @@ def test_the_path_goes_on_from_the_prediction_by_the_swing_s_own_equation():
 
 
 def test_the_mean_path_is_the_drift_alone():
-    motion = DrogueMotion(SwingSettings(), STEP_S, LEAD_S, 0.1)
+    motion = OneHose(SwingSettings(), STEP_S, LEAD_S, 0.1)
     motion.start(np.array([4.0, 0.0, 0.0]), np.zeros(3))
     for k in range(3000):
         motion.step(np.array([4.0, 0.2 * k * STEP_S, 0.0]), CALM, STILL)
@@ -254,7 +269,7 @@ def test_the_filter_answers_as_fast_at_another_control_rate(axis):
     """Poles of its error, (I - K H) F, as rates [1/s]: the noise of what is seen is white, not one of ticks."""
 
     def poles_1_s(hz):
-        motion = DrogueMotion(SwingSettings(), 1.0 / hz, LEAD_S, 0.1)
+        motion = OneHose(SwingSettings(), 1.0 / hz, LEAD_S, 0.1)
         for _ in range(60 * hz):
             motion.step(CALM, CALM, STILL)
         P = motion._P[axis]
@@ -272,7 +287,7 @@ def test_with_gaps_it_is_the_kalman_filter_of_another_program():
     Of places that scatter by 0.1 m and are told to be known to 1 mm both lose digits, filterpy's more: 2 and 20 mm.
     """
     settings, rng = replace(SwingSettings(), position_sigma_m=(0.02, 0.002, 0.002)), np.random.default_rng(4)
-    motion, others = DrogueMotion(settings, STEP_S, LEAD_S, 0.1), []
+    motion, others = OneHose(settings, STEP_S, LEAD_S, 0.1), []
     motion.start(np.array([4.0, 0.1, -0.2]), np.array([0.0, 0.4, 0.3]))
     for axis in range(3):
         other = KalmanFilter(dim_x=9, dim_z=1, dim_u=1)
@@ -299,7 +314,7 @@ def test_with_gaps_it_is_the_kalman_filter_of_another_program():
 def test_a_drogue_that_whips_about_and_is_seen_in_glimpses_does_not_lead_it_far_away():
     """Places a metre about that no model foresees, in glimpses: gains of steady sight made 250 km of them."""
     rng = np.random.default_rng(5)
-    motion, farthest = DrogueMotion(SwingSettings(), STEP_S, LEAD_S, 0.1), 0.0
+    motion, farthest = OneHose(SwingSettings(), STEP_S, LEAD_S, 0.1), 0.0
     motion.start(np.array([4.0, 0.0, 0.0]), np.zeros(3))
     for _ in range(100):
         place = [4.0, 0.0, 0.0] + rng.uniform(-1.0, 1.0, 3)

@@ -44,7 +44,7 @@ def foretell(motion, places):
 
 def test_with_one_ratio_it_is_the_filter_itself():
     alone, one, rng = (
-        DrogueMotion(SwingSettings(), STEP_S, LEAD_S, NODE_S),
+        DrogueMotion((SwingSettings(),), STEP_S, LEAD_S, NODE_S),
         MultipleModels(KNOWN, STEP_S, LEAD_S, NODE_S),
         np.random.default_rng(1),
     )
@@ -57,7 +57,7 @@ def test_with_one_ratio_it_is_the_filter_itself():
             motion.step(place if k % 5 else None, push[0], felt)
     assert one.frequency_ratio == 1.0
     omega = 2.0 * np.pi * np.array([mode.frequency_hz for mode in KNOWN.modes])
-    np.testing.assert_array_equal(one.swing_m_s2, alone.swing_m_s2(omega))
+    np.testing.assert_array_equal(one.swing_m_s2, alone.swing_m_s2(omega)[0])
     for ask in (
         lambda motion: motion.drift_m_s,
         lambda motion: motion.middle_m,
@@ -66,7 +66,7 @@ def test_with_one_ratio_it_is_the_filter_itself():
         lambda motion: motion.mean_path(5),
         lambda motion: motion.mean_ahead(),
     ):
-        np.testing.assert_array_equal(ask(one), ask(alone))
+        np.testing.assert_array_equal(ask(one), ask(alone)[0])
 
 
 @pytest.mark.parametrize("ratio", [0.7, 1.0, 1.4])
@@ -166,18 +166,18 @@ def test_what_was_learnt_of_the_hose_stays_while_the_drogue_is_not_seen_and_when
 def test_what_is_unforeseen_is_told_with_its_variance():
     """nu and S of the first place seen, with any moment's covariance."""
     settings, begin, seen = SwingSettings(), np.array([4.0, 0.1, -0.2]), np.array([3.9, 0.15, 0.1])
-    motion = DrogueMotion(settings, STEP_S, LEAD_S, NODE_S)
+    motion = DrogueMotion((settings,), STEP_S, LEAD_S, NODE_S)
     motion.start(begin, CALM)
     motion.step(seen, CALM, STILL)
     for axis in range(3):
         P = any_moment(settings, axis, settings.drift_sigma_m_s)
         S = PLACE_ROW @ P @ PLACE_ROW + settings.position_sigma_m[axis] ** 2
-        np.testing.assert_allclose(motion.unforeseen[:, axis], [(seen - begin)[axis] ** 2 / S, np.log(S)], rtol=1e-9)
+        np.testing.assert_allclose(motion.unforeseen[0, :, axis], [(seen - begin)[axis] ** 2 / S, np.log(S)], rtol=1e-9)
 
 
 def test_a_slow_swing_is_as_unquiet_as_one_of_the_usual_hose():
     """Of the first mode by 0.2 m: omega^2 s, with the omega of the settings."""
     motion = MultipleModels(replace(SwingSettings(), frequency_ratios=(0.7,)), STEP_S, LEAD_S, NODE_S)
-    motion._filters[0]._x[:, 2] = 0.2
+    motion._filters._x[0, :, 2] = 0.2
     omega = 2.0 * np.pi * np.array(SwingSettings().modes[0].frequency_hz)
     np.testing.assert_allclose(motion.swing_m_s2, 0.2 * omega**2, rtol=1e-12)
