@@ -94,6 +94,7 @@ class AirMotion:
         self._fit = np.ascontiguousarray(np.linalg.pinv(design, rcond=_FLAT))  # Eq. (1)
         self._room: tuple[Array, ...] = (np.zeros((0, 3)),)  # for the places; written anew whenever they are asked for
         self._still = gusts is None and discrete is None and wake is None and bow_wave is None
+        self._tables = (np.empty((0, 7)) if wake is None else wake), (np.empty(0) if bow_wave is None else bow_wave)
 
     def step(self) -> None:
         """Advance by one tick."""
@@ -121,12 +122,8 @@ class AirMotion:
         rolling = 0.0 if self._gusts is None else self._gusts.write_gusts(x_F, x, gust_F)
         if self._discrete is not None:
             gust_F = gust_F + self._discrete.velocity(x_F)
-        if self._wake is not None:
-            write_wake_velocity(places_T, self._wake, wake_T)
-        if self._bow_wave is not None:
-            write_bow_wave_velocity(tow_B, self._bow_wave, bow_B)
         air = np.empty((n + 2, 3))
-        _join(gust_F, wake_T, bow_B, R_WB, R_WT, self._fit, rolling, air)
+        _join(gust_F, *self._tables, places_T, wake_T, tow_B, bow_B, R_WB, R_WT, self._fit, rolling, air)
         return AirState(air[:n], air[n], air[n + 1])
 
     def steady(self) -> "AirMotion":
@@ -167,8 +164,14 @@ def _places(tow_W, points_B, R_WB, p_WB, R_WT, p_WT, exit_T, x_F, places_T, tow_
 
 
 @njit(cache=True)
-def _join(gust_F, wake_T, bow_B, R_WB, R_WT, fit, rolling, out):  # type: ignore[no-untyped-def]
-    """Write air at the tow (n, 3) and at the receiver's centre of gravity in W, its turning about the receiver in B."""
+def _join(gust_F, wake, bow, places_T, wake_T, tow_B, bow_B, R_WB, R_WT, fit, rolling, out):  # type: ignore[no-untyped-def]
+    """Write air at the tow (n, 3) and at the receiver's centre of gravity in W, its turning about the receiver in B.
+
+    Tables of wake and bow wave that are empty are of none; `wake_T` and `bow_B` are room for what they do.
+    """
+    write_wake_velocity(places_T, wake, wake_T)
+    if len(bow) > 0:
+        write_bow_wave_velocity(tow_B, bow, bow_B)
     m = fit.shape[1]
     n = gust_F.shape[0] - m
     level = np.sqrt(R_WT[0, 0] ** 2 + R_WT[1, 0] ** 2)
