@@ -32,7 +32,16 @@ from dockair.nav.guidance.evasion import Evasion
 from dockair.nav.guidance.field_of_view import FieldOfView
 from dockair.nav.guidance.guidance_settings import GuidanceSettings, RelativeState
 from dockair.nav.guidance.phase_clocks import PhaseClocks
-from dockair.nav.guidance.phases import RED_LIGHT, Phase, PhaseLimits, Situation, next_phase
+from dockair.nav.guidance.phases import (
+    GOING_BACK,
+    ON_THE_PROBE,
+    RED_LIGHT,
+    TOUCHING,
+    Phase,
+    PhaseLimits,
+    Situation,
+    next_phase,
+)
 from dockair.nav.guidance.pid import Pid
 from dockair.nav.guidance.predictive import Predictive
 from dockair.nav.guidance.slack_hose import SlackHose
@@ -45,8 +54,6 @@ __all__ = ["Guidance", "GuidanceSettings", "PhaseLimits", "RelativeState"]
 
 _FOLLOWING = (Phase.JOIN_UP, Phase.PRE_CONTACT, Phase.APPROACH, Phase.CLEAR)
 _WAITING = (Phase.JOIN_UP, Phase.PRE_CONTACT)
-_TOUCHING = (Phase.CONTACT, Phase.HOLD, Phase.DISCONNECT)
-_RETREATING = (Phase.DISCONNECT, Phase.BACK_OFF, Phase.BREAKAWAY)
 _EVADE_GAIN_1_S = 4.0  # as quickly as the limits allow
 
 
@@ -132,7 +139,7 @@ class Guidance:
         """Go on with the announced path, and learn from the drogue what it leaves."""
         if state.usable:
             self._place = ring
-        elif self.phase not in _TOUCHING:  # on the probe it stays where it was seen
+        elif self.phase not in TOUCHING:  # on the probe it stays where it was seen
             self._place = self._reckoning.place_m
         going = rate if state.usable else np.zeros(3)
         self._turned = np.array([self._axes.turned(self._place), self._axes.turned(going)])
@@ -144,7 +151,7 @@ class Guidance:
     def _observe(self, state: RelativeState, ring: Array, rate: Array) -> None:
         """Show the drogue to the controller, and its distance from the probe's line to the prediction of the miss."""
         change = np.full(3, np.nan) if self._path.is_announced else self._axes.R_NB @ state.dv_WP_B
-        touches = self.phase in _TOUCHING or (self.phase in (Phase.APPROACH, *_RETREATING) and ring[0] <= 0.0)
+        touches = self.phase in TOUCHING or (self.phase in (Phase.APPROACH, *GOING_BACK) and ring[0] <= 0.0)
         if not state.usable or touches or self._coasts(state):  # a drogue that the probe pushes would lead it astray
             self._controller.observe(None, change)
             self._miss.skip()
@@ -178,7 +185,7 @@ class Guidance:
             self._reckoning.see(ring, controller.middle_m, drift, bearable=bearable)
             return
         frames_come = state.frame_age_s <= self._settings.limits.frames_stop_s
-        not_shown = state.not_shown and frames_come and self.phase not in _TOUCHING
+        not_shown = state.not_shown and frames_come and self.phase not in TOUCHING
         self._reckoning.miss(self._u, self._axes.R_NB, not_shown=not_shown)
 
     def _count(self, state: RelativeState, ring: Array, rate: Array, lateral_m: float) -> None:
@@ -198,7 +205,7 @@ class Guidance:
             self._entered_m = 0.0
         elif self._entered_m == 0.0 and math.isfinite(lateral_m):
             self._entered_m = lateral_m
-        if self.phase in _TOUCHING:
+        if self.phase in TOUCHING:
             self._take_in.step(self._u[0] - self._controller.steady_drift_m_s[0], self._light)
 
     def _is_steady(self, ring_ahead_m: float) -> bool:
@@ -316,7 +323,7 @@ class Guidance:
                 must_follow=True,
                 to_contact_s=self._to_contact_s(distance_m) if self._closure.committed else None,
             )
-        elif self.phase in _RETREATING:
+        elif self.phase in GOING_BACK:
             wanted = Wanted(distance_m=None, speed_m_s=-s.back_off_speed_m_s, aim_m=self._aim_now())
         else:
             wanted = Wanted(
@@ -339,8 +346,8 @@ class Guidance:
 
     def _hold_course(self, ring: Array) -> Array:
         """(3,) du/dt toward the drogue's drift, plus the speed along that the phase asks for."""
-        about_it = self.phase in _RETREATING and ring[0] <= 0.0  # it may come along: its drift would be one's own
-        s, steady, touching = self._settings, self._controller.steady_drift_m_s, self.phase in _TOUCHING
+        about_it = self.phase in GOING_BACK and ring[0] <= 0.0  # it may come along: its drift would be one's own
+        s, steady, touching = self._settings, self._controller.steady_drift_m_s, self.phase in TOUCHING
         lost = self._clocks.unusable_s > 0.0 and not touching
         target = self._reckoning.drift_m_s.copy() if lost else self._controller.drift_m_s
         if touching or about_it:
@@ -349,9 +356,9 @@ class Guidance:
             target[1:] += self._trail.across_m_s
         if self._path.is_announced and touching:  # the drogue has come along
             target += self._axes.turned(np.array([self._take_in.pushed_in_m, 0.0, 0.0]))
-        if self.phase in (Phase.CONTACT, Phase.HOLD):
+        if self.phase in ON_THE_PROBE:
             target[0] += self._take_in.speed_m_s(self.phase, self._light)
-        elif self.phase in _RETREATING or (
+        elif self.phase in GOING_BACK or (
             self.phase in _WAITING and self._clocks.unusable_s > s.limits.lost_s
         ):  # nobody waits near a drogue that is not seen
             if lost:

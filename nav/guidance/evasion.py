@@ -12,10 +12,15 @@ Not modelled: where the hose is; how long it whips.
 """
 
 from dockair.nav.guidance.guidance_settings import GuidanceSettings
-from dockair.nav.guidance.phases import Phase, PhaseLimits, Situation, is_off_the_probe, is_reached
-
-_ON_PROBE = (Phase.CONTACT, Phase.HOLD)
-_GOING_BACK = (Phase.DISCONNECT, Phase.BACK_OFF, Phase.BREAKAWAY)
+from dockair.nav.guidance.phases import (
+    GOING_BACK,
+    ON_THE_PROBE,
+    Phase,
+    PhaseLimits,
+    Situation,
+    is_off_the_probe,
+    is_reached,
+)
 
 
 class Evasion:
@@ -39,10 +44,10 @@ class Evasion:
             phase: that begins or goes on.
             situation: that it was decided on.
         """
-        if phase not in _GOING_BACK:
+        if phase not in GOING_BACK:
             self._was_held, self._slipped_off, self._left_s = False, False, 0.0
             return False
-        ends_hold, coupling = before in _ON_PROBE, (situation.ahead_m, situation.beside_m)
+        ends_hold, coupling = before in ON_THE_PROBE, (situation.ahead_m, situation.beside_m)
         self._was_held = self._was_held or ends_hold or is_reached(self._limits, *coupling)
         slips_off = is_off_the_probe(self._limits, *coupling)
         self._slipped_off = slips_off if ends_hold else self._slipped_off and not _is_seen_ahead(situation)

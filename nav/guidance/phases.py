@@ -25,6 +25,11 @@ class Phase(Enum):
     CLEAR = "clear"
 
 
+BEFORE_CONTACT = (Phase.JOIN_UP, Phase.PRE_CONTACT, Phase.APPROACH)
+ON_THE_PROBE = (Phase.CONTACT, Phase.HOLD)  #: pushed in, and held
+TOUCHING = (*ON_THE_PROBE, Phase.DISCONNECT)
+GOING_BACK = (Phase.DISCONNECT, Phase.BACK_OFF, Phase.BREAKAWAY)
+
 RED_LIGHT = "red light"  #: the reason to go back from a hose that is dead
 REFUELLED = "refuelled"  #: the reason to end a hold in which the light has been green for long enough
 

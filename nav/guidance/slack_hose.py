@@ -25,12 +25,9 @@ from collections import deque
 
 import numpy as np
 
-from dockair.nav.guidance.phases import Phase, PhaseLimits, is_off_the_probe, is_reached
+from dockair.nav.guidance.phases import BEFORE_CONTACT, ON_THE_PROBE, Phase, PhaseLimits, is_off_the_probe, is_reached
 from dockair.rotations import Array
 from dockair.vectors import cross
-
-_BEFORE = (Phase.JOIN_UP, Phase.PRE_CONTACT, Phase.APPROACH)
-_HOLDING = (Phase.CONTACT, Phase.HOLD)
 
 
 class SlackHose:
@@ -60,7 +57,7 @@ class SlackHose:
             seen: whether that is known of frames that have not stopped.
         """
         self._contact_s += self._step_s
-        if phase in _BEFORE:
+        if phase in BEFORE_CONTACT:
             self._contact_s, self._far_s, self.is_slack = -np.inf, 0.0, False
             self._turns_rad.clear()
             if seen:
@@ -78,7 +75,7 @@ class SlackHose:
         turn = turn_rad(along, self._rest) if on_the_probe and self._rest is not None else None
         if self._contact_s <= limits.slack_to_s:
             self._look(turn)
-        elif phase in _HOLDING and turn is not None:
+        elif phase in ON_THE_PROBE and turn is not None:
             self._far_s = self._far_s + self._step_s if turn[1] > limits.slack_far_rad else 0.0
             self.is_slack = self._far_s >= limits.slack_over_s
 

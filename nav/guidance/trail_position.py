@@ -16,11 +16,8 @@ a coupling that does not let the drogue turn, where there is nothing to see.
 
 import numpy as np
 
-from dockair.nav.guidance.phases import Phase, PhaseLimits, is_off_the_probe
+from dockair.nav.guidance.phases import BEFORE_CONTACT, TOUCHING, Phase, PhaseLimits, is_off_the_probe
 from dockair.rotations import Array
-
-_BEFORE = (Phase.JOIN_UP, Phase.PRE_CONTACT, Phase.APPROACH)
-_TOUCHING = (Phase.CONTACT, Phase.HOLD, Phase.DISCONNECT)
 
 
 class TrailPosition:
@@ -53,11 +50,11 @@ class TrailPosition:
             seen: whether that is known of frames that have not stopped.
         """
         self.across_m_s = np.zeros(2)
-        self._touching_s = self._touching_s + self._step_s if phase in _TOUCHING else 0.0
+        self._touching_s = self._touching_s + self._step_s if phase in TOUCHING else 0.0
         if not seen:
             return
         angles_rad = np.arctan2(along[1:], along[0])
-        if phase in _BEFORE:
+        if phase in BEFORE_CONTACT:
             self._before_rad = self._before_rad + self._share * (angles_rad - self._before_rad)
             self._known += self._share * (1.0 - self._known)
             return
