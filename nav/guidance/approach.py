@@ -92,13 +92,7 @@ class Guidance:
         self._is_evading = self._is_recalled = False
         self._evasion = Evasion(settings, self._dt)
         self._hose = SlackHose(settings.limits, self._dt)
-        self._trail = TrailPosition(
-            gain_m_s=settings.trail_gain_m_s,
-            speed_max_m_s=settings.trail_speed_max_m_s,
-            before_s=settings.trail_before_s,
-            limits=settings.limits,
-            step_s=self._dt,
-        )
+        self._trail = TrailPosition(settings, self._dt)
 
     def announce(self, announcement: TankerAnnouncement) -> None:
         """Take note of what the tanker is about to do."""

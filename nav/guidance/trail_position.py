@@ -16,7 +16,8 @@ a coupling that does not let the drogue turn, where there is nothing to see.
 
 import numpy as np
 
-from dockair.nav.guidance.phases import BEFORE_CONTACT, TOUCHING, Phase, PhaseLimits, is_off_the_probe
+from dockair.nav.guidance.guidance_settings import GuidanceSettings
+from dockair.nav.guidance.phases import BEFORE_CONTACT, TOUCHING, Phase, is_off_the_probe
 from dockair.rotations import Array
 
 
@@ -24,18 +25,13 @@ class TrailPosition:
     """Eq. (1), one control tick at a time.
 
     Args:
-        gain_m_s: k, per radian.
-        speed_max_m_s: v_max, of each axis.
-        before_s: over which a' is taken.
-        limits: from when on the hose is no longer looked at for slack, and what is off the probe.
+        settings: k, v_max and over which time a' is taken; from when on nobody looks at the hose for slack any more.
         step_s: control period.
     """
 
-    def __init__(
-        self, *, gain_m_s: float, speed_max_m_s: float, before_s: float, limits: PhaseLimits, step_s: float
-    ) -> None:
-        self._gain_m_s, self._speed_max_m_s, self._limits, self._step_s = gain_m_s, speed_max_m_s, limits, step_s
-        self._share, self._known = step_s / before_s, 0.0
+    def __init__(self, settings: GuidanceSettings, step_s: float) -> None:
+        self._settings, self._step_s = settings, step_s
+        self._share, self._known = step_s / settings.trail_before_s, 0.0
         self._before_rad: Array = np.zeros(2)  # a' times the share of it that is known
         self._touching_s = 0.0
         self.across_m_s: Array = np.zeros(2)  #: (2,) v, left and up; nothing unless the drogue is seen on the probe
@@ -58,7 +54,8 @@ class TrailPosition:
             self._before_rad = self._before_rad + self._share * (angles_rad - self._before_rad)
             self._known += self._share * (1.0 - self._known)
             return
-        off = is_off_the_probe(self._limits, float(coupling[0]), float(np.hypot(coupling[1], coupling[2])))
-        if self._touching_s > self._limits.slack_to_s and self._known > 0.0 and not off:
-            asked = self._gain_m_s * (angles_rad - self._before_rad / self._known)
-            self.across_m_s = np.clip(asked, -self._speed_max_m_s, self._speed_max_m_s)
+        s, beside_m = self._settings, float(np.hypot(coupling[1], coupling[2]))
+        off = is_off_the_probe(s.limits, float(coupling[0]), beside_m)
+        if self._touching_s > s.limits.slack_to_s and self._known > 0.0 and not off:
+            asked = s.trail_gain_m_s * (angles_rad - self._before_rad / self._known)
+            self.across_m_s = np.clip(asked, -s.trail_speed_max_m_s, s.trail_speed_max_m_s)

@@ -26,13 +26,7 @@ def seen_before(seconds=20.0, at=lambda t: REST_DEG):
 
 
 def new():
-    return TrailPosition(
-        gain_m_s=GAIN_M_S,
-        speed_max_m_s=SETTINGS.trail_speed_max_m_s,
-        before_s=SETTINGS.trail_before_s,
-        limits=LIMITS,
-        step_s=STEP_S,
-    )
+    return TrailPosition(SETTINGS, STEP_S)
 
 
 def held(trail, turned_deg, seconds, *, phase=Phase.HOLD, coupling=AT_THE_TIP, seen=True):
