@@ -62,6 +62,7 @@ class BeliefBuffer:
         self._span_s, self._interval_s = span_s, interval_s
         self._nodes: list[Node] = []
         self._head: Node | None = None  #: at the newest sample, when no frame is newer
+        self._head_is_due = False  # and is brought there once it is asked for: a frame that comes first moves it anyway
         self._coasted: tuple[Node, Node] | None = None  #: the second: the first, coasted on for long
         self._asked: tuple[list[Belief], Node] | None = None  #: the moment asked for last, from the beliefs before it
 
@@ -73,7 +74,7 @@ class BeliefBuffer:
     @property
     def newest(self) -> Node | None:
         """The head, or the last node; None before the first message."""
-        return self._head or (self._nodes[-1] if self._nodes else None)
+        return self._renewed_head() or (self._nodes[-1] if self._nodes else None)
 
     @property
     def newest_s(self) -> float:
@@ -82,12 +83,13 @@ class BeliefBuffer:
 
     def begin(self, time_s: float, beliefs: list[Belief]) -> None:
         """Forget all nodes but one, at a time, with these beliefs."""
-        self._nodes, self._head, self._coasted = [Node(time_s, None, beliefs)], None, None
+        self._nodes = [Node(time_s, None, beliefs)]
+        self._forget_head()
         self.renew_head()
 
     def change_all(self, changed: Callable[[Belief], Belief]) -> None:
         """Put another belief in the place of each, the start's too."""
-        self._head = self._coasted = None
+        self._forget_head()
         self._start = [changed(belief) for belief in self._start]
         for node in self._nodes:
             node.beliefs = [changed(belief) for belief in node.beliefs]
@@ -101,8 +103,9 @@ class BeliefBuffer:
             self._run_from(bisect_right(self._nodes, before_s, key=_time))  # those after it had to guess the rate
         if time_s - self._nodes[-1].time_s >= self._interval_s:
             self.renew_head()
-            assert self._head is not None  # no frame is newer
-            self._nodes.append(self._head)
+            head = self._renewed_head()
+            assert head is not None  # no frame is newer
+            self._nodes.append(head)
         self._forget(time_s)
 
     def _forget(self, now_s: float) -> None:
@@ -131,19 +134,27 @@ class BeliefBuffer:
 
     def renew_head(self) -> None:
         """Bring the belief to the newest sample, unless a frame is newer."""
-        newest_s, last = self._record.newest_s, self._nodes[-1]
-        if newest_s < last.time_s:
-            self._head = None
-            return
-        begin = last if self._head is None or self._head.time_s < last.time_s else self._head
-        self._head = Node(newest_s, None, self._moved(begin, newest_s))
+        self._head_is_due = True
+
+    def _renewed_head(self) -> Node | None:
+        if not self._head_is_due:
+            return self._head
+        newest_s, last, head = self._record.newest_s, self._nodes[-1], self._head
+        begin = last if head is None or head.time_s < last.time_s else head
+        self._head = None if newest_s < last.time_s else Node(newest_s, None, self._moved(begin, newest_s))
+        self._head_is_due = False
+        return self._head
+
+    def _forget_head(self) -> None:
+        self._head, self._head_is_due, self._coasted = None, False, None
 
     def beliefs(self, time_s: float) -> list[Belief]:
         """Return the belief at a time; the oldest kept if it is older."""
         if not self._nodes:
             return self._start
-        if self._head is not None and self._head.time_s <= time_s:
-            return self._coasting(self._head, time_s)
+        head = self._renewed_head() if self._record.newest_s <= time_s else None
+        if head is not None:
+            return self._coasting(head, time_s)
         index = bisect_right(self._nodes, time_s, key=_time)
         return self._coasting(self._nodes[index - 1], time_s) if index else self._nodes[0].beliefs
 
@@ -166,7 +177,7 @@ class BeliefBuffer:
 
     def _run_from(self, index: int) -> None:
         """Run the nodes again from one on; the first is given."""
-        self._head = self._coasted = None
+        self._forget_head()
         for i in range(max(index, 1), len(self._nodes)):
             node = self._nodes[i]
             node.beliefs = self._taken_again(node, self._moved(self._nodes[i - 1], node.time_s))
