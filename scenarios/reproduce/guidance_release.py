@@ -55,7 +55,9 @@ def release(seed: int, gain_m_s: float) -> Release | None:
     """Fly a seed; None if the drogue was not held and let go."""
     scenario = load_scenario(_SCENARIO, _OVERRIDES)
     flight = Flight(scenario, seed)
-    guidance = replace(guidance_settings(scenario), trail_gain_m_s=gain_m_s)
+    flown = guidance_settings(scenario)
+    limits = replace(flown.limits, slack_far_rad=np.inf)  # else a hose that is held far aside is told to be slack
+    guidance = replace(flown, trail_gain_m_s=gain_m_s, limits=limits)
     flight.navigator = Navigator(flight.sheets, NavigatorSettings(guidance=guidance))
     times, places, latched, tips, rates = [], [], [], [], []
     try:
