@@ -213,16 +213,22 @@ def _spread(P, F, Q):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
+def _carry(A, x, out):  # type: ignore[no-untyped-def]
+    """Write A x of (n, n) and (n,)."""
+    for i in range(len(x)):
+        out[i] = 0.0
+        for j in range(len(x)):
+            out[i] += A[i, j] * x[j]
+
+
+@njit(cache=True)
 def _predict(x, lead, A, lead_s, push, push_then, out):  # type: ignore[no-untyped-def]
     """Write place, velocity and acceleration (rows of each hose's out) of each axis after its lead time."""
     hoses, _, n = x.shape
     later = np.empty(n)
     for hose in range(hoses):
         for axis in range(3):
-            for i in range(n):
-                later[i] = 0.0
-                for j in range(n):
-                    later[i] += lead[hose, axis, i, j] * x[hose, axis, j]
+            _carry(lead[hose, axis], x[hose, axis], later)
             tau, now, then = lead_s[axis], push[axis], push_then[axis]
             out[hose, 0, axis] = _at(later, 0) + tau * tau * (now / 3.0 + then / 6.0)
             out[hose, 1, axis] = _at(later, 1) + 0.5 * tau * (now + then)
@@ -239,10 +245,7 @@ def _go_on(x, lead, lead_s, F, pushed, push, out):  # type: ignore[no-untyped-de
     state, later = np.empty(n), np.empty(n)
     for hose in range(hoses):
         for axis in range(3):
-            for i in range(n):
-                state[i] = 0.0
-                for j in range(n):
-                    state[i] += lead[hose, axis, i, j] * x[hose, axis, j]
+            _carry(lead[hose, axis], x[hose, axis], state)
             tau, now, then = lead_s[axis], push[0, axis], push[1, axis]
             state[FIRST_MODE] += tau * tau * (now / 3.0 + then / 6.0)
             state[FIRST_MODE + 1] += 0.5 * tau * (now + then)

@@ -67,15 +67,16 @@ class SlackHose:
         limits, ahead_m, beside_m = self._limits, float(coupling[0]), float(np.hypot(coupling[1], coupling[2]))
         if self._contact_s == -np.inf and (phase is Phase.CONTACT or is_reached(limits, ahead_m, beside_m)):
             self._contact_s = 0.0
-        if self.is_slack or self._contact_s < limits.slack_from_s:
+        late = self._contact_s > limits.slack_to_s
+        if self.is_slack or self._contact_s < limits.slack_from_s or (late and phase not in ON_THE_PROBE):
             return
         if self._rest is None:
             self._rest = np.sum(self._before, axis=0) if self._before else None
         on_the_probe = seen and not is_off_the_probe(limits, ahead_m, beside_m)
         turn = turn_rad(along, self._rest) if on_the_probe and self._rest is not None else None
-        if self._contact_s <= limits.slack_to_s:
+        if not late:
             self._look(turn)
-        elif phase in ON_THE_PROBE and turn is not None:
+        elif turn is not None:
             self._far_s = self._far_s + self._step_s if turn[1] > limits.slack_far_rad else 0.0
             self.is_slack = self._far_s >= limits.slack_over_s
 
