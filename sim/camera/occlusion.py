@@ -12,8 +12,9 @@ triangle with corners a, b, c of a mesh is met at t, where
 
     o + t d = a + u (b - a) + v (c - a),    u >= 0, v >= 0, u + v <= 1                                           (4)
 
-Solids beside a cone around all rays from one point are not looked at. Only geoms that are drawn hide: those in a
-visible group and not fully transparent.
+Solids beside a cone around all rays from one point are not looked at; rays with starts of their own are each measured
+against the balls around all solids first. Only geoms that are drawn hide: those in a visible group and not fully
+transparent.
 Not modelled: partly hidden sources (a source is a point), transparent things.
 Sources: Glassner (ed.), An Introduction to Ray Tracing, ch. 2; Moeller & Trumbore 1997 (4).
 """
@@ -29,11 +30,11 @@ from dockair.rotations import Array
 from dockair.sim.camera.meshes import Meshes
 from dockair.sim.camera.obstacles import Obstacles
 from dockair.sim.camera.solids import BALL, BOX, CAPSULE
-from dockair.triples import Vector, cross, dot, turned_back
+from dockair.triples import Vector, cross, dot, turned, turned_back
 
 _ALONG = 1e-300  # least squared component across a tube, of a ray that does not run along it
 _ROUNDING = 1e-9  # of distances to boxes, relative and in metres
-_SPARE_M = 1e-6  # between a solid's ball and a cone of rays: far more than rounding
+_SPARE_M = 1e-6  # between a ball around a solid and rays beside it: far more than rounding
 _NOWHERE = (math.inf, -math.inf)
 
 Part = tuple[float, float]  # of a ray: from one distance to another; nothing where the second is less
@@ -109,12 +110,52 @@ def _clear_rays(
     out: NDArray[np.bool_],
 ) -> None:
     """Fill (n,) whether no surface is nearer to a start than its distance."""
-    nearest = np.empty(1)
+    patches, balls = len(obstacles.meshes.geoms), _balls_around(obstacles, xpos, xmat)
+    near = np.empty(balls.shape[1], dtype=np.bool_)
     for i in range(len(starts)):
-        nearest[0] = distances[i]
-        if distances[i] > 0.0:
-            _cast(obstacles, xpos, xmat, starts[i], directions[i : i + 1], nearest)
-        out[i] = nearest[0] >= distances[i]
+        out[i], reach = True, distances[i]
+        if not reach > 0.0:
+            continue
+        p, d = (starts[i, 0], starts[i, 1], starts[i, 2]), (directions[i, 0], directions[i, 1], directions[i, 2])
+        _mark_near(balls, p, d, reach, near)
+        for k in range(patches):
+            if near[k] and _meets_patch(obstacles.meshes, k, xpos, xmat, p, d, reach) < reach:
+                out[i] = False
+                break
+        for k in range(patches, len(near)):
+            if not out[i]:
+                break
+            if near[k] and _meets_solid(obstacles, k - patches, xpos, xmat, p, d, reach) < reach:
+                out[i] = False
+
+
+@njit(cache=True)
+def _balls_around(obstacles: Obstacles, xpos: Array, xmat: Array) -> Array:
+    """(4, n) centres and radii, a little too large, of balls around the meshes' patches and then the solids, in W."""
+    meshes, patches = obstacles.meshes, len(obstacles.meshes.geoms)
+    out = np.empty((4, patches + len(obstacles.geoms)))
+    for k in range(patches):
+        g, m = meshes.geoms[k], meshes.centres_m[k]
+        from_geom = turned(xmat[g], (m[0], m[1], m[2]))
+        for axis in range(3):
+            out[axis, k] = xpos[g, axis] + from_geom[axis]
+        out[3, k] = meshes.radii_m[k] + _SPARE_M
+    for k in range(len(obstacles.geoms)):
+        for axis in range(3):
+            out[axis, patches + k] = xpos[obstacles.geoms[k], axis]
+        out[3, patches + k] = obstacles.radii_m[k] + _SPARE_M
+    return out
+
+
+@njit(cache=True)
+def _mark_near(balls: Array, p: Vector, d: Vector, reach: float, out: NDArray[np.bool_]) -> None:
+    """Fill (n,) which balls (4, n) a ray may meet within `reach`; without branches, so that many are taken at once."""
+    x, y, z, radius = balls[0], balls[1], balls[2], balls[3]
+    for k in range(len(out)):
+        r = (x[k] - p[0], y[k] - p[1], z[k] - p[2])
+        along = dot(r, d)
+        is_beside = dot(r, r) - along * along > radius[k] * radius[k]
+        out[k] = not (is_beside | (along + radius[k] < 0.0) | (along - radius[k] > reach))
 
 
 @njit(cache=True)
@@ -145,11 +186,11 @@ def _is_beside(p: Vector, radius: float, cone: Cone) -> bool:
 @njit(cache=True)
 def _cast(obstacles: Obstacles, xpos: Array, xmat: Array, p: Array, directions: Array, nearest: Array) -> None:
     """Lower (n,) distances to those of the nearest surface."""
-    cone = _cone_around(directions)
+    cone, start = _cone_around(directions), (p[0], p[1], p[2])
     _cast_at_meshes(obstacles.meshes, xpos, xmat, p, directions, cone, nearest)
     for k in range(len(obstacles.geoms)):
-        g, radius, h = obstacles.geoms[k], obstacles.radii_m[k], obstacles.half_sizes_m[k]
-        x, y, z, M = xpos[g, 0] - p[0], xpos[g, 1] - p[1], xpos[g, 2] - p[2], xmat[g]
+        g, radius = obstacles.geoms[k], obstacles.radii_m[k]
+        x, y, z = xpos[g, 0] - p[0], xpos[g, 1] - p[1], xpos[g, 2] - p[2]
         if _is_beside((x, y, z), radius, cone):
             continue
         square = x * x + y * y + z * z
@@ -158,12 +199,7 @@ def _cast(obstacles: Obstacles, xpos: Array, xmat: Array, p: Array, directions: 
             along = x * d[0] + y * d[1] + z * d[2]
             if square - along * along > radius * radius or along + radius < 0.0 or along - radius > nearest[i]:
                 continue
-            start, stop = _inside(
-                obstacles.kinds[k], (h[0], h[1], h[2]), turned_back(M, (-x, -y, -z)), turned_back(M, d)
-            )
-            at = start if start >= 0.0 else stop
-            if start <= stop and 0.0 <= at < nearest[i]:
-                nearest[i] = at
+            nearest[i] = _meets_solid(obstacles, k, xpos, xmat, start, d, nearest[i])
 
 
 @njit(cache=True)
@@ -184,10 +220,35 @@ def _cast_at_meshes(
             along = x * ray[0] + y * ray[1] + z * ray[2]
             if square - along * along > radius * radius or along + radius < 0.0 or along - radius > nearest[i]:
                 continue
-            for run in range(meshes.first_run[k], meshes.first_run[k + 1]):
-                if _meets_box(meshes.run_box_m[run], o, ray, nearest[i]):
-                    for t in range(meshes.run_start[run], meshes.run_start[run + 1]):
-                        nearest[i] = min(nearest[i], _meets_triangle(meshes, t, o, ray))
+            nearest[i] = _meets_runs(meshes, k, o, ray, nearest[i])
+
+
+@njit(cache=True)
+def _meets_solid(obstacles: Obstacles, k: int, xpos: Array, xmat: Array, p: Vector, d: Vector, reach: float) -> float:
+    """Distance along a ray to a solid; `reach` where that is no less."""
+    g, h = obstacles.geoms[k], obstacles.half_sizes_m[k]
+    M, o = xmat[g], (p[0] - xpos[g, 0], p[1] - xpos[g, 1], p[2] - xpos[g, 2])
+    start, stop = _inside(obstacles.kinds[k], (h[0], h[1], h[2]), turned_back(M, o), turned_back(M, d))
+    at = start if start >= 0.0 else stop
+    return at if start <= stop and 0.0 <= at < reach else reach
+
+
+@njit(cache=True)
+def _meets_patch(meshes: Meshes, k: int, xpos: Array, xmat: Array, p: Vector, d: Vector, reach: float) -> float:
+    """The same for a patch of a mesh."""
+    g = meshes.geoms[k]
+    M, o = xmat[g], (p[0] - xpos[g, 0], p[1] - xpos[g, 1], p[2] - xpos[g, 2])
+    return _meets_runs(meshes, k, turned_back(M, o), turned_back(M, d), reach)
+
+
+@njit(cache=True)
+def _meets_runs(meshes: Meshes, k: int, o: Vector, d: Vector, reach: float) -> float:
+    """The same, the ray being in the axes of the patch's geom."""
+    for run in range(meshes.first_run[k], meshes.first_run[k + 1]):
+        if _meets_box(meshes.run_box_m[run], o, d, reach):
+            for t in range(meshes.run_start[run], meshes.run_start[run + 1]):
+                reach = min(reach, _meets_triangle(meshes, t, o, d))
+    return reach
 
 
 @njit(cache=True)

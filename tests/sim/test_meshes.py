@@ -15,7 +15,7 @@ from dockair.sim.camera.mesh_view import _is_beside
 from dockair.sim.camera.meshes import Meshes, mesh_of
 from dockair.sim.camera.mirrors import Mirrors
 from dockair.sim.camera.obstacles import Obstacles
-from dockair.sim.camera.occlusion import first_hits
+from dockair.sim.camera.occlusion import first_hits, rays_are_clear
 from dockair.sim.camera.solids import VISIBLE_GROUPS, Haze, Lighting
 from dockair.sim.camera.tiles import mesh_tiles, triangle_tile
 from dockair.sim.camera.traced import TracedSolids
@@ -204,6 +204,25 @@ def test_rays_from_anywhere_meet_meshes_where_mujocos_do(world: Any) -> None:
         assert (wanted >= 0.0).sum() > 40
         same = np.isclose(hits, wanted, atol=1e-5)
         assert (~same).sum() <= 2  # rays along a face
+
+
+@pytest.mark.parametrize("parts_of_reach", [0.2, 1.0 - 1e-6, 1.0 + 1e-6, np.inf])
+def test_a_way_is_clear_where_its_own_ray_meets_nothing_nearer(world: Any, parts_of_reach: float) -> None:
+    """Rays from many places in one call, each as long as a part of its own way to a surface; in turned axes."""
+    name, model, data = world
+    rng = np.random.default_rng(5)
+    for geom in range(model.ngeom):
+        data.geom_xmat[geom], data.geom_xpos[geom] = exp(np.array([0.2, -0.3, 1.0])).ravel(), [1.0, -2.0, 0.5]
+    starts = rng.normal(0.0, 0.3 * FAR[name], (600, 3))
+    ways = rng.normal(0.0, 0.1 * FAR[name], (600, 3)) - starts
+    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+    obstacles = Obstacles.of(model)
+    alone = np.array([first_hits(obstacles, data, p, d[None], np.inf)[0] for p, d in zip(starts, ways, strict=True)])
+    met = alone >= 0.0
+    assert 40 < met.sum() < 560
+    reach = np.where(met, alone, FAR[name]) * parts_of_reach
+    assert np.array_equal(rays_are_clear(obstacles, data, starts, ways, reach), ~met | (alone >= reach))
+    mujoco.mj_forward(model, data)
 
 
 def test_a_window_is_the_full_pictures_bit_for_bit(world: Any) -> None:

@@ -198,3 +198,13 @@ def test_a_way_of_no_length_is_clear() -> None:
     obstacles, data = _world(_ball(2.0))
     starts, ways = np.zeros((3, 3)), np.array([AHEAD, AHEAD, AHEAD])
     assert list(rays_are_clear(obstacles, data, starts, ways, np.array([-0.1, 0.0, 5.0]))) == [True, True, False]
+
+
+def test_ways_from_many_places_are_clear_where_mujocos_rays_meet_nothing_nearer(crowd) -> None:
+    model, data = crowd
+    rng, ways = np.random.default_rng(7), _directions(1500)
+    starts, reach = rng.uniform(-9.0, 9.0, (1500, 3)), rng.choice([0.5, 3.0, 12.0, np.inf], 1500)
+    hits = np.array([_mujocos_hits(model, data, p, d[None])[0] for p, d in zip(starts, ways, strict=True)])
+    expected = (hits < 0.0) | (hits >= reach)
+    assert 0.2 < expected.mean() < 0.9
+    assert np.array_equal(rays_are_clear(Obstacles.of(model), data, starts, ways, reach), expected)
