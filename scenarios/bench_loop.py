@@ -5,10 +5,10 @@ counted. All are flown by turns, and of each the fastest stands in its line: wha
 under a virtual one, only makes a flight slower. `median` and `slowest`, of all its turns, say how much it did.
 
 `x_real_time` is simulated over wall time. `x_of_own_time` is simulated over the processor's time of the flight or of
-the camera's process, whichever is longer: what it could be at most with nothing else on the machine. `load` is the mean
-number of processes that wanted a core in the minute before the end, this one's among them. Where it is above the number
-of cores, wall time says how busy the machine was; the processor's time is longer then, too, because caches and cores
-are shared.
+the camera's process, whichever is longer: what it could be at most with nothing else on the machine. What a process
+waits for the other awake counts, what it sleeps does not; see `camera_process`. `load` is the mean number of processes
+that wanted a core in the minute before the end, this one's among them. Where it is above the number of cores, wall time
+says how busy the machine was; the processor's time is longer then, too, because caches and cores are shared.
 
     two at once over one = sum of the two speeds / speed of one alone, no flight with a second process
 

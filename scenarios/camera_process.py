@@ -2,9 +2,10 @@
 
 The world's state at the exposure and the frame's pixels go through shared memory, a slot for each frame under way;
 orders and answers through a pipe. While there is no order the camera works ahead on its tables, so that no frame has to
-wait for them. The process is a fork of the flight, so it has the camera as it was built, and it ends with the flight:
-an order of None, or the pipe's end, ends it. What the camera refuses is raised in the flight, when the frame is asked
-for.
+wait for them. Whoever waits for the other stays awake for some milliseconds, its core free for all who want it: to be
+woken on a core that sleeps takes a tenth of the time of a frame. The process is a fork of the flight, so it has the
+camera as it was built, and it ends with the flight: an order of None, or the pipe's end, ends it. What the camera
+refuses is raised in the flight, when the frame is asked for.
 
 Not for a camera that draws with OpenGL (a context does not survive a fork), nor for systems without fork, nor inside a
 process that may have no children: see `can_overlap`.
@@ -13,8 +14,10 @@ process that may have no children: see `can_overlap`.
 import mmap
 import multiprocessing
 import os
+import select
 import signal
 import sys
+import time
 from collections import deque
 from contextlib import suppress
 from multiprocessing.connection import Connection
@@ -32,6 +35,7 @@ from dockair.sim.camera.scene_state import SceneState, size_of
 
 _SLOTS = 4  # frames under way: two at 50 Hz and 10 ms; more when the transfer takes long
 _PIECES_AHEAD = 3  # of what comes next, after a frame: so that the camera is idle again when the next order comes
+_AWAKE_S = 4e-3  # of waiting for the other process: longer than a frame takes
 _GOODBYE_S = 5.0  # for a process to end by itself; it has at most _SLOTS frames to finish
 
 
@@ -68,6 +72,26 @@ class _Slot:
         self.pixels: NDArray[np.uint8] = np.frombuffer(memory, dtype=np.uint8, offset=8 * numbers, count=most_pixels)
 
 
+class _Inbox:
+    """Messages that come through a pipe."""
+
+    def __init__(self, pipe: Connection) -> None:
+        self._pipe, self._poll = pipe, select.poll()
+        self._poll.register(pipe.fileno(), select.POLLIN)
+
+    def next(self) -> Any:
+        """Wait for the next message, awake at first.
+
+        Raises:
+            EOFError: the other end was closed.
+            OSError: likewise, in the middle of a message.
+        """
+        sleeps_at = time.perf_counter() + _AWAKE_S
+        while not self._poll.poll(0) and time.perf_counter() < sleeps_at:
+            os.sched_yield()
+        return self._pipe.recv()
+
+
 class OverlappedExposures:
     """Stands where `ExposuresInTurn` stands, and gives the same frames.
 
@@ -85,6 +109,7 @@ class OverlappedExposures:
         self._next_slot = 0
         fork = multiprocessing.get_context("fork")
         self._pipe, theirs = fork.Pipe()
+        self._answers = _Inbox(self._pipe)
         self._process: Any = fork.Process(
             target=_serve, args=(camera, self._slots, theirs, self._pipe), name="camera", daemon=True
         )
@@ -127,7 +152,7 @@ class OverlappedExposures:
         """Wait for the oldest frame that is being made."""
         begun = self._begun.popleft()
         try:
-            answer = self._pipe.recv()
+            answer = self._answers.next()
         except (EOFError, OSError) as error:
             raise self._lost() from error
         if isinstance(answer, _Failed):
@@ -163,9 +188,10 @@ def can_overlap(camera: object) -> TypeGuard[NearInfraredCamera]:
 def _serve(camera: NearInfraredCamera, slots: list[_Slot], pipe: Connection, flights_end: Connection) -> None:
     """Expose as ordered until there are no more orders, and work ahead in between."""
     flights_end.close()  # or the pipe would never end with the flight
+    orders = _Inbox(pipe)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # a keyboard's interrupt goes to both; the flight says when to end
     with suppress(EOFError, OSError):
-        while (order := pipe.recv()) is not None:
+        while (order := orders.next()) is not None:
             slot, *asked = order
             try:
                 answer: Any = _exposed(camera, slots[slot], *asked)

@@ -1,7 +1,9 @@
 """A camera in a process of its own gives the frames of one that the world waits for, bit by bit and when due."""
 
+import multiprocessing
 import os
 import signal
+import threading
 import time
 from pathlib import Path
 from types import SimpleNamespace
@@ -224,3 +226,38 @@ def runs(process):
         return "\nState:\tZ" not in Path(f"/proc/{process}/status").read_text()
     except FileNotFoundError:
         return False
+
+
+def test_who_waits_for_a_message_is_awake_until_it_comes(monkeypatch):
+    ours, theirs = multiprocessing.Pipe()
+    looks = []
+
+    def look():
+        looks.append(None)
+        if len(looks) == 3:
+            theirs.send("frame")
+
+    monkeypatch.setattr(camera_process, "_AWAKE_S", 60.0)
+    monkeypatch.setattr(os, "sched_yield", look)
+    assert camera_process._Inbox(ours).next() == "frame"
+    assert len(looks) == 3
+
+
+def test_who_waits_for_long_sleeps(monkeypatch):
+    ours, theirs = multiprocessing.Pipe()
+    looks = []
+    monkeypatch.setattr(camera_process, "_AWAKE_S", -1.0)
+    monkeypatch.setattr(os, "sched_yield", lambda: looks.append(None))
+    later = threading.Timer(0.05, theirs.send, ("frame",))
+    later.start()
+    assert camera_process._Inbox(ours).next() == "frame"
+    assert not looks
+    later.join()
+
+
+def test_an_inbox_whose_other_end_was_closed_says_so(monkeypatch):
+    monkeypatch.setattr(camera_process, "_AWAKE_S", 60.0)
+    ours, theirs = multiprocessing.Pipe()
+    theirs.close()
+    with pytest.raises(EOFError):
+        camera_process._Inbox(ours).next()
