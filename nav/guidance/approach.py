@@ -2,16 +2,7 @@
 
 Everything is flown in stabilised axes (`stabilised_axes`): a controller (`predictive`, or `pid` for comparison) follows
 the drogue; `closure` says how fast to close, and when to be called back; `take_in` how far to push it in; `phases` says
-what comes next.
-
-Where the tanker turns or descends, the receiver's own path does so as announced, and leans on what announced and true
-turn differ by (`announced_path`). None of this is left to the controller: to its u is added the velocity v, level to
-the left (l), that the path is learnt to leave, and what the turn n of the axes does to the drogue's place p is taken
-off,
-
-    commanded = u + v l - n x p                                                                           (1)
-
-so that the drogue's drift is the same on the way to it, on the probe and back.
+what comes next. Where the tanker turns or descends, none of it is left to them: `formation` keeps company with it.
 
 The push of the receiver's own bow wave is part of the prediction, and what it did otherwise at one attempt is part of
 the next one's aim (`bow_wave_push`).
@@ -22,7 +13,6 @@ import math
 import numpy as np
 
 from dockair.messages import Light, PodSignal, ReceiverCommand, TankerAnnouncement
-from dockair.nav.guidance.announced_path import AnnouncedPath
 from dockair.nav.guidance.closing import PredictedMiss, time_to_contact_s
 from dockair.nav.guidance.closure import Closure
 from dockair.nav.guidance.command_limits import CommandLimits
@@ -30,6 +20,7 @@ from dockair.nav.guidance.controller import Controller, Sight, Wanted
 from dockair.nav.guidance.dead_reckoning import DeadReckoning
 from dockair.nav.guidance.evasion import Evasion
 from dockair.nav.guidance.field_of_view import FieldOfView
+from dockair.nav.guidance.formation import Formation
 from dockair.nav.guidance.guidance_settings import GuidanceSettings, RelativeState
 from dockair.nav.guidance.phase_clocks import PhaseClocks
 from dockair.nav.guidance.phases import (
@@ -45,7 +36,6 @@ from dockair.nav.guidance.phases import (
 from dockair.nav.guidance.pid import Pid
 from dockair.nav.guidance.predictive import Predictive
 from dockair.nav.guidance.slack_hose import SlackHose
-from dockair.nav.guidance.stabilised_axes import StabilisedAxes
 from dockair.nav.guidance.take_in import TakeIn
 from dockair.nav.guidance.trail_position import TrailPosition
 from dockair.rotations import Array
@@ -69,16 +59,14 @@ class Guidance:
     def __init__(self, settings: GuidanceSettings, control_rate_hz: int, field: FieldOfView | None = None) -> None:
         self._settings, self._dt = settings, 1.0 / control_rate_hz
         self.phase, self.phase_reason = Phase.JOIN_UP, ""
-        self._axes = StabilisedAxes(settings.levelling_s, self._dt)
+        self._formation = Formation(settings, self._dt)
+        self._axes = self._formation.axes
         self._controller = _controller(settings, self._dt)
         self._limits = CommandLimits(settings, self._dt)
         self._miss = PredictedMiss(settings.closing, self._dt)
         self._u: Array = np.zeros(3)
         self._u_dot: Array = np.zeros(3)
-        self._path = AnnouncedPath(settings.path)
-        self._place: Array = np.zeros(3)  # p of Eq. (1), reckoned while nobody sees the drogue
-        self._turned: Array = np.zeros((2, 3))  # n x p and its rate
-        self._commanded: Array = np.zeros(3)  # Eq. (1)
+        self._place: Array = np.zeros(3)  # of the drogue, reckoned while nobody sees it
         self._aim: Array = np.zeros(2)
         self._reckoning = DeadReckoning(settings, self._dt, field)
         self._passed: Array | None = None  # where the ring was when the tip last came to its plane, left and up
@@ -96,7 +84,7 @@ class Guidance:
 
     def announce(self, announcement: TankerAnnouncement) -> None:
         """Take note of what the tanker is about to do."""
-        self._path.announce(announcement)
+        self._formation.path.announce(announcement)
 
     def signal(self, signal: PodSignal) -> None:
         """Take note of what the pod's light begins to show."""
@@ -108,12 +96,12 @@ class Guidance:
         Args:
             state: the relative state now; a prediction when not usable.
         """
-        self._axes.step(state.w_WB_B, self._path.turn_rate_rad_s, self._path.bank_rad)
+        self._formation.turn(state.w_WB_B)
         ring, rate = self._axes.moved(state.p_PD_B, state.rate_PD_B)
         coupling = self._axes.R_NB @ state.p_PK_B
         lateral_m = float(np.hypot(ring[1], ring[2]))
-        if self._path.is_announced:
-            self._follow_path(state, ring, rate)
+        if self._formation.is_led:
+            self._keep_company(state, ring, rate)
         self._observe(state, ring, rate)
         self._reckon(state, ring)
         self._count(state, ring, rate, lateral_m)
@@ -127,24 +115,21 @@ class Guidance:
         asked = self._follow(ring, lateral_m) if self._follows(state, ring) else self._hold_course(ring)
         self._u, self._u_dot = self._limits.step(self._u, self._u_dot, asked, patient=self._is_patient)
         self._controller.given(self._u, self._u_dot)
-        return self._command(self._u_dot)
+        return self._formation.command(self._u, self._u_dot)
 
-    def _follow_path(self, state: RelativeState, ring: Array, rate: Array) -> None:
-        """Go on with the announced path, and learn from the drogue what it leaves."""
+    def _keep_company(self, state: RelativeState, ring: Array, rate: Array) -> None:
+        """Tell the formation where the drogue is, and whether it says anything about the path."""
         if state.usable:
             self._place = ring
         elif self.phase not in TOUCHING:  # on the probe it stays where it was seen
             self._place = self._reckoning.place_m
-        going = rate if state.usable else np.zeros(3)
-        self._turned = np.array([self._axes.turned(self._place), self._axes.turned(going)])
         pushed = self._closure.committed  # a drogue in the bow wave says nothing about the path
         learns = state.usable and self.phase in _FOLLOWING and not pushed
-        left = float((rate + self._turned[0] + self._commanded) @ self._axes.left_N)
-        self._path.step(self._dt, left if learns else None)
+        self._formation.follow(self._place, rate if state.usable else np.zeros(3), learns=learns)
 
     def _observe(self, state: RelativeState, ring: Array, rate: Array) -> None:
         """Show the drogue to the controller, and its distance from the probe's line to the prediction of the miss."""
-        change = np.full(3, np.nan) if self._path.is_announced else self._axes.R_NB @ state.dv_WP_B
+        change = np.full(3, np.nan) if self._formation.is_led else self._axes.R_NB @ state.dv_WP_B
         touches = self.phase in TOUCHING or (self.phase in (Phase.APPROACH, *GOING_BACK) and ring[0] <= 0.0)
         if not state.usable or touches or self._coasts(state):  # a drogue that the probe pushes would lead it astray
             self._controller.observe(None, change)
@@ -348,7 +333,7 @@ class Guidance:
             target[0] = steady[0]
         if touching:
             target[1:] += self._trail.across_m_s
-        if self._path.is_announced and touching:  # the drogue has come along
+        if self._formation.is_led and touching:  # the drogue has come along
             target += self._axes.turned(np.array([self._take_in.pushed_in_m, 0.0, 0.0]))
         if self.phase in ON_THE_PROBE:
             target[0] += self._take_in.speed_m_s(self.phase, self._light)
@@ -366,21 +351,6 @@ class Guidance:
         if self._is_evading:
             u_dot[2] = _EVADE_GAIN_1_S * (-s.evade_speed_m_s - self._u[2])
         return u_dot
-
-    def _command(self, u_dot: Array) -> ReceiverCommand:
-        """Eq. (1) and its rate in body axes, and what the path does."""
-        path, axes, u = self._path, self._axes, self._u
-        if path.is_announced:
-            u = u + path.left_m_s * axes.left_N - self._turned[0]
-            u_dot = u_dot + path.left_m_s2 * axes.left_N - self._turned[1]
-        self._commanded = u
-        R_BN = axes.R_NB.T
-        return ReceiverCommand(
-            velocity_m_s=R_BN @ u,
-            acceleration_m_s2=R_BN @ u_dot,
-            turn_rate_rad_s=path.flown_rad_s,
-            climb_rad=path.climb_rad,
-        )
 
 
 def _controller(settings: GuidanceSettings, step_s: float) -> Controller:

@@ -234,7 +234,7 @@ def test_in_a_turn_that_is_not_quite_the_announced_one_the_probe_meets_the_drogu
         if plant.latched:
             across.append(plant.tip_T[1:])
         if guidance._closure.committed:  # the drogue is pushed about from now on
-            learnt.add(guidance._path._e)
+            learnt.add(guidance._formation.path._e)
     assert guidance.phase is Phase.DISCONNECT
     assert plant.offset_m < 0.03
     assert len(learnt) == 1
@@ -290,11 +290,13 @@ def test_a_drogue_out_of_view_turns_with_the_tanker_where_it_is_reckoned_and_no_
         guidance.step(unseen)
     ahead_m = guidance._reckoning.place_m[0]
     assert 9.0 < ahead_m < 12.0
-    np.testing.assert_allclose(guidance._turned[0], guidance._axes.turned(guidance._reckoning.place_m), atol=1e-3)
-    assert np.hypot(*guidance._turned[0, 1:]) == pytest.approx(TURN * ahead_m, rel=0.05)
+    np.testing.assert_allclose(
+        guidance._formation._turned[0], guidance._axes.turned(guidance._reckoning.place_m), atol=1e-3
+    )
+    assert np.hypot(*guidance._formation._turned[0, 1:]) == pytest.approx(TURN * ahead_m, rel=0.05)
     for _ in range(1100):
         guidance.step(unseen)
-    np.testing.assert_array_equal(guidance._turned, np.zeros((2, 3)))
+    np.testing.assert_array_equal(guidance._formation._turned, np.zeros((2, 3)))
 
 
 def test_what_is_learnt_of_the_path_begins_with_what_was_commanded_before_it_was_announced():
@@ -307,6 +309,6 @@ def test_what_is_learnt_of_the_path_begins_with_what_was_commanded_before_it_was
     learnt = []
     for _ in range(2):
         guidance.step(beside)
-        learnt.append(guidance._path.left_m_s)
+        learnt.append(guidance._formation.path.left_m_s)
     assert command.velocity_m_s[1] > 0.1
     assert learnt[0] > 0.4 * learnt[1] > 0.0
