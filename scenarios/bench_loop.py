@@ -6,9 +6,10 @@ under a virtual one, only makes a flight slower. `median` and `slowest`, of all 
 
 `x_real_time` is simulated over wall time. `x_of_own_time` is simulated over the processor's time of the flight or of
 the camera's process, whichever is longer: what it could be at most with nothing else on the machine. What a process
-waits for the other awake counts, what it sleeps does not; see `camera_process`. `load` is the mean number of processes
-that wanted a core in the minute before the end, this one's among them. Where it is above the number of cores, wall time
-says how busy the machine was; the processor's time is longer then, too, because caches and cores are shared.
+waits for the other awake counts, what it sleeps does not; see `camera_process`. `waited_s` is the wall time in which the
+flight waited for its camera, awake or not. `load` is the mean number of processes that wanted a core in the minute
+before the end, this one's among them. Where it is above the number of cores, wall time says how busy the machine was;
+the processor's time is longer then, too, because caches and cores are shared.
 
     two at once over one = sum of the two speeds / speed of one alone, no flight with a second process
 
@@ -160,13 +161,14 @@ def _timed(flight: "Flight", folder: Path | None, seconds: float) -> dict[str, f
         while flight.truth.time_s < _WARM_UP_S:
             recorder.append(flight.step())
         wall_s, own_s, beside_s = time.perf_counter(), time.process_time(), _children_s()
+        waited_s = flight.waited_for_camera_s
         begun_s = flight.truth.time_s
         outcome = None
         while outcome is None and flight.truth.time_s < begun_s + seconds:
             tick = flight.step()
             recorder.append(tick)
             outcome, frames = tick.outcome, frames + (tick.frame is not None)
-        simulated_s = flight.truth.time_s - begun_s
+        simulated_s, waited_s = flight.truth.time_s - begun_s, flight.waited_for_camera_s - waited_s
     # the recorder has written its last message by now
     wall_s, own_s, beside_s = time.perf_counter() - wall_s, time.process_time() - own_s, _children_s() - beside_s
     return {
@@ -176,6 +178,7 @@ def _timed(flight: "Flight", folder: Path | None, seconds: float) -> dict[str, f
         "frames_per_s": frames / wall_s,
         "flight_process_s": own_s,
         "camera_process_s": beside_s,
+        "waited_s": waited_s,
     }
 
 

@@ -78,6 +78,7 @@ class _Inbox:
     def __init__(self, pipe: Connection) -> None:
         self._pipe, self._poll = pipe, select.poll()
         self._poll.register(pipe.fileno(), select.POLLIN)
+        self.waited_s = 0.0  #: for all messages so far
 
     def next(self) -> Any:
         """Wait for the next message, awake at first.
@@ -86,10 +87,12 @@ class _Inbox:
             EOFError: the other end was closed.
             OSError: likewise, in the middle of a message.
         """
-        sleeps_at = time.perf_counter() + _AWAKE_S
-        while not self._poll.poll(0) and time.perf_counter() < sleeps_at:
+        begun_s = time.perf_counter()
+        while not self._poll.poll(0) and time.perf_counter() < begun_s + _AWAKE_S:
             os.sched_yield()
-        return self._pipe.recv()
+        message = self._pipe.recv()
+        self.waited_s += time.perf_counter() - begun_s
+        return message
 
 
 class OverlappedExposures:
@@ -134,6 +137,11 @@ class OverlappedExposures:
         while any(begun.least_s <= time_s for begun in self._begun):
             self._collect()
         return newest_arrived(self._in_transfer, time_s)
+
+    @property
+    def waited_s(self) -> float:
+        """Wall time for which the flight has waited for frames so far."""
+        return self._answers.waited_s
 
     def close(self) -> None:
         """See `exposures.Exposures`."""

@@ -78,6 +78,11 @@ class Flight:
         """The world now."""
         return self.world.truth
 
+    @property
+    def waited_for_camera_s(self) -> float:
+        """Wall time so far in which nothing went on but the camera, in a process of its own; 0 where it has none."""
+        return self._exposures.waited_s if isinstance(self._exposures, OverlappedExposures) else 0.0
+
     def step(self, command: ReceiverCommand | None = None) -> Tick:
         """Advance by one control tick.
 

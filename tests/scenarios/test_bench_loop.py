@@ -63,6 +63,7 @@ def test_speed_is_simulated_over_wall_time_without_the_first_second():
     longer = max(figures["flight_process_s"], figures["camera_process_s"])
     assert figures["x_of_own_time"] == pytest.approx(0.5 / longer)
     assert figures["load"] > 0.0
+    assert 0.0 < figures["waited_s"] < figures["wall_s"]
 
 
 def test_the_time_of_processes_beside_is_that_of_their_work():

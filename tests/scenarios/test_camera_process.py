@@ -248,10 +248,11 @@ def test_who_waits_for_long_sleeps(monkeypatch):
     looks = []
     monkeypatch.setattr(camera_process, "_AWAKE_S", -1.0)
     monkeypatch.setattr(os, "sched_yield", lambda: looks.append(None))
-    later = threading.Timer(0.05, theirs.send, ("frame",))
+    later, inbox = threading.Timer(0.05, theirs.send, ("frame",)), camera_process._Inbox(ours)
     later.start()
-    assert camera_process._Inbox(ours).next() == "frame"
+    assert inbox.next() == "frame"
     assert not looks
+    assert inbox.waited_s > 0.0
     later.join()
 
 

@@ -149,7 +149,7 @@ def test_a_phase_of_ones_own_navigator_is_no_markup():
 
 
 def test_no_heading_of_a_bench_is_cut_off_in_a_file(capsys):
-    headings = ("x_real_time", "x_of_own_time", "simulated_s", "wall_s", "frames_per_s", "flight_process_s", "load")
+    headings = ("x_real_time", "x_of_own_time", "simulated_s", "wall_s", "frames_per_s", "waited_s", "load")
     flights = {"windowed, 50 Hz, one process": dict.fromkeys(headings, 1.0)}
     show_stages_bench({"flights": flights, "steps_per_second": {"dockair/DockFast-v0": 1.0}, "ratios": {}})
     heading, row, *_ = capsys.readouterr().out.splitlines()
