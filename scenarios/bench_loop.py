@@ -6,8 +6,8 @@ under a virtual one, only makes a flight slower. `median` and `slowest`, of all 
 
 `x_real_time` is simulated over wall time. `x_of_own_time` is simulated over the processor's time of the flight or of
 the camera's process, whichever is longer: what it could be at most with nothing else on the machine. What a process
-waits for the other awake counts, what it sleeps does not; see `camera_process`. `waited_s` is the wall time in which the
-flight waited for its camera, awake or not. `load` is the mean number of processes that wanted a core in the minute
+waits for the other awake counts, what it sleeps does not; see `camera_process`. `waited_s` is the wall time for which a
+flight has waited for its camera, awake or not. `load` is the mean number of processes that wanted a core in the minute
 before the end, this one's among them. Where it is above the number of cores, wall time says how busy the machine was;
 the processor's time is longer then, too, because caches and cores are shared.
 
