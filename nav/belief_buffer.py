@@ -77,6 +77,11 @@ class BeliefBuffer:
         return self._renewed_head() or (self._nodes[-1] if self._nodes else None)
 
     @property
+    def last(self) -> Node | None:
+        """The last node, whose beliefs hold what no motion changes as well as the newest; None before the first."""
+        return self._nodes[-1] if self._nodes else None
+
+    @property
     def newest_s(self) -> float:
         """Stamp of the newest message; -inf before the first."""
         return max(self._record.newest_s, self._nodes[-1].time_s if self._nodes else -np.inf)

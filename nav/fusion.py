@@ -207,8 +207,8 @@ class RelativeFilter:
     @property
     def bias_B(self) -> Array:
         """(3,) of the gyro, as believed now [rad/s]."""
-        newest = self._buffer.newest
-        return newest.beliefs[0].bias if newest is not None else np.zeros(3)
+        last = self._buffer.last
+        return last.beliefs[0].bias if last is not None else np.zeros(3)
 
     def mean_force_B(self, start_s: float, end_s: float) -> Array:
         """(3,) mean specific force after `start_s` up to `end_s` [m/s^2]; NaN where none was felt."""

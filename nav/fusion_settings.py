@@ -72,7 +72,8 @@ class FusionSettings:
     buffer_s: float = 0.45  # how late a frame may be
     leap_s: float = 1.0  # how far ahead of all others a frame's stamp is believed without a second one
     imu_leap_s: float = 0.1  # the same of a sample: it sets the time that all else is held against
-    node_interval_s: float = 0.02  # between beliefs kept to begin at when a frame is late; a frame's period
+    #: Between beliefs kept to begin at when a frame is late: none while frames come every 20 ms, one control tick late.
+    node_interval_s: float = 0.04
     longest_gap_s: float = 0.02  # between samples of acceleration: a receiver does not change it much sooner
     longest_step_s: float = 0.01  # of Eq. (2) of `belief_motion`: the swing's period is 300 of them
     #: Hardware beside its sheets, 1 sigma each: 0.05 degrees of mounting and 1 px of principal point; 2 mm of mounting;
