@@ -1,78 +1,45 @@
 """The stages in order: gyro and frame in, belief and command out.
 
-    frame ► frame_checks ► ring_finder (detect ► identify ► track) ► pose ► integrity ► fusion ► guidance ► command
-    IMU   ────────────────────────────────────────────────────────────────────────────────┘         ▲
-       └► tip_motion ───────────────────────────────────────────────────────────────────────────────┘
+    frame ► frame_checks ► ring_finder ► belief_update (pose ► integrity ► fusion) ► guidance ► command
+    IMU   ─────────────────────────────────────────────────────────────────┘          ▲
+       └► tip_motion ─────────────────────────────────────────────────────────────────┘
 
-Only this file knows the order. What it knows of its hardware arrives as `NavigationSheets`. Named LEDs may come in the
-place of a frame; they go the same way but for the ring_finder. What is claimed for contact is the `contact_watch`'s.
+Only this file knows the order; ring_finder is detect ► identify ► track. What it knows of its hardware arrives as
+`NavigationSheets`. Named LEDs may come in the place of a frame; they go the same way but for the ring_finder. What is
+claimed for contact is the `contact_watch`'s.
 """
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from dockair.calibration import LedRing, NavigationSheets
 from dockair.errors import DockairError
 from dockair.messages import CameraFrame, ImuSample, LedObservation, NavSolution, PodSignal, TankerAnnouncement
+from dockair.nav.belief_update import POSE_LEDS, BeliefUpdate
 from dockair.nav.contact_watch import ContactWatch, look_back_s
-from dockair.nav.frame_checks import FrameChecks, only, with_numbers
-from dockair.nav.fusion import FusionSettings, RelativeFilter
-from dockair.nav.guidance.approach import Guidance, GuidanceSettings, RelativeState
+from dockair.nav.frame_checks import FrameChecks, with_numbers
+from dockair.nav.fusion import RelativeFilter
+from dockair.nav.guidance.approach import Guidance, RelativeState
 from dockair.nav.guidance.field_of_view import FieldOfView
 from dockair.nav.guidance.phases import Phase
-from dockair.nav.heading.own_heading import OwnHeading, OwnHeadingSettings
+from dockair.nav.heading.own_heading import OwnHeading
 from dockair.nav.identify.code import CodeSettings, code_of
 from dockair.nav.identify.hypotheses import IdentifySettings
 from dockair.nav.identify.perspective import SLOTS
-from dockair.nav.image.detect import DetectSettings
-from dockair.nav.integrity.coasting import CoastingSettings
-from dockair.nav.integrity.contact import ContactClaim, ContactLimits
-from dockair.nav.integrity.fault_test import IntegritySettings
-from dockair.nav.integrity.monitor import IntegrityStatus, check_integrity
-from dockair.nav.pose.estimate import PoseStatus, solve_pose
-from dockair.nav.pose.measurement import lines_of_sight_from_pixels
-from dockair.nav.pose.prior import AttitudePrior
-from dockair.nav.ring_finder import FewSettings, RingFinder
+from dockair.nav.integrity.contact import ContactClaim
+from dockair.nav.navigator_settings import NavigatorSettings
+from dockair.nav.ring_finder import RingFinder
 from dockair.nav.tip_motion import TipMotion
-from dockair.nav.track import TrackSettings
 from dockair.rotations import Array
 from dockair.vectors import is_finite, largest_sigma
 
+__all__ = ["Navigator", "NavigatorSettings"]
+
 _EVEN_LEDS = 5  # four are seldom more than an accident
 _ROUNDING_RAD = 1e-9  # of a sheet's angles
-_POSE_LEDS = 4  # fewer are no pose without a belief ...
 _LONGEST_TICKS = 1.5  # between two stamps, for what is felt at the second to stand for all of the time
-_LEAST_POSE_LEDS = 3  # ... and these are one with its attitude
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class NavigatorSettings:
-    """Settings of every stage."""
-
-    detect: DetectSettings = field(default_factory=DetectSettings)
-    track: TrackSettings = field(default_factory=TrackSettings)
-    few: FewSettings = field(default_factory=FewSettings)
-    integrity: IntegritySettings = field(default_factory=IntegritySettings)
-    contact: ContactLimits = field(default_factory=ContactLimits)
-    coasting: CoastingSettings = field(default_factory=CoastingSettings)
-    fusion: FusionSettings = field(default_factory=FusionSettings)
-    guidance: GuidanceSettings = field(default_factory=GuidanceSettings)
-    tip_levelling_s: float = 60.0  # of the tip's motion: gusts of 1 m/s are then taken for 0.02 m/s^2 of gravity
-    heading: OwnHeadingSettings | None = None  # none: docking needs no heading, and each of its frames shows no LEDs
-    led_position_sigma_m: float = 3e-4  # as-built tolerance of an LED's place on the ring; 0.3 px at 3 m
-    learnt_place_sigmas: float = 4.0  # of that tolerance: so far a learnt place is believed when a frame is tested
-    #: LEDs from which on a frame is tested by itself. Of four any three fit: the range could be off by 0.3 m unseen,
-    #: of five by as much near the frontal attitude. Fewer are tested with the attitude that the frames before showed.
-    alone_leds: int = 6
-    usable_sigma_m: float = 0.10  # lateral 1 sigma above which the state may not be flown on
-    turned_rad: float = np.radians(10.0)  # roll by which a belief is off that its own gate may no longer bridge
-    usable_age_s: float = 0.5  # breakaway practice: a track lost for 0.5 s is lost
-    #: Time for which no frame has been used, after which the ring is looked for anywhere. By then an acceleration that
-    #: is 0.3 m/s^2 in error has moved the belief by 0.6 m, more than the ring's own size.
-    search_anew_s: float = 2.0
 
 
 class Navigator:
@@ -86,9 +53,6 @@ class Navigator:
     def __init__(self, sheets: NavigationSheets, settings: NavigatorSettings | None = None) -> None:
         self._sheets, self._settings = sheets, settings or NavigatorSettings()
         _check_ring(sheets.ring, self._settings.led_position_sigma_m)
-        learnt_sigmas = self._settings.learnt_place_sigmas
-        if not learnt_sigmas >= 0.0:
-            raise DockairError("navigator.learnt_place_sigmas", expected="a number, 0 or more", got=learnt_sigmas)
         contact, coasting = self._settings.contact, self._settings.coasting
         asked_s = look_back_s(sheets, contact, coasting)
         self._filter = RelativeFilter(sheets, self._settings.fusion, look_back_s=asked_s)
@@ -103,16 +67,14 @@ class Navigator:
         self._guidance = Guidance(self._settings.guidance, sheets.control_rate_hz, field_of_view)
         self._heading = None if self._settings.heading is None else OwnHeading(sheets, self._settings.heading)
         self._checks = FrameChecks(1.0 / sheets.camera_rate_hz, self._settings.fusion.buffer_s)
-        self._points_D = sheets.ring.positions_D
-        self._time_s = 0.0
-        self._used_time_s = self._begun_s = float("nan")
+        self._time_s, self._begun_s = 0.0, float("nan")
         self._looked_time_s = 0.0  # when the newest frame came that says something
         self._felt_time_s = 0.0
         self._contact = ContactWatch(sheets, self._filter, contact, coasting)
+        self._update = BeliefUpdate(sheets, self._settings, self._filter, self._contact)
         self._status = self._finder.status
         self._not_shown = False
         self._candidates_px: Array = np.empty((0, 2))
-        self._led_pixels_px: Array = np.full((len(self._points_D), 2), np.nan)
 
     def announce(self, announcement: TankerAnnouncement) -> None:
         """Take note of what the tanker is about to do."""
@@ -144,13 +106,9 @@ class Navigator:
         """Of the newest frame offered to the filter: its chi-square against the belief, and the degrees of freedom."""
         return self._filter.innovation
 
-    def _followed(self, time_s: float) -> bool:
-        """Whether the belief has been corrected lately enough to say which LED a single one is."""
-        return time_s - self._used_time_s <= self._settings.usable_age_s
-
     def _lost(self, time_s: float) -> bool:
         """Whether the belief has followed no frame for so long that it says nothing of where the drogue is."""
-        since_s = self._begun_s if np.isnan(self._used_time_s) else self._used_time_s
+        since_s = self._begun_s if np.isnan(self._update.used_time_s) else self._update.used_time_s
         return time_s - since_s > self._settings.search_anew_s
 
     def _checked(self, frame: CameraFrame | LedObservation) -> CameraFrame | LedObservation | None:
@@ -159,7 +117,8 @@ class Navigator:
         refused = self._checks.refused(frame, clock_s)
         if refused is None:
             return frame
-        self._candidates_px, self._status = np.empty((0, 2)), self._nothing(refused)
+        self._update.nothing()
+        self._candidates_px, self._status = np.empty((0, 2)), refused
         return None
 
     def _give_heading(
@@ -179,124 +138,23 @@ class Navigator:
         time_s = frame.time_stamp_s
         lost, nothing = self._lost(time_s), "ring not found"
         if isinstance(frame, CameraFrame):
-            seen = self._finder.find(frame, followed=self._followed(time_s), lost=lost)
+            seen = self._finder.find(frame, followed=self._update.followed(time_s), lost=lost)
             self._candidates_px, nothing = self._finder.candidates_px, self._finder.status
         else:
             seen = with_numbers(frame)
             self._candidates_px = seen.centroids_px
         self._not_shown = self._shows_no_ring(frame)
-        if lost and len(seen.led_numbers) >= _POSE_LEDS:
-            self._begin_again(seen)
-        return self._use(seen) if len(seen.led_numbers) else self._nothing(nothing)
+        if lost and len(seen.led_numbers) >= POSE_LEDS:
+            self._update.begin_again(seen)
+        if len(seen.led_numbers) > 0:
+            return self._update.use(seen)
+        self._update.nothing()
+        return nothing
 
     def _shows_no_ring(self, frame: CameraFrame | LedObservation) -> bool:
         """Whether a frame is of the whole field, and shows fewer spots than a ring is found by."""
         whole = not isinstance(frame, CameraFrame) or frame.window == self._sheets.camera.full_window
-        return whole and len(self._candidates_px) < _POSE_LEDS
-
-    def _begin_again(self, seen: LedObservation) -> None:
-        """Believe the drogue to be where LEDs that agree show it, whatever was believed while it was lost."""
-        pixels, points_D, camera = seen.centroids_px, self._points_D[seen.led_numbers], self._sheets.camera
-        pose = solve_pose(pixels, points_D, camera, sigma_px=seen.sigma_px)
-        if pose.status is not PoseStatus.CONVERGED:
-            return
-        sigma_px = np.hypot(seen.sigma_px, self._misplaced_px(pose.p_CD))
-        pose = solve_pose(pixels, points_D, camera, sigma_px=sigma_px, initial=(pose.R_CD, pose.p_CD))
-        if pose.status is not PoseStatus.CONVERGED:
-            return
-        checked = check_integrity(pose, None, self._settings.integrity)
-        if checked.status is not IntegrityStatus.INCONSISTENT:
-            self._filter.begin_again(checked.pose, seen.time_stamp_s)
-            self._contact.found_again()
-
-    def _nothing(self, status: str) -> str:
-        self._led_pixels_px = np.full((len(self._points_D), 2), np.nan)
-        return status
-
-    def _use(self, seen: LedObservation) -> str:
-        """Named LEDs to pose to belief; every way out leaves its reason in the status."""
-        time_s, named = seen.time_stamp_s, seen.led_numbers
-        self._led_pixels_px = np.full((len(self._points_D), 2), np.nan)
-        self._led_pixels_px[named] = seen.centroids_px
-        R_CD, p_CD, covariance = self._filter.predicted_pose(time_s)
-        attitude = self._attitude_known(len(named), time_s, R_CD, covariance)
-        tight = self._settings.fusion.coupling == "tight"
-        few = len(named) < (_POSE_LEDS if tight else self._settings.alone_leds)
-        if few and (attitude is None or len(named) < _LEAST_POSE_LEDS or not tight):
-            return self._use_few(seen, R_CD, p_CD)  # a loose filter would take the believed attitude of fewer for new
-        pose = solve_pose(
-            seen.centroids_px,
-            self._believed_points_D(time_s)[named],
-            self._sheets.camera,
-            sigma_px=np.hypot(seen.sigma_px, self._misplaced_px(p_CD)),
-            initial=(R_CD, p_CD),
-            prior=attitude if few else None,
-        )
-        if pose.status is not PoseStatus.CONVERGED:
-            return f"pose {pose.status.value}"
-        checked = check_integrity(pose, attitude, self._settings.integrity)
-        if checked.status is IntegrityStatus.INCONSISTENT:
-            self._contact.contradicted(time_s)
-            return f"pose {checked.status.value}"
-        kept = np.isfinite(checked.pose.led_chi2)  # neither left out nor beyond the lens's edge, where no ray goes
-        self._led_pixels_px[named[~kept]] = np.nan
-        if kept.sum() < _LEAST_POSE_LEDS:  # what is left makes no pose, whose claim it could be
-            return self._use_few(only(seen, kept), R_CD, p_CD)
-        sight = lines_of_sight_from_pixels(
-            seen.centroids_px[kept],
-            self._points_D[named[kept]],
-            self._sheets.camera,
-            self._unlearnt_px(seen, R_CD, p_CD)[kept],
-        )
-        if not self._filter.update(replace(checked.pose, measurement=sight), time_s):
-            self._contact.refused(checked, self._points_D[named[kept]], time_s)
-            return "pose refused by the gate"
-        self._contact.used(checked, self._points_D[named[kept]], time_s)
-        self._used_time_s = max(time_s, self._used_time_s)  # NaN before the first: the first of the two then
-        return "pose used"
-
-    def _misplaced_px(self, p_CD: Array) -> float:
-        """What an LED's place on the ring, as built, moves its image by across the line of sight, one sigma [px]."""
-        return float(self._sheets.camera.focal_length_px * self._settings.led_position_sigma_m / p_CD[0])
-
-    def _unlearnt_px(self, seen: LedObservation, R_CD: Array, p_CD: Array) -> Array:
-        """(n,) sigma of the LEDs' images for the filter: the centroid's, and that of what it does not learn [px].
-
-        It learns the LEDs' places in the ring's plane, and takes none to be out of it. One that is shows the more the
-        farther it is seen off the drogue's axis: less than the centroid's noise 8 m ahead, ten times it at the ring.
-        """
-        arm_D = self._points_D[seen.led_numbers] + R_CD.T @ p_CD
-        slope = np.hypot(arm_D[:, 1], arm_D[:, 2]) / np.abs(arm_D[:, 0])
-        return np.asarray(np.hypot(seen.sigma_px, self._misplaced_px(p_CD) * slope))
-
-    def _believed_points_D(self, time_s: float) -> Array:
-        """(count, 3) places of the LEDs as far as the belief has learnt them, for a frame that tests itself [m].
-
-        Each axis departs from the sheet by at most a set number of tolerances: a fault that grows too slowly for any
-        one frame to see is learnt like a place, and is then seen at last.
-        """
-        most_m = self._settings.learnt_place_sigmas * self._settings.led_position_sigma_m
-        learnt_D = self._filter.led_points_D(time_s) - self._points_D
-        return np.asarray(self._points_D + np.minimum(np.maximum(learnt_D, -most_m), most_m))
-
-    def _attitude_known(self, leds: int, time_s: float, R_CD: Array, covariance: Array) -> AttitudePrior | None:
-        """The attitude that is believed, where the LEDs of one frame are too few to test one another without it."""
-        if leds >= self._settings.alone_leds or not self._followed(time_s):
-            return None
-        return AttitudePrior(R_CD=R_CD, information=np.linalg.inv(covariance[:3, :3]))
-
-    def _use_few(self, seen: LedObservation, R_CD: Array, p_CD: Array) -> str:
-        """LEDs too few for a pose correct a belief that follows the drogue, and begin none."""
-        time_s = seen.time_stamp_s
-        if self._settings.fusion.coupling != "tight" or not self._followed(time_s):
-            return "pose too few LEDs"
-        sigma_px = self._unlearnt_px(seen, R_CD, p_CD)
-        if not self._filter.update_leds(seen.centroids_px, self._points_D[seen.led_numbers], sigma_px, time_s):
-            self._contact.contradicted(time_s)
-            return "LEDs refused by the gate"
-        self._used_time_s = max(time_s, self._used_time_s)
-        self._contact.corrected(time_s)
-        return "LEDs used"
+        return whole and len(self._candidates_px) < POSE_LEDS
 
     def contact_claim(self) -> ContactClaim | None:
         """Whether contact may be flown on the present belief, and why not; None before the first pose that was used."""
@@ -305,7 +163,7 @@ class Navigator:
     def _solution(self) -> NavSolution:
         state = self._filter.state(self._time_s)
         sigma_lateral_m = largest_sigma(state.covariance[4:6, 4:6])
-        aged_s = self._time_s - self._used_time_s
+        aged_s = self._time_s - self._update.used_time_s
         known = is_finite(state.p_PD_B) and is_finite(state.rate_PD_B) and is_finite(state.covariance)
         recent = -0.5 / self._sheets.control_rate_hz <= aged_s <= self._settings.usable_age_s
         valid = known and sigma_lateral_m <= self._settings.usable_sigma_m and recent
@@ -340,9 +198,9 @@ class Navigator:
             covariance=state.covariance if valid else np.full((9, 9), np.nan),
             command=command,
             window=None if np.isfinite(exposure_s) else self._finder.window(self._time_s),
-            frame_time_stamp_s=self._used_time_s,
+            frame_time_stamp_s=self._update.used_time_s,
             candidates_px=self._candidates_px,
-            led_pixels_px=self._led_pixels_px,
+            led_pixels_px=self._update.led_pixels_px,
             contact_usable=contact_usable,
             phase_reason=self._guidance.phase_reason,
             exposure_s=exposure_s,

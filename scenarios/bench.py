@@ -23,7 +23,7 @@ PARTS: dict[str, tuple[str, str]] = {
     "sensor": ("dockair.sim.camera.camera", "NearInfraredCamera.expose"),
     "detect": ("dockair.nav.ring_finder", "detect"),
     "identify": ("dockair.nav.ring_finder", "identify"),
-    "pose": ("dockair.nav.navigator", "solve_pose"),
+    "pose": ("dockair.nav.belief_update", "solve_pose"),
     "navigation": ("dockair.nav.navigator", "Navigator.step"),
 }
 #: What a part contains of the others; its share is its own time without theirs.
