@@ -76,9 +76,6 @@ class BeliefUpdate:
         """Take note of a frame without named LEDs."""
         self.led_pixels_px = self._none()
 
-    def _none(self) -> Array:
-        return np.full((len(self._points_D), 2), np.nan)
-
     def use(self, seen: LedObservation) -> str:
         """Correct the belief by a frame's named LEDs, one at least; return what became of it."""
         time_s, named = seen.time_stamp_s, seen.led_numbers
@@ -120,6 +117,9 @@ class BeliefUpdate:
         self._contact.used(checked, self._points_D[named[kept]], time_s)
         self.used_time_s = max(time_s, self.used_time_s)  # NaN before the first: the first of the two then
         return "pose used"
+
+    def _none(self) -> Array:
+        return np.full((len(self._points_D), 2), np.nan)
 
     def _misplaced_px(self, p_CD: Array) -> float:
         """What an LED's place on the ring, as built, moves its image by across the line of sight, one sigma [px]."""
