@@ -53,7 +53,11 @@ def through_another(a, b):
 
 @pytest.fixture
 def load_source(tmp_path, monkeypatch):
-    """Function that writes a module, unless it stands there, and imports it anew, as another process would."""
+    """Function that writes a module, unless it stands there, and imports it anew, as another process would.
+
+    Python keeps no bytecode of it: it would take an edit of the same length within a second for none.
+    """
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
 
     def load(name: str, source: str) -> ModuleType:
         path = tmp_path / f"{name}.py"
