@@ -72,11 +72,6 @@ class BeliefBuffer:
         return self._start
 
     @property
-    def newest(self) -> Node | None:
-        """The head, or the last node; None before the first message."""
-        return self._renewed_head() or (self._nodes[-1] if self._nodes else None)
-
-    @property
     def last(self) -> Node | None:
         """The last node, whose beliefs hold what no motion changes as well as the newest; None before the first."""
         return self._nodes[-1] if self._nodes else None

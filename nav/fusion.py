@@ -181,7 +181,7 @@ class RelativeFilter:
     def state(self, time_s: float | None = None) -> FilterState:
         """Return the belief at a time; at that of the newest message if none is given."""
         if time_s is None:
-            time_s = self._buffer.newest_s if self._buffer.newest is not None else 0.0
+            time_s = self._buffer.newest_s if self._buffer.last is not None else 0.0
         belief, r, average_s = self._belief(time_s), self._p_IP, self._settings.rate_average_s
         w_B = self._record.mean_rate_B(time_s, average_s) - belief.bias
         rate2 = self._rate_variance(time_s)

@@ -140,7 +140,7 @@ class OverlappedExposures:
 
     @property
     def waited_s(self) -> float:
-        """Wall time for which the flight has waited for frames so far."""
+        """See `exposures.Exposures`."""
         return self._answers.waited_s
 
     def close(self) -> None:

@@ -42,6 +42,11 @@ class Exposures(Protocol):
         """Return the newest frame that has arrived; it is then taken, and older ones are dropped."""
         ...
 
+    @property
+    def waited_s(self) -> float:
+        """Wall time for which the flight has waited for another process so far."""
+        ...
+
     def close(self) -> None:
         """End what runs beside the flight; twice is once."""
         ...
@@ -53,6 +58,8 @@ class ExposuresInTurn:
     Args:
         camera: or what stands in its place.
     """
+
+    waited_s = 0.0  #: the camera's work is the flight's own
 
     def __init__(self, camera: Senses) -> None:
         self._camera = camera

@@ -81,7 +81,7 @@ class Flight:
     @property
     def waited_for_camera_s(self) -> float:
         """Wall time so far in which nothing went on but the camera, in a process of its own; 0 where it has none."""
-        return self._exposures.waited_s if isinstance(self._exposures, OverlappedExposures) else 0.0
+        return 0.0 if self._exposures is None else self._exposures.waited_s
 
     def step(self, command: ReceiverCommand | None = None) -> Tick:
         """Advance by one control tick.
