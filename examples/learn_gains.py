@@ -16,7 +16,7 @@ import gymnasium
 import numpy as np
 
 import dockair  # noqa: F401 - makes the environments known
-from dockair.scenarios.envs_tables import OBSERVATION
+from dockair.scenarios.envs.tables import OBSERVATION
 from dockair.scenarios.schema import load_scenario
 
 INDEX = {entry.name: k for k, entry in enumerate(OBSERVATION)}

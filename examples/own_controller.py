@@ -13,7 +13,7 @@ import gymnasium
 import numpy as np
 
 import dockair  # noqa: F401 - makes the environments known
-from dockair.scenarios.envs_tables import OBSERVATION
+from dockair.scenarios.envs.tables import OBSERVATION
 
 INDEX = {entry.name: k for k, entry in enumerate(OBSERVATION)}
 STAND_OFF_M, CLOSING_M_S = 4.0, 1.2

@@ -11,7 +11,7 @@ import gymnasium
 import numpy as np
 
 import dockair  # noqa: F401 - makes the environments known
-from dockair.scenarios.envs_tables import ACTION, OBSERVATION
+from dockair.scenarios.envs.tables import ACTION, OBSERVATION
 
 FIRST = [entry.name for entry in OBSERVATION].index("navigator_command_velocity_x")
 

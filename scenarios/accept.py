@@ -13,10 +13,10 @@ from pydantic import Field, model_validator
 
 from dockair.errors import DockairError
 from dockair.nav.guidance.phases import REFUELLED
-from dockair.scenarios.table import Table
+from dockair.scenarios.tables.table import Table
 
 if TYPE_CHECKING:
-    from dockair.scenarios.attempts import RefereeLimits
+    from dockair.scenarios.judgement.attempts import RefereeLimits
 
 OutcomeName = Literal["contact", "miss", "rim_strike", "abort", "collision", "timeout", "diverged"]
 
@@ -200,7 +200,9 @@ _IN_WORDS = {
 
 
 def _good_contact() -> "RefereeLimits":
-    from dockair.scenarios.attempts import RefereeLimits  # loads an engine, which who reads a scenario does not need
+    from dockair.scenarios.judgement.attempts import (
+        RefereeLimits,  # loads an engine, which who reads a scenario does not need
+    )
 
     return RefereeLimits()
 

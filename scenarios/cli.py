@@ -17,11 +17,11 @@ import typer
 
 import dockair
 from dockair.errors import DockairError
-from dockair.scenarios.allan_command import allan
-from dockair.scenarios.campaign_command import campaign
-from dockair.scenarios.cli_options import Json, ScenarioName, Seed, Settings, overrides, print_json, stdout_kept
-from dockair.scenarios.design_ring_command import design_ring
-from dockair.scenarios.report_command import report
+from dockair.scenarios.commands.allan import allan
+from dockair.scenarios.commands.campaign import campaign
+from dockair.scenarios.commands.design_ring import design_ring
+from dockair.scenarios.commands.options import Json, ScenarioName, Seed, Settings, overrides, print_json, stdout_kept
+from dockair.scenarios.commands.report import report
 from dockair.scenarios.std_streams import outlive_readers
 
 if TYPE_CHECKING:
@@ -73,7 +73,7 @@ def fly(
     as_json: Json = False,
 ) -> None:
     """Fly a scenario and write its result, logs, recording and picture to a folder (docs/results.md)."""
-    from dockair.scenarios.output import FlightProgress, show_result
+    from dockair.scenarios.commands.output import FlightProgress, show_result
     from dockair.scenarios.output_folder import check_output_folder, default_output_folder
     from dockair.scenarios.schema import load_scenario
 
@@ -104,8 +104,8 @@ def scenarios(
     as_json: Json = False,
 ) -> None:
     """List the library's scenarios, what each is there to show and what it is held to; show one whole, or all keys."""
-    from dockair.scenarios import library_output
-    from dockair.scenarios.cli_keys import scenario_keys
+    from dockair.scenarios.commands import library_output
+    from dockair.scenarios.commands.keys import scenario_keys
     from dockair.scenarios.scenario_file import scenario_names
     from dockair.scenarios.schema import load_scenario
 
@@ -156,7 +156,7 @@ def reproduce(
     as_json: Json = False,
 ) -> None:
     """Reproduce a published figure or table: ours beside the source's, and a picture."""
-    from dockair.scenarios.output import show_reproduction, show_reproductions, show_working
+    from dockair.scenarios.commands.output import show_reproduction, show_reproductions, show_working
     from dockair.scenarios.reproduce import registry
     from dockair.scenarios.reproduce.reference import picture_name
 
@@ -205,9 +205,9 @@ def bench(
     world, beside a bare step of MuJoCo. Only flight and sensors depend on the
     scenario.
     """
-    from dockair.scenarios.bench import bench as bench_scenario
-    from dockair.scenarios.bench import bench_stages
-    from dockair.scenarios.output import show_bench, show_stages_bench, show_working
+    from dockair.scenarios.bench.run import bench as bench_scenario
+    from dockair.scenarios.bench.run import bench_stages
+    from dockair.scenarios.commands.output import show_bench, show_stages_bench, show_working
     from dockair.scenarios.schema import load_scenario
 
     chosen = load_scenario(scenario, overrides(settings))
@@ -237,8 +237,8 @@ app.command()(report)
 @app.command()
 def doctor(as_json: Json = False) -> None:
     """Check the machine: Python, links, off-screen OpenGL, cores, memory, disk, packages."""
+    from dockair.scenarios.commands.output import show_checks
     from dockair.scenarios.doctor import examine, is_fit, package_versions, to_json
-    from dockair.scenarios.output import show_checks
 
     checks = examine(Path("out"))
     if as_json:

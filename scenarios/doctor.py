@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from dockair.errors import MachineError
-from dockair.scenarios.light_tables import CameraOptions
+from dockair.scenarios.tables.light import CameraOptions
 from dockair.sim.opengl import APT_PACKAGES, RENDER_SCRIPT, TIMEOUT_S, kind_of_context, try_drawing
 
 PYTHON_AT_LEAST = (3, 11)

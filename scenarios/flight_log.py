@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from dockair.messages import CameraFrame, ImuSample, LedObservation, NavSolution
 from dockair.rotations import Array, quaternion_from_matrix
-from dockair.scenarios.metrics import true_relative_state
+from dockair.scenarios.judgement.metrics import true_relative_state
 from dockair.sim.truth import Truth
 
 FILE_NAME = "flight.parquet"

@@ -15,14 +15,14 @@ import numpy as np
 
 from dockair.errors import DockairError, check_integer
 from dockair.messages import ImuSample, NavSolution, PodSignal, ReceiverCommand, TankerAnnouncement
-from dockair.scenarios.attempts import RefereeLimits
-from dockair.scenarios.build import build
+from dockair.scenarios.assembly.parts import build
 from dockair.scenarios.camera_process import OverlappedExposures, can_overlap
 from dockair.scenarios.exposures import Exposures, ExposuresInTurn, Frame
+from dockair.scenarios.judgement.attempts import RefereeLimits
+from dockair.scenarios.judgement.referee import Outcome, Referee
+from dockair.scenarios.judgement.result import Result
 from dockair.scenarios.plug_in import announce_to, signal_to, step_navigator
 from dockair.scenarios.recorder import Recorder
-from dockair.scenarios.referee import Outcome, Referee
-from dockair.scenarios.result import Result
 from dockair.scenarios.schema import Scenario
 from dockair.scenarios.truth_navigation import TruthNavigator
 from dockair.sim.truth import Truth

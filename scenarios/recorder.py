@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Self
 
 from dockair.errors import DockairError
 from dockair.messages import LedObservation
-from dockair.scenarios.causes import flown_of
 from dockair.scenarios.flight_log import FlightLog
+from dockair.scenarios.judgement.causes import flown_of
+from dockair.scenarios.judgement.referee import Outcome
+from dockair.scenarios.judgement.result import Result, held_to, summarise
 from dockair.scenarios.message_log import MessageLog, read_messages
 from dockair.scenarios.output_folder import FlightFolder, utf8_path_of
-from dockair.scenarios.referee import Outcome
-from dockair.scenarios.result import Result, held_to, summarise
 
 if TYPE_CHECKING:  # the loop imports this module
     from dockair.scenarios.loop import Flight, Tick
@@ -103,8 +103,8 @@ class Recorder:
         return result
 
     def _write(self, flight: "Flight", result: Result, folder: Path) -> None:
-        from dockair.scenarios.picture import picture_of_flight
-        from dockair.scenarios.recording import write_episode
+        from dockair.scenarios.picture.flight import picture_of_flight
+        from dockair.scenarios.recording.episode import write_episode
         from dockair.sim.shapes import shapes_of
 
         result.write(folder)

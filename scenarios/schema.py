@@ -16,14 +16,14 @@ from dockair.errors import DockairError
 from dockair.parameters import load_parameters, read_sheet
 from dockair.rotations import Array
 from dockair.scenarios.accept import Accept
-from dockair.scenarios.air_tables import BowWave, Gusts, Turbulence, Wake
-from dockair.scenarios.crew_tables import Guidance, Navigation
-from dockair.scenarios.fault_tables import FaultTable
-from dockair.scenarios.flight_tables import FlightConditions, Rates, Start, Tanker
-from dockair.scenarios.light_tables import CameraOptions, Sun, Weather
 from dockair.scenarios.refusal import Expected, refusal
 from dockair.scenarios.scenario_file import ScenarioFile
-from dockair.scenarios.table import Table, tuple_from_list
+from dockair.scenarios.tables.air import BowWave, Gusts, Turbulence, Wake
+from dockair.scenarios.tables.crew import Guidance, Navigation
+from dockair.scenarios.tables.fault import FaultTable
+from dockair.scenarios.tables.flight import FlightConditions, Rates, Start, Tanker
+from dockair.scenarios.tables.light import CameraOptions, Sun, Weather
+from dockair.scenarios.tables.table import Table, tuple_from_list
 from dockair.streams import LARGEST_SEED
 
 ReceiverSheet = Literal["airframe", "flight_control", "mounting", "bow_wave"]

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import dockair
 from dockair.errors import DockairError
-from dockair.scenarios.build_measured import FITTED_IN
+from dockair.scenarios.assembly.measured import FITTED_IN
 from dockair.scenarios.campaign.jobs import Job
 
 #: Beginnings of names in `scenarios` whose files show, compare or plan flights and do not fly them; library and plans
@@ -25,7 +25,7 @@ _NOT_FLOWN = tuple(
     "allan bench campaign cli design_ring doctor library output parameters_page picture plans recording replay report "
     "reproduce statistics".split()
 )
-_OF_ALL = f"library/{FITTED_IN}.toml"  # its light, against which `build_measured` holds a scenario's own
+_OF_ALL = f"library/{FITTED_IN}.toml"  # its light, against which `assembly.measured` holds a scenario's own
 _NO_SOURCES = (".pyc", ".nbi", ".nbc", ".md", "~", "#")  # ends of names: caches, documents, what editors leave
 _OURS, _SHEETS = "dockair", "sheets"
 _SETTLED_NS = 2_000_000_000  # a file younger than the ticks of any file system's clock may change and look the same

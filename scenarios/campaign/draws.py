@@ -20,7 +20,7 @@ from pydantic import BeforeValidator, Field
 
 from dockair.errors import DockairError
 from dockair.scenarios.refusal import Expected
-from dockair.scenarios.table import Table, tuple_from_list
+from dockair.scenarios.tables.table import Table, tuple_from_list
 
 SamplerName = Literal["grid", "random", "latin_hypercube"]
 Value = bool | int | float | str

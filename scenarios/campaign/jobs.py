@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from dockair.errors import DockairError
-from dockair.scenarios.buildable import require_buildable
+from dockair.scenarios.assembly.buildable import require_buildable
 from dockair.scenarios.campaign.draws import Point
 from dockair.scenarios.campaign.plan import Entry
 from dockair.scenarios.campaign.plan_file import PlanFile

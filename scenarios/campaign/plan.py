@@ -12,7 +12,7 @@ from pydantic import BeforeValidator, Field
 
 from dockair.scenarios.campaign.draws import Draw, SamplerName
 from dockair.scenarios.refusal import Expected
-from dockair.scenarios.table import Table, tuple_from_list
+from dockair.scenarios.tables.table import Table, tuple_from_list
 from dockair.streams import LARGEST_SEED
 
 MOST_SEEDS = 100_000

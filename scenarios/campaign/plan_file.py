@@ -12,7 +12,7 @@ from dockair.scenarios.campaign.plan import Plan, RatesAsked
 from dockair.scenarios.refusal import refusal
 from dockair.scenarios.scenario_file import scenario_names
 from dockair.scenarios.schema import Scenario
-from dockair.scenarios.table import Table
+from dockair.scenarios.tables.table import Table
 from dockair.scenarios.toml_files import PLANS, SCENARIOS, read_toml, toml_value
 
 _T = TypeVar("_T", bound=Table)

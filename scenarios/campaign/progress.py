@@ -12,7 +12,7 @@ from rich.text import Text
 
 from dockair.scenarios.campaign.jobs import Job
 from dockair.scenarios.campaign.row import flight_of, unflown
-from dockair.scenarios.output import plain_console
+from dockair.scenarios.commands.output import plain_console
 from dockair.scenarios.report.groups import groups_of
 from dockair.scenarios.statistics import wilson_interval
 

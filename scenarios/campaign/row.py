@@ -11,8 +11,8 @@ from typing import Any, TypeGuard
 from dockair.parameters import read_sheet
 from dockair.scenarios.campaign.jobs import Job
 from dockair.scenarios.campaign.worker import Answer
-from dockair.scenarios.metrics import HeadingFigures, NavigationFigures
-from dockair.scenarios.result import Result
+from dockair.scenarios.judgement.metrics import HeadingFigures, NavigationFigures
+from dockair.scenarios.judgement.result import Result
 
 Row = dict[str, Any]
 

@@ -23,9 +23,9 @@ from dockair.rotations import Array
 from dockair.scenarios.accept import has_refuelled
 from dockair.scenarios.campaign.points import runs_of
 from dockair.scenarios.campaign.row import SET
-from dockair.scenarios.crew_tables import OUR_NAVIGATOR
-from dockair.scenarios.no_attempt import cause_and_ending, ending
+from dockair.scenarios.judgement.no_attempt import cause_and_ending, ending
 from dockair.scenarios.statistics import wilson_interval
+from dockair.scenarios.tables.crew import OUR_NAVIGATOR
 
 Row = Mapping[str, Any]
 

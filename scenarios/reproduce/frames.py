@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from dockair.messages import CameraFrame, Window
 from dockair.rotations import Array, quaternion_from_matrix
-from dockair.scenarios.build import Parts, build, camera_sheets
+from dockair.scenarios.assembly.parts import Parts, build, camera_sheets
 from dockair.scenarios.schema import load_scenario
 from dockair.sim.camera.camera import NearInfraredCamera
 from dockair.sim.camera.electronics import output_gain

@@ -24,7 +24,7 @@ from dockair.nav.fusion import FusionSettings
 from dockair.nav.fusion_settings import swing_covariance
 from dockair.parameters import load_parameters
 from dockair.rotations import Array, exp, matrix_from_yaw_pitch_roll
-from dockair.scenarios.mounting_parameters import MountingParameters
+from dockair.scenarios.assembly.mounting_parameters import MountingParameters
 from dockair.sim.as_built import AsBuilt, AsBuiltParameters, draw_as_built
 from dockair.sim.camera.sheets import LedParameters
 from dockair.sim.imu import Imu, ImuParameters

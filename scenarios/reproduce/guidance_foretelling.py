@@ -20,7 +20,7 @@ from dockair.nav.guidance.own_path import OwnPath
 from dockair.nav.guidance.stabilised_axes import StabilisedAxes
 from dockair.nav.guidance.swing_model import SwingSettings
 from dockair.rotations import Array
-from dockair.scenarios.build import guidance_settings
+from dockair.scenarios.assembly.parts import guidance_settings
 from dockair.scenarios.loop import Flight
 from dockair.scenarios.reproduce.reference import picture_name
 from dockair.scenarios.schema import load_scenario

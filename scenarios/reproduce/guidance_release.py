@@ -13,7 +13,7 @@ import numpy as np
 
 from dockair.nav.navigator import Navigator, NavigatorSettings
 from dockair.rotations import Array
-from dockair.scenarios.build import guidance_settings
+from dockair.scenarios.assembly.parts import guidance_settings
 from dockair.scenarios.loop import Flight
 from dockair.scenarios.reproduce.reference import picture_name
 from dockair.scenarios.schema import load_scenario

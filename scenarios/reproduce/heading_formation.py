@@ -18,7 +18,7 @@ from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
 
 from dockair.rotations import Array
-from dockair.scenarios.build_receiver import airframe
+from dockair.scenarios.assembly.receiver import airframe
 from dockair.scenarios.schema import load_scenario
 from dockair.sim.air.atmosphere import STANDARD_GRAVITY_M_S2, standard_atmosphere
 from dockair.sim.aircraft.tanker import TankerPath, TankerPathParameters

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from dockair.messages import CameraFrame, LedObservation
 from dockair.nav.image.detect import detect
 from dockair.rotations import Array
-from dockair.scenarios.build_measured import measured_leds
+from dockair.scenarios.assembly.measured import measured_leds
 from dockair.scenarios.loop import Flight
 from dockair.scenarios.measured_leds import View
 from dockair.scenarios.schema import load_scenario

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from dockair.scenarios.build_measured import FITTED_IN
+from dockair.scenarios.assembly.measured import FITTED_IN
 from dockair.scenarios.reproduce.measurement_frames import seen_in_flight
 from dockair.scenarios.reproduce.measurement_model import beside, standing
 from dockair.scenarios.reproduce.reference import picture_name

@@ -17,7 +17,7 @@ import numpy as np
 
 from dockair.parameters import load_parameters
 from dockair.rotations import Array
-from dockair.scenarios.build_measured import SHEET
+from dockair.scenarios.assembly.measured import SHEET
 from dockair.scenarios.measured_leds import MeasurementParameters
 from dockair.scenarios.reproduce.measurement_fit import Fitted, fit
 from dockair.scenarios.reproduce.measurement_frames import Mask, Seen, joined, seen_in_flight

@@ -20,7 +20,7 @@ import numpy as np
 
 from dockair.messages import ReceiverCommand
 from dockair.parameters import load_parameters
-from dockair.scenarios.referee import Outcome, Referee
+from dockair.scenarios.judgement.referee import Outcome, Referee
 from dockair.scenarios.reproduce.driven import PHYSICS_HZ, driven_world
 from dockair.scenarios.reproduce.reference import picture_name
 from dockair.sim.hose.chain import DrogueParameters

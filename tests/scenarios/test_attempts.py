@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from dockair.rotations import exp
-from dockair.scenarios.attempts import Attempt, first_attempt_succeeded, is_good_contact, succeeded
+from dockair.scenarios.judgement.attempts import Attempt, first_attempt_succeeded, is_good_contact, succeeded
+from dockair.scenarios.judgement.referee import Outcome, Referee
 from dockair.scenarios.loop import Flight
-from dockair.scenarios.referee import Outcome, Referee
 from dockair.scenarios.schema import load_scenario
 from dockair.sim.truth import Truth
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from dockair.scenarios.bench import PARTS, bench
+from dockair.scenarios.bench.run import PARTS, bench
 from dockair.scenarios.schema import load_scenario
 
 pytestmark = [pytest.mark.slow, pytest.mark.gl]
@@ -32,7 +32,7 @@ def test_the_stopwatches_are_gone_afterwards():
 
 
 def test_the_image_bench_counts_the_leds_of_its_frames_and_times_every_detector(monkeypatch):
-    from dockair.scenarios import bench_image as image
+    from dockair.scenarios.bench import image
 
     monkeypatch.setattr(image, "TITLES", ("30 m", "6 m, Sun behind", "night"))
     for name in ("_REPETITIONS", "_TRIAL_REPETITIONS", "_WINDOW_REPETITIONS", "_CASES", "_CASE_REPETITIONS"):
@@ -56,7 +56,7 @@ def test_identification_is_timed_on_forty_candidates_of_which_eight_are_a_ring()
 
     from dockair.calibration import Camera
     from dockair.nav.identify.ring import identify
-    from dockair.scenarios.bench_image import _ring_among_clutter
+    from dockair.scenarios.bench.image import _ring_among_clutter
 
     points = _ring_among_clutter(np.random.default_rng(1), Camera())
     assert points.shape == (40, 2)
@@ -66,7 +66,7 @@ def test_identification_is_timed_on_forty_candidates_of_which_eight_are_a_ring()
 
 
 def test_the_world_bench_times_mujoco_and_every_part_of_ours(monkeypatch):
-    from dockair.scenarios import bench_world as bench_of_world
+    from dockair.scenarios.bench import world as bench_of_world
 
     for name in ("_SETTLE_TICKS", "_ROUNDS", "_TICKS", "_WARM_TICKS"):
         monkeypatch.setattr(bench_of_world, name, 2)

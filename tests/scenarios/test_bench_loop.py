@@ -2,7 +2,7 @@
 
 import pytest
 
-from dockair.scenarios import bench_loop as loop
+from dockair.scenarios.bench import loop
 
 
 def test_of_every_case_the_fastest_turn_stands_beside_median_and_slowest(monkeypatch):

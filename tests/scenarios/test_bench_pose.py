@@ -3,7 +3,7 @@
 import cv2
 import pytest
 
-from dockair.scenarios import bench_pose as pose
+from dockair.scenarios.bench import pose
 
 
 @pytest.mark.slow

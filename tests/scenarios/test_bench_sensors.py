@@ -4,7 +4,7 @@ import os
 
 import pytest
 
-from dockair.scenarios import bench_sensors as sensors
+from dockair.scenarios.bench import sensors
 from dockair.scenarios.schema import load_scenario
 
 

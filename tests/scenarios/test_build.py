@@ -12,10 +12,10 @@ from dockair.errors import DockairError
 from dockair.messages import Window
 from dockair.nav.guidance.approach import GuidanceSettings
 from dockair.parameters import load_parameters
-from dockair.scenarios.build import build, guidance_settings
-from dockair.scenarios.buildable import require_buildable
+from dockair.scenarios.assembly.buildable import require_buildable
+from dockair.scenarios.assembly.mounting_parameters import MountingParameters
+from dockair.scenarios.assembly.parts import build, guidance_settings
 from dockair.scenarios.message_log import numbers
-from dockair.scenarios.mounting_parameters import MountingParameters
 from dockair.scenarios.schema import load_scenario
 from dockair.scenarios.truth_navigation import TruthNavigator
 from dockair.sim.hose.coupling import CouplingParameters

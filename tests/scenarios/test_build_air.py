@@ -6,7 +6,7 @@ import pytest
 from dockair.clock import Clock
 from dockair.errors import DockairError
 from dockair.parameters import load_parameters
-from dockair.scenarios.build_air import air_motion
+from dockair.scenarios.assembly.air import air_motion
 from dockair.scenarios.schema import load_scenario
 from dockair.sim.air.discrete_gust import DiscreteGusts
 from dockair.sim.air.turbulence import DrydenField

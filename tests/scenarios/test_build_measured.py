@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from dockair.calibration import Camera
-from dockair.scenarios.build_measured import FITTED_IN, texture_light
+from dockair.scenarios.assembly.measured import FITTED_IN, texture_light
 from dockair.scenarios.measured_leds import TextureLight
 from dockair.scenarios.reproduce.measurement_model import FITTED, HELD_OUT
 from dockair.scenarios.schema import load_scenario

@@ -5,8 +5,8 @@ import sys
 import numpy as np
 import pytest
 
-from dockair.scenarios import build as build_module
-from dockair.scenarios import build_measured
+from dockair.scenarios.assembly import measured as build_measured
+from dockair.scenarios.assembly import parts as build_module
 from dockair.scenarios.loop import Flight
 from dockair.scenarios.schema import load_scenario
 from dockair.sim.camera import camera_noise

@@ -15,7 +15,7 @@ import pytest
 from dockair.errors import DockairError, MachineError
 from dockair.messages import Window
 from dockair.scenarios import camera_process
-from dockair.scenarios.build import build
+from dockair.scenarios.assembly.parts import build
 from dockair.scenarios.camera_process import OverlappedExposures, can_overlap
 from dockair.scenarios.exposures import ExposuresInTurn
 from dockair.scenarios.loop import Flight, fly

@@ -6,16 +6,16 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
-from dockair.scenarios.attempts import Attempt
 from dockair.scenarios.campaign.jobs import jobs_of
 from dockair.scenarios.campaign.plan_file import PlanFile
 from dockair.scenarios.campaign.row import COLUMNS, column_names, columns_of, is_row, row_of, unflown
 from dockair.scenarios.campaign.summary import summary_of
 from dockair.scenarios.campaign.table import read_table, write_table
 from dockair.scenarios.campaign.worker import Answer
-from dockair.scenarios.metrics import HeadingFigures, NavigationFigures
-from dockair.scenarios.referee import Contact
-from dockair.scenarios.result import Result
+from dockair.scenarios.judgement.attempts import Attempt
+from dockair.scenarios.judgement.metrics import HeadingFigures, NavigationFigures
+from dockair.scenarios.judgement.referee import Contact
+from dockair.scenarios.judgement.result import Result
 
 
 @pytest.fixture

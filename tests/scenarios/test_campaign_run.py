@@ -20,7 +20,7 @@ import pytest
 from rich.console import Console
 
 from dockair.errors import DockairError, MachineError
-from dockair.scenarios import campaign_command, cli
+from dockair.scenarios import cli
 from dockair.scenarios.campaign import manifest
 from dockair.scenarios.campaign import pool as pool_module
 from dockair.scenarios.campaign import run as run_module
@@ -37,6 +37,7 @@ from dockair.scenarios.campaign.run import run
 from dockair.scenarios.campaign.table import read_table
 from dockair.scenarios.campaign.whole_file import write_whole
 from dockair.scenarios.campaign.worker import Answer, one_line
+from dockair.scenarios.commands import campaign as campaign_command
 from dockair.sim.opengl import Trial
 
 #: Flies nothing: answers after a while that the seed decides, or comes to the end that the seed decides.

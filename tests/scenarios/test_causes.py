@@ -8,8 +8,16 @@ import pytest
 
 from dockair.messages import NavSolution, ReceiverCommand
 from dockair.rotations import exp
-from dockair.scenarios.attempts import Attempt
-from dockair.scenarios.causes import CAUSES, CauseRules, Flown, cause_of_flight, flown_of, unforeseen_motion, with_cause
+from dockair.scenarios.judgement.attempts import Attempt
+from dockair.scenarios.judgement.causes import (
+    CAUSES,
+    CauseRules,
+    Flown,
+    cause_of_flight,
+    flown_of,
+    unforeseen_motion,
+    with_cause,
+)
 from dockair.scenarios.schema import load_scenario
 from dockair.sim.faults import CameraDropOut, DeadReel, LedOff
 
@@ -352,7 +360,7 @@ def test_an_attempt_that_ended_before_the_departure_has_its_own_cause(flight):
 
 
 def test_every_cause_is_in_the_modules_table_and_every_one_there_is_known():
-    import dockair.scenarios.causes as causes
+    import dockair.scenarios.judgement.causes as causes
 
     rows = [line.split("|")[1].strip() for line in causes.__doc__.splitlines() if line.startswith("| ")]
     assert {row for row in rows if row and row != "cause"} | {"never_steady"} == set(CAUSES)

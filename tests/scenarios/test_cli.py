@@ -17,12 +17,12 @@ from rich.text import Text
 
 from dockair.errors import DockairError, MachineError
 from dockair.scenarios import cli, doctor
-from dockair.scenarios.cli_options import overrides
-from dockair.scenarios.flight_profile import PhaseEntry
-from dockair.scenarios.metrics import NavigationFigures
+from dockair.scenarios.commands.options import overrides
+from dockair.scenarios.judgement.flight_profile import PhaseEntry
+from dockair.scenarios.judgement.metrics import NavigationFigures
+from dockair.scenarios.judgement.referee import Contact
+from dockair.scenarios.judgement.result import Result, held_to
 from dockair.scenarios.output_folder import FlightFolder
-from dockair.scenarios.referee import Contact
-from dockair.scenarios.result import Result, held_to
 from dockair.scenarios.schema import load_scenario
 from dockair.sim import opengl
 

@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from dockair.errors import DockairError
-from dockair.scenarios.cli_keys import keys_page, scenario_keys
-from dockair.scenarios.library_output import show_keys
+from dockair.scenarios.commands.keys import keys_page, scenario_keys
+from dockair.scenarios.commands.library_output import show_keys
 from dockair.scenarios.scenario_file import scenario_names, scenario_text
 from dockair.scenarios.schema import Scenario, load_scenario
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from dockair.rotations import exp
-from dockair.scenarios.departure import Departure, DepartureLimits
+from dockair.scenarios.judgement.departure import Departure, DepartureLimits
 from dockair.scenarios.loop import Flight
 from dockair.scenarios.schema import load_scenario
 

@@ -17,7 +17,9 @@ from dockair.nav.pose.measurement import lines_of_sight_from_pixels
 from dockair.nav.pose.planar import mirrored
 from dockair.rotations import exp
 from dockair.scenarios import cli
-from dockair.scenarios.design_ring import (
+from dockair.scenarios.design_ring.options import corridor_from_options, numbers, rings_from_options
+from dockair.scenarios.design_ring.output import PICTURE, draw, trials_of
+from dockair.scenarios.design_ring.ranking import (
     _SURE_CHI2,
     RANKINGS,
     Corridor,
@@ -29,9 +31,7 @@ from dockair.scenarios.design_ring import (
     map_ring,
     rank,
 )
-from dockair.scenarios.design_ring_options import corridor_from_options, numbers, rings_from_options
-from dockair.scenarios.design_ring_output import PICTURE, draw, trials_of
-from dockair.scenarios.design_ring_trials import try_ring
+from dockair.scenarios.design_ring.trials import try_ring
 
 CORRIDOR = Corridor(ranges_m=np.array([3.0, 10.0, 30.0]), tilts_rad=np.deg2rad([0.0, 10.0, 20.0]))
 FLAT, DEEP = RingDesign(), RingDesign(inner=4, depth_m=0.2)

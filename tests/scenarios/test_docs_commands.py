@@ -11,7 +11,7 @@ import typer
 from dockair.errors import DockairError
 from dockair.scenarios.campaign.plan_file import PlanFile
 from dockair.scenarios.cli import app
-from dockair.scenarios.cli_options import overrides
+from dockair.scenarios.commands.options import overrides
 from dockair.scenarios.reproduce import registry
 from dockair.scenarios.schema import load_scenario
 

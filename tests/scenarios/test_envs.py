@@ -15,9 +15,8 @@ from gymnasium.utils.env_checker import check_env
 import dockair
 from dockair.errors import DockairError
 from dockair.messages import LedObservation
-from dockair.scenarios.attempts import Attempt
 from dockair.scenarios.envs import DockEnv, DockFastEnv, DockPixelsEnv
-from dockair.scenarios.envs_tables import (
+from dockair.scenarios.envs.tables import (
     ACTION,
     OBSERVATION,
     OUTCOME_REWARD,
@@ -26,8 +25,9 @@ from dockair.scenarios.envs_tables import (
     clipped,
     observation_from,
 )
+from dockair.scenarios.judgement.attempts import Attempt
+from dockair.scenarios.judgement.referee import Outcome, Referee
 from dockair.scenarios.loop import Flight, Tick
-from dockair.scenarios.referee import Outcome, Referee
 from dockair.scenarios.schema import load_scenario
 
 #: The world without camera: what is tested here does not depend on who navigates.

@@ -4,8 +4,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from dockair.scenarios.envs_judge import AttemptJudge
-from dockair.scenarios.referee import Outcome
+from dockair.scenarios.envs.judge import AttemptJudge
+from dockair.scenarios.judgement.referee import Outcome
 
 
 def _watch(judge: AttemptJudge, *xs: float, aside: float = 0.0, touches: bool = False, latched: bool = False):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from dockair.scenarios.envs_picture import pooled_picture
+from dockair.scenarios.envs.picture import pooled_picture
 
 
 @pytest.mark.parametrize(

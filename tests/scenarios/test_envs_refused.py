@@ -9,11 +9,13 @@ import pytest
 from dockair.calibration import Window
 from dockair.errors import DockairError, MachineError
 from dockair.messages import CameraFrame
-from dockair.scenarios import display, envs_episode, envs_viewer
+from dockair.scenarios import display
 from dockair.scenarios.envs import DockEnv, DockFastEnv, DockPixelsEnv
-from dockair.scenarios.envs_options import command_from
+from dockair.scenarios.envs import episode as envs_episode
+from dockair.scenarios.envs import viewer as envs_viewer
+from dockair.scenarios.envs.options import command_from
+from dockair.scenarios.judgement.referee import Outcome
 from dockair.scenarios.loop import Flight
-from dockair.scenarios.referee import Outcome
 from dockair.scenarios.schema import load_scenario
 
 #: The world without camera: what is tested here does not depend on who navigates.

@@ -8,8 +8,8 @@ import pytest
 
 from dockair.errors import MachineError
 from dockair.rotations import matrix_from_yaw_pitch_roll
-from dockair.scenarios import envs_viewer
-from dockair.scenarios.envs_viewer import LiveViewer
+from dockair.scenarios.envs import viewer as envs_viewer
+from dockair.scenarios.envs.viewer import LiveViewer
 from dockair.scenarios.loop import Tick
 
 SECONDS = 0.5

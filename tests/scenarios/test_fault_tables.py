@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from dockair.errors import DockairError
-from dockair.scenarios.fault_tables import FaultKind, FaultTable
 from dockair.scenarios.schema import load_scenario
+from dockair.scenarios.tables.fault import FaultKind, FaultTable
 from dockair.sim import faults
 
 #: One right table a kind, and what it becomes.

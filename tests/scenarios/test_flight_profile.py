@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dockair.scenarios.flight_profile import RANGE_EDGES_M, navigation_by_range, timeline
+from dockair.scenarios.judgement.flight_profile import RANGE_EDGES_M, navigation_by_range, timeline
 
 
 def _flown(flight, count):

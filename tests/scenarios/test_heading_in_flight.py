@@ -5,7 +5,7 @@ import pytest
 
 from dockair.errors import DockairError
 from dockair.nav.navigator import NavigatorSettings
-from dockair.scenarios.build import build, camera_sheets, guidance_settings
+from dockair.scenarios.assembly.parts import build, camera_sheets, guidance_settings
 from dockair.scenarios.loop import Flight
 from dockair.scenarios.schema import load_scenario
 from dockair.scenarios.truth_navigation import TruthNavigator

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from dockair.scenarios import build
+from dockair.scenarios.assembly import parts
 from dockair.scenarios.loop import Flight
 from dockair.scenarios.scenario_file import scenario_names, scenario_text
 from dockair.scenarios.schema import load_scenario
@@ -28,7 +28,7 @@ def test_a_scenario_claims_something_in_a_sentence_and_is_held_to_figures(name):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_a_scenario_is_built_and_flies_to_its_first_frame(name, monkeypatch):
-    monkeypatch.setattr(build, "SETTLE_S", 0.0)  # of the hose, before the flight: most of the time that it takes
+    monkeypatch.setattr(parts, "SETTLE_S", 0.0)  # of the hose, before the flight: most of the time that it takes
     flight = Flight(load_scenario(name), 1)
     try:
         ticks = [flight.step() for _ in range(10)]

@@ -1,7 +1,7 @@
 """The library as it is listed: what each scenario claims and what it is held to."""
 
 from dockair.scenarios.accept import Accept
-from dockair.scenarios.library_output import show_scenario, show_scenarios
+from dockair.scenarios.commands.library_output import show_scenario, show_scenarios
 from dockair.scenarios.schema import Scenario, load_scenario
 
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from dockair.messages import ReceiverCommand
+from dockair.scenarios.judgement.referee import Outcome
 from dockair.scenarios.loop import Flight, fly
-from dockair.scenarios.referee import Outcome
 from dockair.scenarios.schema import load_scenario
 from dockair.sim.world import DivergedError, World
 

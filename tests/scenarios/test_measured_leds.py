@@ -13,7 +13,7 @@ from dockair.errors import DockairError
 from dockair.nav.navigator import NavigatorSettings
 from dockair.parameters import load_parameters
 from dockair.rotations import exp
-from dockair.scenarios.build_measured import SHEET, refuse_unmodelled
+from dockair.scenarios.assembly.measured import SHEET, refuse_unmodelled
 from dockair.scenarios.measured_leds import MeasuredLeds, MeasurementParameters, TextureLight
 from dockair.scenarios.schema import load_scenario
 from dockair.sim.as_built import AsBuilt, AsBuiltParameters, draw_as_built

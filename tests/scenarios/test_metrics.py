@@ -10,11 +10,11 @@ import pyarrow.parquet as pq
 import pytest
 
 from dockair.rotations import exp
-from dockair.scenarios import metrics, result
-from dockair.scenarios.causes import flown_of
 from dockair.scenarios.flight_log import FlightLog
-from dockair.scenarios.hold import hold_of
-from dockair.scenarios.referee import Referee
+from dockair.scenarios.judgement import metrics, result
+from dockair.scenarios.judgement.causes import flown_of
+from dockair.scenarios.judgement.hold import hold_of
+from dockair.scenarios.judgement.referee import Referee
 from dockair.scenarios.schema import load_scenario
 
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from dockair.scenarios.no_attempt import cause_and_ending, ending
+from dockair.scenarios.judgement.no_attempt import cause_and_ending, ending
 
 
 def _timeline(*phases):

@@ -5,9 +5,9 @@ import pytest
 
 from dockair.parameters import load_parameters
 from dockair.rotations import log, matrix_from_yaw_pitch_roll
-from dockair.scenarios import build as build_module
-from dockair.scenarios.build import build
-from dockair.scenarios.nominal_sheets import nominal_attitude
+from dockair.scenarios.assembly import parts as build_module
+from dockair.scenarios.assembly.nominal_sheets import nominal_attitude
+from dockair.scenarios.assembly.parts import build
 from dockair.scenarios.schema import load_scenario
 from dockair.sim.air.atmosphere import standard_atmosphere
 from dockair.sim.aircraft.aerodynamics import AirframeParameters

@@ -8,8 +8,14 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from dockair.scenarios.commands.output import (
+    FlightProgress,
+    show_checks,
+    show_reproduction,
+    show_result,
+    show_stages_bench,
+)
 from dockair.scenarios.doctor import Check
-from dockair.scenarios.output import FlightProgress, show_checks, show_reproduction, show_result, show_stages_bench
 
 
 def tick(time_s: float):

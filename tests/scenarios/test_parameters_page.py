@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from dockair.parameters import load_parameters, read_sheet, sheet_names
-from dockair.scenarios import build, build_measured, build_receiver
+from dockair.scenarios.assembly import measured, parts, receiver
 from dockair.scenarios.parameters_page import parameters_page
 from dockair.scenarios.schema import load_scenario
 from dockair.sim.camera import sheets
@@ -45,10 +45,10 @@ def test_every_sheet_fills_the_class_that_a_flight_is_built_with(monkeypatch: py
         loaded.setdefault(sheet, set()).add(cls)
         return load_parameters(sheet, cls, overrides)
 
-    for module in (build, build_measured, build_receiver):
+    for module in (parts, measured, receiver):
         monkeypatch.setattr(module, "load_parameters", recording)
     monkeypatch.setattr(sheets, "load_parameters", recording)
-    monkeypatch.setattr(build, "SETTLE_S", 0.0)
+    monkeypatch.setattr(parts, "SETTLE_S", 0.0)
     choices = (
         {"camera.filter": "long_pass", "hardware.imu": "mti"},
         {"camera.filter": "band_pass", "hardware.imu": "tactical"},
@@ -56,6 +56,6 @@ def test_every_sheet_fills_the_class_that_a_flight_is_built_with(monkeypatch: py
         {"camera.sensing": "measurements"},
     )
     for choice in choices:
-        build.build(load_scenario("default", choice), 0)
+        parts.build(load_scenario("default", choice), 0)
     assert sorted(loaded) == sheet_names()
     assert [len(classes) for classes in loaded.values()] == [1] * len(loaded)

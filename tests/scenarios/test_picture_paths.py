@@ -8,10 +8,10 @@ import pytest
 from matplotlib.figure import Figure
 
 from dockair.rotations import matrix_from_yaw_pitch_roll
-from dockair.scenarios.attempts import RefereeLimits
 from dockair.scenarios.flight_log import FlightLog
-from dockair.scenarios.picture_columns import contact, level_axes, vectors
-from dockair.scenarios.picture_paths import (
+from dockair.scenarios.judgement.attempts import RefereeLimits
+from dockair.scenarios.picture.columns import contact, level_axes, vectors
+from dockair.scenarios.picture.paths import (
     approach_begin,
     draw_along_axis,
     draw_side_view,

@@ -12,16 +12,16 @@ from PIL import Image
 
 from dockair.messages import Window
 from dockair.rotations import matrix_from_yaw_pitch_roll
-from dockair.scenarios import picture
 from dockair.scenarios.flight_log import FlightLog
 from dockair.scenarios.message_log import MessageLog, read_messages
 from dockair.scenarios.navigator_recipe import NavigatorRecipe
-from dockair.scenarios.picture import picture_of_flight
-from dockair.scenarios.picture_columns import not_valid
-from dockair.scenarios.recording import drawn_ticks, write_episode
-from dockair.scenarios.recording_frames import FRAME_BYTES, padded_shape, shown_frames, shown_pixels
-from dockair.scenarios.recording_overlays import believed_ring_px, frame_missing
-from dockair.scenarios.recording_plots import plot_series
+from dockair.scenarios.picture import flight as picture
+from dockair.scenarios.picture.columns import not_valid
+from dockair.scenarios.picture.flight import picture_of_flight
+from dockair.scenarios.recording.episode import drawn_ticks, write_episode
+from dockair.scenarios.recording.frames import FRAME_BYTES, padded_shape, shown_frames, shown_pixels
+from dockair.scenarios.recording.overlays import believed_ring_px, frame_missing
+from dockair.scenarios.recording.plots import plot_series
 from dockair.sim.shapes import Shape
 
 TICKS = 60

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from dockair.rotations import exp
-from dockair.scenarios.attempts import RefereeLimits
-from dockair.scenarios.referee import Outcome, Referee
+from dockair.scenarios.judgement.attempts import RefereeLimits
+from dockair.scenarios.judgement.referee import Outcome, Referee
 from dockair.sim.truth import Truth
 
 

@@ -14,7 +14,7 @@ from dockair.scenarios.campaign import manifest as manifests
 from dockair.scenarios.campaign import table
 from dockair.scenarios.campaign.jobs import scenario_hash
 from dockair.scenarios.campaign.row import COLUMNS
-from dockair.scenarios.causes import CAUSES
+from dockair.scenarios.judgement.causes import CAUSES
 from dockair.scenarios.report import figures
 from dockair.scenarios.report.acceptance import claim_of, shortfalls_of
 from dockair.scenarios.report.cause_words import MEANINGS

@@ -12,7 +12,7 @@ from dockair.calibration import Mounting
 from dockair.nav.navigator import Navigator
 from dockair.nav.pose.planar import mirrored
 from dockair.rotations import exp
-from dockair.scenarios.metrics import true_relative_state
+from dockair.scenarios.judgement.metrics import true_relative_state
 from dockair.scenarios.reproduce import fusion_closed_loop
 from dockair.scenarios.reproduce.reference import picture_name
 

@@ -9,8 +9,8 @@ import pytest
 
 from dockair.errors import DockairError
 from dockair.parameters import load_parameters
-from dockair.scenarios import build_receiver
-from dockair.scenarios.mounting_parameters import MountingParameters
+from dockair.scenarios.assembly import receiver as build_receiver
+from dockair.scenarios.assembly.mounting_parameters import MountingParameters
 from dockair.scenarios.reproduce import world_receiver
 from dockair.scenarios.schema import load_scenario
 from dockair.sim.aircraft.aerodynamics import AirframeParameters

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dockair.parameters import load_parameters
-from dockair.scenarios.referee import Outcome
+from dockair.scenarios.judgement.referee import Outcome
 from dockair.scenarios.reproduce import world_contact, world_reel, world_whip
 from dockair.sim.hose.reel import ReelParameters
 

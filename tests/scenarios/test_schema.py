@@ -7,10 +7,10 @@ import pytest
 
 from dockair.errors import DockairError
 from dockair.scenarios.accept import Accept
-from dockair.scenarios.flight_tables import Start
-from dockair.scenarios.light_tables import Sun
 from dockair.scenarios.scenario_file import scenario_names
 from dockair.scenarios.schema import Scenario, load_scenario
+from dockair.scenarios.tables.flight import Start
+from dockair.scenarios.tables.light import Sun
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from dockair.rotations import exp
-from dockair.scenarios.build import build
+from dockair.scenarios.assembly.parts import build
 from dockair.scenarios.schema import load_scenario
 from dockair.scenarios.truth_navigation import TruthNavigator
 

@@ -1,0 +1,97 @@
+"""Refuses, before anything is built, what building a flight would refuse, as far as that takes milliseconds.
+
+A campaign asks it of every scenario that it is about to fly: what nothing can be flown of is said in one line, and not
+once a flight. A flight asks it, too. What shows only with a world in hand is left to the flight: a physics rate that
+hose and reel cannot bear, a receiver that cannot be trimmed, the Sun at the edge of the field of the camera as built.
+"""
+
+import numpy as np
+
+from dockair.calibration import Camera, LedRing
+from dockair.errors import DockairError
+from dockair.parameters import load_parameters
+from dockair.scenarios.assembly.measured import require_measurable
+from dockair.scenarios.assembly.nominal_sheets import nominal_camera, nominal_ring
+from dockair.scenarios.plug_in import navigator_class_of
+from dockair.scenarios.schema import Scenario
+from dockair.sim.basket import require_fit
+from dockair.sim.camera.camera_noise import CameraNoise
+from dockair.sim.camera.defects import Defects
+from dockair.sim.camera.electronics import OUTPUT_BITS, output_black, output_gain
+from dockair.sim.camera.readout import row_time_s, shortest_period_s
+from dockair.sim.camera.sheets import CameraSheets, SensorParameters
+from dockair.sim.faults import Faults
+from dockair.sim.hose.chain import DrogueParameters
+from dockair.sim.hose.coupling import CouplingParameters
+
+
+def require_buildable(scenario: Scenario) -> None:
+    """Refuse a flight into the ground, a rate of the camera, sheets and faults that do not fit, and no navigator.
+
+    Raises:
+        DockairError: one of them does not, or the navigator's class is none.
+    """
+    _check_altitude(scenario)
+    ring, own = nominal_ring(scenario), scenario.parameters
+    drogue = load_parameters("drogue", DrogueParameters, own.get("drogue"))
+    _check_ring(ring, drogue)
+    require_fit(drogue, load_parameters("coupling", CouplingParameters, own.get("coupling")))
+    faults = Faults([table.fault for table in scenario.faults], ring.count)
+    if scenario.navigation.is_truth:
+        return
+    _check_navigator(scenario.navigation.navigator)
+    camera, sheets = nominal_camera(scenario), CameraSheets.load(scenario.camera.filter, scenario.parameters)
+    _check_camera_rate(scenario.rates.camera_hz, camera, sheets)
+    _check_full_scale(sheets.sensor)
+    noise = CameraNoise.of(0)  # nothing is drawn
+    Defects(camera, sheets.glare, sheets.exposure, faults, noise.dirt, noise.hot_pixels)
+    if scenario.camera.sensing == "measurements":
+        require_measurable(scenario)
+
+
+def _check_navigator(name: str) -> None:
+    try:
+        navigator_class_of(name)
+    except DockairError as error:
+        got = f"{name}: {error.got}"
+        raise DockairError("navigation.navigator", expected=error.expected, got=got) from error
+
+
+def _check_altitude(scenario: Scenario) -> None:
+    """A toboggan ends above the ground: from under it the camera sees no Earth."""
+    flight, tanker = scenario.flight, scenario.tanker
+    if tanker.manoeuvre != "toboggan":
+        return
+    descends_s = max(flight.duration_s - tanker.starts_s, 0.0)
+    down_m = float(np.sin(np.radians(tanker.descent_deg))) * flight.airspeed_m_s * descends_s
+    if not flight.altitude_m > down_m:
+        expected = f"more than {down_m:.1f} m, as far as the tanker goes down in flight.duration_s"
+        raise DockairError("flight.altitude_m", expected=expected, got=flight.altitude_m)
+
+
+def _check_ring(ring: LedRing, drogue: DrogueParameters) -> None:
+    """The LEDs sit on the rim that the drogue's sheet describes."""
+    if ring.diameter_m != drogue.ring_diameter_m:
+        where, expected = "parameters.drogue.ring_diameter_m", f"the LED ring's own diameter, {ring.diameter_m} m"
+        raise DockairError(where, expected=f"{expected} (hardware.ring)", got=drogue.ring_diameter_m)
+
+
+def _check_camera_rate(camera_hz: int, camera: Camera, sheets: CameraSheets) -> None:
+    """A full frame must be read before the next: the navigation may ask for one at any time."""
+    sensor, longest_s = sheets.sensor, sheets.exposure.longest_s
+    highest_hz = 1.0 / shortest_period_s(camera.height_px, sensor, longest_s)
+    if camera_hz > highest_hz:
+        at_which = f"at which the sensor's {sensor.outputs} outputs read full frames"
+        if longest_s > camera.height_px * row_time_s(sensor):
+            at_which = f"at which it can still expose for exposure.longest_s = {longest_s} s"
+        expected = f"a rate up to {np.floor(10.0 * highest_hz) / 10.0:.1f} Hz, {at_which}"
+        raise DockairError("rates.camera_hz", expected=expected, got=camera_hz)
+
+
+def _check_full_scale(sensor: SensorParameters) -> None:
+    """A full well must read full scale: that level is all by which a clipped LED is told from a whole one."""
+    full_scale = 2.0**OUTPUT_BITS - 1.0
+    if output_black(sensor) + output_gain(sensor) * sensor.full_well_e < full_scale:
+        least_e = np.ceil((full_scale - output_black(sensor)) / output_gain(sensor))
+        expected = f"at least {least_e:.0f} e-, which read full scale, by which clipped LEDs are known"
+        raise DockairError("parameters.sensor.full_well_e", expected=expected, got=sensor.full_well_e)

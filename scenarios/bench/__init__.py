@@ -1,0 +1,1 @@
+"""How fast a flight and its parts run on this machine: `dockair bench`."""

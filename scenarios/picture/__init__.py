@@ -1,0 +1,1 @@
+"""What a glance shows of a flight: `flight.png`."""

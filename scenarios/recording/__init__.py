@@ -1,0 +1,1 @@
+"""What the rerun viewer opens: `episode.rrd`."""
