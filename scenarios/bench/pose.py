@@ -21,7 +21,7 @@ from dockair.nav.pose.levenberg_marquardt import LEVENBERG_MARQUARDT
 from dockair.nav.pose.position import solve_position
 from dockair.nav.pose.prior import AttitudePrior
 from dockair.rotations import exp, matrix_from_yaw_pitch_roll
-from dockair.scenarios.reproduce.opencv_pose import OpenCvSolvers
+from dockair.scenarios.reproduce.pose.opencv_pose import OpenCvSolvers
 
 _CALLS = 3000
 _SIGMA_PX = 0.1

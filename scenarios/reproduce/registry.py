@@ -4,8 +4,9 @@ A reproduction is a function of a folder for its picture, or None for no picture
 
     {"id": ..., "source": ..., "rows": [{"case": ..., "ours": {...}, "reference": {...}}]}
 
-with units in the keys; `ours` has every key of `reference`. A module of this folder is one when it has ID, TITLE and
-`reproduce`, or several when it has REPRODUCTIONS, id -> (title, function); no other list names it.
+with units in the keys; `ours` has every key of `reference`. A module of this folder's folders, which are called as the
+first part of the id, is one when it has ID, TITLE and `reproduce`, or several when it has REPRODUCTIONS, id -> (title,
+function); no other list names it.
 """
 
 import pkgutil
@@ -22,12 +23,12 @@ Reproduction = Callable[[Path | None], dict[str, Any]]
 
 
 def _found() -> dict[str, tuple[str, Reproduction]]:
-    """Id -> title and function, of every module beside this one."""
+    """Id -> title and function, of every module in the folders beside this one."""
     found: dict[str, tuple[str, Reproduction]] = {}
-    for name in sorted(info.name for info in pkgutil.iter_modules(_package.__path__)):
-        if name == __name__.rpartition(".")[2]:
+    for info in pkgutil.walk_packages(_package.__path__, f"{_package.__name__}."):
+        if info.ispkg or info.name == __name__:
             continue
-        module = import_module(f"{_package.__name__}.{name}")
+        module = import_module(info.name)
         found |= getattr(module, "REPRODUCTIONS", {})
         if hasattr(module, "ID"):
             found[module.ID] = module.TITLE, module.reproduce

@@ -5,7 +5,7 @@ import pytest
 
 from dockair.errors import DockairError
 from dockair.nav.heading.hdr import HeuristicDriftReduction, HeuristicDriftSettings
-from dockair.scenarios.reproduce.heading_tracks import oval_rates_rad_s, straight_rates_rad_s
+from dockair.scenarios.reproduce.heading.tracks import oval_rates_rad_s, straight_rates_rad_s
 
 RATE_HZ = 100.0
 DEGREE = np.pi / 180.0

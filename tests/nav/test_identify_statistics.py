@@ -11,8 +11,7 @@ import pytest
 
 from dockair.nav.identify import ring
 from dockair.nav.identify.ring import METHODS, IdentificationStatus, IdentifySettings, identify
-from dockair.scenarios.reproduce.identification_scenes import CROWDS, Scene
-from dockair.scenarios.reproduce.image_identification import (
+from dockair.scenarios.reproduce.image.identification import (
     CLUTTER,
     TABLES,
     VISIBLE,
@@ -20,6 +19,7 @@ from dockair.scenarios.reproduce.image_identification import (
     cell,
     second_ring,
 )
+from dockair.scenarios.reproduce.image.identification_scenes import CROWDS, Scene
 
 pytestmark = pytest.mark.slow
 SEED = 7  # another than the reproduction's

@@ -6,7 +6,7 @@ import pytest
 from dockair.errors import DockairError
 from dockair.nav.heading.hdr import HeuristicDriftReduction
 from dockair.nav.heading.vdr import VisionDriftReduction, VisionDriftSettings
-from dockair.scenarios.reproduce.heading_tracks import (
+from dockair.scenarios.reproduce.heading.tracks import (
     BIAS_RAD_S,
     RATE_HZ,
     oval_rates_rad_s,

@@ -15,7 +15,7 @@ from dockair.nav.heading.visual import (
     measure_turn,
 )
 from dockair.rotations import matrix_from_yaw_pitch_roll
-from dockair.scenarios.reproduce.heading_scene import random_landscape
+from dockair.scenarios.reproduce.heading.scene import random_landscape
 
 DEGREE = np.pi / 180.0
 FOCAL_PX = 900.0

@@ -6,7 +6,7 @@ import pytest
 from dockair.calibration import Camera
 from dockair.scenarios.assembly.measured import FITTED_IN, texture_light
 from dockair.scenarios.measured_leds import TextureLight
-from dockair.scenarios.reproduce.measurement_model import FITTED, HELD_OUT
+from dockair.scenarios.reproduce.measurement_model.model import FITTED, HELD_OUT
 from dockair.scenarios.schema import load_scenario
 from dockair.sim.camera.radiometry import responses
 from dockair.sim.camera.sheets import CameraSheets

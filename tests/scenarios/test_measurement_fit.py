@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dockair.scenarios.reproduce.measurement_fit import fit, rounded
-from dockair.scenarios.reproduce.measurement_frames import Seen
-from dockair.scenarios.reproduce.measurement_model import compared
+from dockair.scenarios.reproduce.measurement_model.fit import fit, rounded
+from dockair.scenarios.reproduce.measurement_model.frames import Seen
+from dockair.scenarios.reproduce.measurement_model.model import compared
 from dockair.sim.camera.electronics import output_black, output_gain
 from dockair.sim.faults import LedDim, LedOff
 

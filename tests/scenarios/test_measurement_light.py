@@ -5,7 +5,7 @@ import json
 import cv2
 import pytest
 
-from dockair.scenarios.reproduce import measurement_light
+from dockair.scenarios.reproduce.measurement_model import light as measurement_light
 from dockair.scenarios.reproduce.reference import picture_name
 
 pytestmark = pytest.mark.slow

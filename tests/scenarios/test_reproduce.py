@@ -1,13 +1,15 @@
 """Reproductions stand beside their sources, in the form that the command prints."""
 
 import json
+import re
 from pathlib import Path
 
 import cv2
 import pytest
 
 from dockair.errors import DockairError
-from dockair.scenarios.reproduce import fusion_closed_loop, registry
+from dockair.scenarios.reproduce import registry
+from dockair.scenarios.reproduce.fusion import closed_loop as fusion_closed_loop
 
 #: What makes each reproduction, whole or on less of everything; whoever registers another one writes its test.
 MADE_BY = {
@@ -64,8 +66,10 @@ def test_every_reproduction_is_made_by_a_test():
         text = Path(__file__).with_name(name).read_text(encoding="utf-8")
         for wanted in made:
             function = registry._REPRODUCTIONS[wanted][1]
-            module = getattr(function, "func", function).__module__.rpartition(".")[2]
-            assert f'"{wanted}"' in text or module in text, (name, wanted)
+            package, _, module = getattr(function, "func", function).__module__.rpartition(".")
+            assert package.rpartition(".")[2] == wanted.partition("/")[0].replace("-", "_")
+            imported = re.search(rf"from {re.escape(package)}(\.{module} import | import {module}\b)", text)
+            assert f'"{wanted}"' in text or imported, (name, wanted)
 
 
 def test_an_unknown_id_is_refused_with_those_that_exist():

@@ -13,7 +13,7 @@ from dockair.nav.navigator import Navigator
 from dockair.nav.pose.planar import mirrored
 from dockair.rotations import exp
 from dockair.scenarios.judgement.metrics import true_relative_state
-from dockair.scenarios.reproduce import fusion_closed_loop
+from dockair.scenarios.reproduce.fusion import closed_loop as fusion_closed_loop
 from dockair.scenarios.reproduce.reference import picture_name
 
 CLOSING_S = 4.0  # the hand-made flight is on its way in

@@ -8,8 +8,8 @@ import pytest
 
 from dockair.nav.dop import dilution_of_precision
 from dockair.scenarios.reproduce import registry
-from dockair.scenarios.reproduce.dop_figures import FIGURES, landmarks
-from dockair.scenarios.reproduce.dop_printed import dop_of, printed_jacobian
+from dockair.scenarios.reproduce.dop.figures import FIGURES, landmarks
+from dockair.scenarios.reproduce.dop.printed import dop_of, printed_jacobian
 from dockair.scenarios.reproduce.reference import picture_name
 
 IDS = ("dop/fig5", "dop/fig6", "dop/fig7", "dop/fig8")

@@ -10,10 +10,11 @@ import pytest
 from dockair.nav.fusion import FusionSettings
 from dockair.parameters import load_parameters
 from dockair.rotations import log
-from dockair.scenarios.reproduce import fusion_consistency, fusion_outages
-from dockair.scenarios.reproduce.fusion_cases import Case, consistency, figures, tracks
-from dockair.scenarios.reproduce.fusion_flight import Approach, _Motion, fly, navigation_sheets
-from dockair.scenarios.reproduce.fusion_follow import Watching, calibrated
+from dockair.scenarios.reproduce.fusion import consistency as fusion_consistency
+from dockair.scenarios.reproduce.fusion import outages as fusion_outages
+from dockair.scenarios.reproduce.fusion.cases import Case, consistency, figures, tracks
+from dockair.scenarios.reproduce.fusion.flight import Approach, _Motion, fly, navigation_sheets
+from dockair.scenarios.reproduce.fusion.follow import Watching, calibrated
 from dockair.scenarios.reproduce.reference import picture_name
 from dockair.sim.imu import ImuParameters
 

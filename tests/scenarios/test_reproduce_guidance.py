@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from dockair.scenarios.reproduce import guidance_foretelling as foretelling
-from dockair.scenarios.reproduce import guidance_path_plan as paths
+from dockair.scenarios.reproduce.guidance import foretelling
+from dockair.scenarios.reproduce.guidance import path_plan as paths
 
 
 def test_the_drogue_swings_as_widely_as_its_stationary_covariance_says():

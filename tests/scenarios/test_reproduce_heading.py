@@ -5,9 +5,9 @@ import json
 import numpy as np
 import pytest
 
-from dockair.scenarios.reproduce import heading_straight
-from dockair.scenarios.reproduce.heading_tracks import lap_places, oval_true_rates_rad_s
-from dockair.scenarios.reproduce.heading_vision import calibration, seen_lap
+from dockair.scenarios.reproduce.heading import straight as heading_straight
+from dockair.scenarios.reproduce.heading.tracks import lap_places, oval_true_rates_rad_s
+from dockair.scenarios.reproduce.heading.vision import calibration, seen_lap
 from dockair.scenarios.reproduce.registry import ids, reproduce
 
 

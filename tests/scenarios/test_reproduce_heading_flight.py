@@ -7,9 +7,10 @@ import pytest
 
 from dockair.nav.heading.turn import TurnStatus
 from dockair.rotations import log
-from dockair.scenarios.reproduce import heading_flight, registry
-from dockair.scenarios.reproduce.heading_flight import Seen, SeenAgain, own_attitudes
-from dockair.scenarios.reproduce.heading_formation import Formation, Racetrack
+from dockair.scenarios.reproduce import registry
+from dockair.scenarios.reproduce.heading import flight as heading_flight
+from dockair.scenarios.reproduce.heading.flight import Seen, SeenAgain, own_attitudes
+from dockair.scenarios.reproduce.heading.formation import Formation, Racetrack
 
 DEGREE = np.pi / 180.0
 G = 9.80665

@@ -8,19 +8,17 @@ import numpy as np
 import pytest
 
 from dockair.nav.image.labelling import label_contour_tracing
-from dockair.scenarios.reproduce import (
-    ground_fig29,
-    image_contour,
-    image_ellipse,
-    image_frames,
-    image_hough,
-    image_kalman,
-    image_labels,
-    image_scene,
-    registry,
-)
+from dockair.scenarios.reproduce import registry
 from dockair.scenarios.reproduce.frames import matches, studio
-from dockair.scenarios.reproduce.image_grid import mask_from_text
+from dockair.scenarios.reproduce.ground import fig29 as ground_fig29
+from dockair.scenarios.reproduce.image import contour as image_contour
+from dockair.scenarios.reproduce.image import ellipse as image_ellipse
+from dockair.scenarios.reproduce.image import frames as image_frames
+from dockair.scenarios.reproduce.image import hough as image_hough
+from dockair.scenarios.reproduce.image import kalman as image_kalman
+from dockair.scenarios.reproduce.image import labels as image_labels
+from dockair.scenarios.reproduce.image import scene as image_scene
+from dockair.scenarios.reproduce.image.grid import mask_from_text
 from dockair.scenarios.reproduce.reference import picture_name
 from dockair.sim.camera.sheets import CameraSheets
 

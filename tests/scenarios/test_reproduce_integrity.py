@@ -9,13 +9,11 @@ from scipy.stats import binom
 
 from dockair.nav import contact_watch
 from dockair.nav.integrity.fault_test import IntegritySettings
-from dockair.scenarios.reproduce import (
-    faulted_frames,
-    integrity_coasting,
-    integrity_slow_fault,
-    pose_flips,
-    pose_integrity,
-)
+from dockair.scenarios.reproduce.integrity import coasting as integrity_coasting
+from dockair.scenarios.reproduce.integrity import slow_fault as integrity_slow_fault
+from dockair.scenarios.reproduce.pose import faulted_frames
+from dockair.scenarios.reproduce.pose import flips as pose_flips
+from dockair.scenarios.reproduce.pose import integrity as pose_integrity
 from dockair.scenarios.reproduce.reference import picture_name
 
 pytestmark = pytest.mark.slow

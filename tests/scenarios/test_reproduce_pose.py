@@ -11,15 +11,13 @@ from dockair.calibration import Camera, LedRing
 from dockair.nav.pose.difference import pose_difference
 from dockair.nav.pose.levenberg_marquardt import LEVENBERG_MARQUARDT
 from dockair.rotations import matrix_from_yaw_pitch_roll
-from dockair.scenarios.reproduce import (
-    opencv_pose,
-    pose_divergence,
-    pose_efficiency,
-    pose_frontal,
-    pose_opencv,
-    registry,
-)
-from dockair.scenarios.reproduce.pose_efficiency import Node
+from dockair.scenarios.reproduce import registry
+from dockair.scenarios.reproduce.pose import divergence as pose_divergence
+from dockair.scenarios.reproduce.pose import efficiency as pose_efficiency
+from dockair.scenarios.reproduce.pose import frontal as pose_frontal
+from dockair.scenarios.reproduce.pose import opencv as pose_opencv
+from dockair.scenarios.reproduce.pose import opencv_pose
+from dockair.scenarios.reproduce.pose.efficiency import Node
 from dockair.scenarios.reproduce.reference import picture_name
 
 MODULES = (pose_efficiency, pose_opencv, pose_divergence, pose_frontal)

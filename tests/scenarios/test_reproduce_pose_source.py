@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from dockair.scenarios.reproduce.pose_surface import angle
-from dockair.scenarios.reproduce.pose_table3 import table3
-from dockair.scenarios.reproduce.pose_trials import COLUMNS, DIAMETER, RADIUS, attitude, errors, rmse
+from dockair.scenarios.reproduce.pose.surface import angle
+from dockair.scenarios.reproduce.pose.table3 import table3
+from dockair.scenarios.reproduce.pose.trials import COLUMNS, DIAMETER, RADIUS, attitude, errors, rmse
 
 
 def test_attitude_is_passive_about_z_then_y_then_x():

@@ -12,28 +12,26 @@ import numpy as np
 import pytest
 
 from dockair.nav.guidance.phases import PhaseLimits
-from dockair.scenarios.reproduce import (
-    guidance_foretelling,
-    guidance_path_plan,
-    guidance_release,
-    guidance_slack_hose,
-    heading_oval,
-    heading_pairs,
-    heading_vision,
-    image_frames,
-    image_identification,
-    measurement_model,
-    pose_surface,
-    pose_table3,
-    registry,
-    world_contact,
-    world_large_swing,
-    world_reel,
-    world_velocity_hold,
-    world_whip,
-)
-from dockair.scenarios.reproduce.heading_tracks import lap_places
+from dockair.scenarios.reproduce import registry
+from dockair.scenarios.reproduce.guidance import foretelling as guidance_foretelling
+from dockair.scenarios.reproduce.guidance import path_plan as guidance_path_plan
+from dockair.scenarios.reproduce.guidance import release as guidance_release
+from dockair.scenarios.reproduce.guidance import slack_hose as guidance_slack_hose
+from dockair.scenarios.reproduce.heading import oval as heading_oval
+from dockair.scenarios.reproduce.heading import pairs as heading_pairs
+from dockair.scenarios.reproduce.heading import vision as heading_vision
+from dockair.scenarios.reproduce.heading.tracks import lap_places
+from dockair.scenarios.reproduce.image import frames as image_frames
+from dockair.scenarios.reproduce.image import identification as image_identification
+from dockair.scenarios.reproduce.measurement_model import model as measurement_model
+from dockair.scenarios.reproduce.pose import surface as pose_surface
+from dockair.scenarios.reproduce.pose import table3 as pose_table3
 from dockair.scenarios.reproduce.reference import picture_name
+from dockair.scenarios.reproduce.world import contact as world_contact
+from dockair.scenarios.reproduce.world import large_swing as world_large_swing
+from dockair.scenarios.reproduce.world import reel as world_reel
+from dockair.scenarios.reproduce.world import velocity_hold as world_velocity_hold
+from dockair.scenarios.reproduce.world import whip as world_whip
 
 pytestmark = pytest.mark.slow
 

@@ -8,9 +8,10 @@ import pytest
 
 from dockair.messages import ReceiverCommand
 from dockair.parameters import load_parameters
-from dockair.scenarios.reproduce import world_bow_wave, world_wake
 from dockair.scenarios.reproduce.reference import picture_name
-from dockair.scenarios.reproduce.tow_at_rest import tow_at_rest
+from dockair.scenarios.reproduce.world import bow_wave as world_bow_wave
+from dockair.scenarios.reproduce.world import wake as world_wake
+from dockair.scenarios.reproduce.world.tow_at_rest import tow_at_rest
 from dockair.sim.air.atmosphere import standard_atmosphere
 from dockair.sim.air.bow_wave import BowWaveParameters, bow_wave_coefficients, bow_wave_velocity
 from dockair.sim.air.motion import AirMotion

@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from dockair.scenarios.reproduce import world_excursions, world_gusts
 from dockair.scenarios.reproduce.reference import picture_name, read_reference
-from dockair.scenarios.reproduce.world_excursions import Condition, excursions, ride
+from dockair.scenarios.reproduce.world import excursions as world_excursions
+from dockair.scenarios.reproduce.world import gusts as world_gusts
+from dockair.scenarios.reproduce.world.excursions import Condition, excursions, ride
 
 MODERATE = Condition(airspeed_m_s=150.0, altitude_m=6096.0, intensity="moderate")
 

@@ -6,8 +6,11 @@ import cv2
 import numpy as np
 import pytest
 
-from dockair.scenarios.reproduce import world_convergence, world_hose_checks, world_static, world_swing
-from dockair.scenarios.reproduce.hose_cases import HoseCase, continuous_cable
+from dockair.scenarios.reproduce.world import convergence as world_convergence
+from dockair.scenarios.reproduce.world import hose_checks as world_hose_checks
+from dockair.scenarios.reproduce.world import static as world_static
+from dockair.scenarios.reproduce.world import swing as world_swing
+from dockair.scenarios.reproduce.world.hose_cases import HoseCase, continuous_cable
 
 
 def _checked(result, folder, name):

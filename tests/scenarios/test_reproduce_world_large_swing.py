@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from dockair.scenarios.reproduce import world_large_swing
+from dockair.scenarios.reproduce.world import large_swing as world_large_swing
 
 
 def by_hand(given_back):

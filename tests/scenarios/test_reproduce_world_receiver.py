@@ -11,7 +11,7 @@ from dockair.errors import DockairError
 from dockair.parameters import load_parameters
 from dockair.scenarios.assembly import receiver as build_receiver
 from dockair.scenarios.assembly.mounting_parameters import MountingParameters
-from dockair.scenarios.reproduce import world_receiver
+from dockair.scenarios.reproduce.world import receiver as world_receiver
 from dockair.scenarios.schema import load_scenario
 from dockair.sim.aircraft.aerodynamics import AirframeParameters
 from dockair.sim.aircraft.derivatives import DerivativeAirframe

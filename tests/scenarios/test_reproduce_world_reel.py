@@ -7,7 +7,9 @@ import pytest
 
 from dockair.parameters import load_parameters
 from dockair.scenarios.judgement.referee import Outcome
-from dockair.scenarios.reproduce import world_contact, world_reel, world_whip
+from dockair.scenarios.reproduce.world import contact as world_contact
+from dockair.scenarios.reproduce.world import reel as world_reel
+from dockair.scenarios.reproduce.world import whip as world_whip
 from dockair.sim.hose.reel import ReelParameters
 
 REEL = load_parameters("reel", ReelParameters)

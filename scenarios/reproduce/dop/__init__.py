@@ -1,0 +1,1 @@
+"""Dilution of precision: the source's figures 5 to 8."""

@@ -1,0 +1,1 @@
+"""The belief against its own covariance, and what outages cost."""

@@ -1,0 +1,1 @@
+"""What guidance foresees, plans, and does on the probe."""

@@ -1,0 +1,1 @@
+"""Heading by drift reduction, on the ground and in flight."""

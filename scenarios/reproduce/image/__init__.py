@@ -1,0 +1,1 @@
+"""The source's image processing, stage by stage, on rendered frames."""

@@ -1,0 +1,1 @@
+"""What a slow fault and missing frames do."""

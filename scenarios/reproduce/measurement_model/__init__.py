@@ -1,0 +1,1 @@
+"""The measurement model fitted to the camera, and held against it."""

@@ -1,0 +1,1 @@
+"""Solvers of the pose: accuracy, both minima, faults, competitors."""

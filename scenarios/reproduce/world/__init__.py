@@ -1,0 +1,1 @@
+"""Hose, air, reel, contact and receiver against closed forms and published cases."""
