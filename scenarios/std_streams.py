@@ -1,5 +1,7 @@
 """Standard output and error that outlive their readers: a command is done, and its status said, whoever listens."""
 
+import codecs
+import errno
 import io
 import os
 import sys
@@ -8,17 +10,39 @@ from typing import TYPE_CHECKING, TextIO
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer
 
+_STDOUT = 1
+_ANY_TEXT = "dockair.any_text"
+
+
+def _any_text(error: UnicodeError) -> tuple[str | bytes, int]:
+    """Print a path's bytes as they are, and a sign that the stream's encoding lacks as its number."""
+    try:
+        return codecs.lookup_error("surrogateescape")(error)
+    except UnicodeError:
+        return codecs.lookup_error("backslashreplace")(error)
+
+
+codecs.register_error(_ANY_TEXT, _any_text)
+
 
 class _Outliving(io.FileIO):
-    """A file descriptor that leads nowhere once its reader has gone."""
+    """A file descriptor that leads nowhere once its reader has gone, or its disk is full.
+
+    A full disk is an error where results go, once: what is still held back goes nowhere as the process ends. It is
+    passed over where errors go, for a status has to be said all the same.
+    """
 
     def write(self, data: "ReadableBuffer", /) -> int | None:  # type: ignore[override]
         try:
             return super().write(data)
-        except BrokenPipeError:
+        except OSError as error:
+            if error.errno not in (errno.EPIPE, errno.ENOSPC, errno.EDQUOT):
+                raise
             nowhere = os.open(os.devnull, os.O_WRONLY)
             os.dup2(nowhere, self.fileno())
             os.close(nowhere)
+            if error.errno != errno.EPIPE and self.fileno() == _STDOUT:
+                raise
             return memoryview(data).nbytes
 
 
@@ -29,7 +53,7 @@ def outlive_readers() -> None:
     """
     _open_closed_ones()
     if sys.stdout is sys.__stdout__:
-        sys.stdout = _outliving(sys.stdout, 1, errors="surrogateescape")  # a path may be of any bytes
+        sys.stdout = _outliving(sys.stdout, _STDOUT, errors=_ANY_TEXT)
     if sys.stderr is sys.__stderr__:
         sys.stderr = _outliving(sys.stderr, 2, errors="backslashreplace")
 

@@ -21,6 +21,7 @@ REMEDY = f"install {APT_PACKAGES} (Debian, Ubuntu: apt-get install)"
 BACKENDS = ("auto", "mujoco", "analytic")
 TIMEOUT_S = 120.0
 _NO_OPENGL = ("disable", "disabled", "off", "false", "0")  # what MuJoCo takes for none
+_WINDOWED = ("", "enable", "enabled", "on", "true", "1", "glfw", "glx")  # what it takes for the window system's own
 _NEEDED = {  # of each group one
     "egl": (("libEGL.so.1", "libEGL.so"), ("libOpenGL.so.0", "libOpenGL.so", "libGL.so.1", "libGL.so")),
     "osmesa": (("libOSMesa.so.8", "libOSMesa.so.6", "libOSMesa.so"),),
@@ -105,14 +106,18 @@ def why_analytic() -> str:
 
 
 def let_mujoco_be_imported() -> None:
-    """Take back a `MUJOCO_GL` whose library is missing: `import mujoco` would fail on it, with physics and all.
+    """Take back a `MUJOCO_GL` that MuJoCo does not know, or whose library is missing.
+
+    `import mujoco` would fail on it, with physics and all.
 
     To be called before the first import of mujoco; does nothing after it.
     """
     if "mujoco" in sys.modules or not sys.platform.startswith("linux"):
         return
-    groups = _NEEDED.get(os.environ.get("MUJOCO_GL", "").lower().strip(), ())
-    if not all(any(map(_loads, group)) for group in groups):
+    wanted = os.environ.get("MUJOCO_GL", "").lower().strip()
+    groups = _NEEDED.get(wanted, ())
+    known = wanted in (*_NEEDED, *_WINDOWED, *_NO_OPENGL)
+    if not known or not all(any(map(_loads, group)) for group in groups):
         os.environ["MUJOCO_GL"] = _NO_OPENGL[1]
 
 

@@ -37,10 +37,11 @@ def require_buildable(scenario: Scenario) -> None:
     _check_ring(ring, drogue)
     require_fit(drogue, load_parameters("coupling", CouplingParameters, own.get("coupling")))
     faults = Faults([table.fault for table in scenario.faults], ring.count)
+    camera = nominal_camera(scenario)  # which is built whoever navigates
     if scenario.navigation.is_truth:
         return
     _check_navigator(scenario.navigation.navigator)
-    camera, sheets = nominal_camera(scenario), CameraSheets.load(scenario.camera.filter, scenario.parameters)
+    sheets = CameraSheets.load(scenario.camera.filter, scenario.parameters)
     _check_camera_rate(scenario.rates.camera_hz, camera, sheets)
     _check_full_scale(sheets.sensor)
     noise = CameraNoise.of(0)  # nothing is drawn

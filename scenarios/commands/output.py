@@ -55,7 +55,7 @@ class FlightProgress:
     """
 
     def __init__(self, duration_s: float, console: Console | None = None) -> None:
-        self._console = console or Console(stderr=True, highlight=False)
+        self._console = console or Console(stderr=True, highlight=False, emoji=False)
         self._duration_s, self._next_s = duration_s, 0.0
         self._bar = Progress(
             TextColumn("{task.description:<12}", markup=False),
@@ -180,7 +180,7 @@ def show_bench(report: "BenchReport") -> None:
 
 def show_working(text: str) -> AbstractContextManager[Any]:
     """Show on stderr that something goes on, where it is a terminal."""
-    return Console(stderr=True, highlight=False).status(text)
+    return Console(stderr=True, highlight=False, emoji=False).status(text)
 
 
 def show_reproductions(titles: Mapping[str, str]) -> None:
@@ -260,7 +260,7 @@ def plain_console() -> Console:
 
     Where it is no terminal, lines are as long as the tables: nothing is cut off in a file.
     """
-    console = Console(highlight=False, markup=False)
+    console = Console(highlight=False, markup=False, emoji=False)
     if not console.is_terminal:
         console.width = _FILE_WIDTH
     return console

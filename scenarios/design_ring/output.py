@@ -37,7 +37,7 @@ _COLOURS = ("black", "tab:blue", "tab:orange")
 
 def show_ranking(ranking: Ranking, top: int) -> None:
     """Print the first rings and the default one."""
-    corridor, console = ranking.corridor, Console(highlight=False)
+    corridor, console = ranking.corridor, Console(highlight=False, emoji=False)
     low, high = corridor.ranges_m[[0, -1]]
     console.print(
         f"{len(ranking.maps)} rings, {low:g} to {high:g} m, tilt up to {np.rad2deg(corridor.tilts_rad[-1]):g} deg, "
@@ -94,7 +94,7 @@ def show_trials(trials: list[Trials]) -> None:
     """Print what becomes of the bound; nothing when nothing was tried."""
     if not trials:
         return
-    console = Console(highlight=False)
+    console = Console(highlight=False, emoji=False)
     console.print(
         f"\n{trials[0].trials} noisy frames each, frontal, solved from the true pose: bias, and RMSE over bound"
     )

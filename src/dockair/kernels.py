@@ -15,6 +15,8 @@ from typing import Any
 import numba
 from numba.core.caching import FunctionCache
 
+from dockair.errors import MachineError
+
 
 def njit(*, cache: bool, **options: object) -> Callable[[Callable[..., Any]], Any]:
     """Compile a function as `numba.njit` does.
@@ -28,10 +30,18 @@ def njit(*, cache: bool, **options: object) -> Callable[[Callable[..., Any]], An
         kernel: Any = numba.njit(**options)(function)  # type: ignore[call-overload]
         if cache and kernel is not function:  # it is where NUMBA_DISABLE_JIT is set
             # in place of what numba's own `cache=True` puts here
-            kernel._cache = _Cache(function)  # type: ignore[no-untyped-call]
+            kernel._cache = _made_cache(function)
         return kernel
 
     return compiled
+
+
+def _made_cache(function: Callable[..., Any]) -> FunctionCache:
+    try:
+        return _Cache(function)  # type: ignore[no-untyped-call]
+    except RuntimeError as error:  # neither the package's folder nor the user's can be written
+        remedy = "set NUMBA_CACHE_DIR to a folder that can be written"
+        raise MachineError("kernels", expected="a folder to keep compiled code in", remedy=remedy) from error
 
 
 def ingredients(function: FunctionType) -> dict[str, object]:

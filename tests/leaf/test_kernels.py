@@ -7,6 +7,8 @@ from types import ModuleType
 import numpy as np
 import pytest
 
+from dockair import kernels
+from dockair.errors import MachineError
 from dockair.kernels import ingredients, njit
 
 SOURCE = """
@@ -166,3 +168,13 @@ def test_what_is_not_to_be_kept_is_not():
 
     assert one() == 1
     assert not one.stats.cache_path
+
+
+def test_no_folder_to_keep_code_in_is_what_the_machine_lacks(monkeypatch):
+    def no_locator(function):
+        raise RuntimeError(f"cannot cache function '{function.__name__}': no locator available")
+
+    monkeypatch.setattr(kernels, "_Cache", no_locator)
+    with pytest.raises(MachineError, match="a folder to keep compiled code in; set NUMBA_CACHE_DIR"):
+        kernels.njit(cache=True)(lambda x: x)
+    kernels.njit(cache=False)(lambda x: x)

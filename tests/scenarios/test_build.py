@@ -238,3 +238,10 @@ def test_a_sensor_whose_full_well_reads_less_than_full_scale_is_refused(changes,
         require_buildable(load_scenario("still_air", own))
     require_buildable(load_scenario("truth_navigation", own))
     require_buildable(load_scenario("still_air", own | {"parameters.sensor.conversion_gain_dn_e": 0.09}))
+
+
+def test_a_camera_sheet_is_read_whoever_navigates(tmp_path):
+    sheet = tmp_path / "camera.toml"
+    sheet.write_text('name = "none"')
+    with pytest.raises(DockairError, match="expected a known key"):
+        require_buildable(load_scenario("truth_navigation", {"hardware.camera": str(sheet)}))

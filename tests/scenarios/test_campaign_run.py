@@ -919,6 +919,16 @@ def test_a_reason_of_the_gate_is_printed_as_it_is(capsys):
     assert "gate failed: [/] of [hose]" in capsys.readouterr().out
 
 
+def test_a_narrow_terminal_wraps_the_table_and_cuts_nothing_off(here, tmp_path, capsys, monkeypatch):
+    over = fly(plan(tmp_path, 6), tmp_path / "out")
+    narrow = Console(width=40, force_terminal=True, highlight=False, markup=False)
+    monkeypatch.setattr("dockair.scenarios.campaign.progress.plain_console", lambda: narrow)
+    capsys.readouterr()
+    show_campaign(over.to_dict())
+    shown = capsys.readouterr().out
+    assert "first attempt" in shown and "errors" in shown and "\u2026" not in shown
+
+
 def test_none_unsafe_is_told_as_a_number(here, tmp_path, capsys):
     """Two of six flights miss; none is unsafe, none an error."""
     over = fly(plan(tmp_path, 6), tmp_path / "out")

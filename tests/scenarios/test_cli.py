@@ -397,6 +397,35 @@ def test_a_path_of_any_bytes_is_printed_as_it_is():
     assert (done.stdout, done.stderr) == (b"out/\xff\n", b"")
 
 
+def test_a_sign_that_the_encoding_lacks_is_printed_as_its_number_beside_a_path_of_any_bytes():
+    code = "import os; from dockair.scenarios.std_streams import outlive_readers; outlive_readers()"
+    code += "; print('3\\xb0 \\u2014', os.fsdecode(b'\\xff'))"
+    environment = {**os.environ, "PYTHONIOENCODING": "ascii"}
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, env=environment)
+    assert (done.stdout, done.stderr) == (b"3\\xb0 \\u2014 \xff\n", b"")
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device of Linux")
+@pytest.mark.parametrize(
+    ("arguments", "full", "status"),
+    [
+        ("--version", "stdout", 3),
+        ("--help", "stdout", 3),
+        ("scenarios --json", "stdout", 3),
+        ("fly nosuch", "stderr", 2),
+    ],
+)
+def test_a_full_disk_where_output_goes_is_a_status_and_no_traceback(arguments, full, status):
+    with open("/dev/full", "w") as disk:
+        streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, full: disk}
+        done = subprocess.run([sys.executable, "-m", "dockair", *arguments.split()], text=True, **streams)
+    assert done.returncode == status
+    if full == "stdout":
+        assert done.stderr == "dockair: disk: expected room to write, got a full disk\n"
+    else:
+        assert done.stdout == ""
+
+
 @pytest.mark.parametrize(("identical", "expected_status"), [(True, 0), (False, 1)])
 def test_a_replay_that_differs_ends_with_status_one(command, monkeypatch, tmp_path, identical, expected_status):
     class Report:

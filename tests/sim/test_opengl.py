@@ -95,6 +95,13 @@ def test_mujoco_can_be_imported_where_the_library_asked_for_is_missing(kind: str
 
 
 @needs_linux
+def test_mujoco_can_be_imported_where_a_context_is_asked_for_that_it_does_not_know() -> None:
+    assert _run("import mujoco", MUJOCO_GL="nosuch").returncode != 0
+    helped = _run("import dockair.sim; import mujoco", MUJOCO_GL="nosuch")
+    assert helped.returncode == 0, helped.stderr
+
+
+@needs_linux
 @pytest.mark.parametrize(
     ("there", "left"), [("libEGL.so.1 libGL.so.1", "egl"), ("libEGL.so.1", "disabled"), ("libGL.so.1", "disabled")]
 )
