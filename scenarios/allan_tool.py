@@ -25,6 +25,7 @@ UNITS = {"rad/s": 1.0, "deg/s": float(np.pi / 180.0)}  #: in rad/s
 #: Whole units alone: "mdeg/s" is a thousandth of one, "rad/s^2" and "rad_s2" no rate.
 _NAMED = {f"{angle}/s": re.compile(rf"(?<![a-z]){angle}[/_]s(?![a-z0-9²^]|\*\*)") for angle in ("rad", "deg")}
 _SHEET = "imu_mti"  # whose keys, units and ranges are written
+_SHORT_S = 10.0  # a record shorter than this holds too few of the second at which N is read
 _LONG = 10.0  # correlation times that a record should last for B and K to be told apart
 _OPTIONS = {"sample_rate_hz": "--rate-hz", "bias_correlation_s": "--bias-correlation-s", "terms": "--terms"}
 _SUFFIXES = (".csv", ".txt", ".npy")
@@ -62,6 +63,10 @@ class AllanReport:
     @property
     def caution(self) -> str:
         """What the record does not tell; nothing if it tells all."""
+        if self.duration_s < _SHORT_S:
+            return (
+                f"{self.duration_s:.2g} s are less than ten times the 1 s at which N is read: all terms are uncertain"
+            )
         T = self.noise.bias_correlation_s
         if np.isfinite(self.dropped_correlation_s):
             return f"no bias instability: what fits best wanders within {self.dropped_correlation_s:.2g} s"

@@ -28,6 +28,7 @@ from dockair.rotations import Array
 __all__ = ["AllanCurve", "GyroNoise", "allan_deviation", "identify_gyro_noise"]
 
 _FLOOR = 0.617364283  # highest Allan deviation of a Gauss-Markov process over its standard deviation
+_LARGEST = 1e9  # of a sample, in any unit of a rate: above it stands a mark for a missing one, and squares overflow
 _FEWEST_INTERVALS = 3  # of the longest averaging time, by default
 _PER_DECADE = 10
 _ROUNDS = 8  # of re-weighting by the model
@@ -67,7 +68,8 @@ def allan_deviation(rates: ArrayLike, sample_rate_hz: float, taus_s: ArrayLike |
             up to a third of the record.
 
     Raises:
-        DockairError: fewer than three samples, a sample that is not finite, a time that does not fit twice.
+        DockairError: fewer than three samples, a sample that is not finite or larger than any rate, a time that does
+            not fit twice.
     """
     y = np.asarray(rates, dtype=float)
     y = y[:, None] if y.ndim == 1 else y
@@ -75,6 +77,8 @@ def allan_deviation(rates: ArrayLike, sample_rate_hz: float, taus_s: ArrayLike |
         raise DockairError("rates", expected="(n,) or (n, m) samples, n >= 3", got=f"shape {np.shape(rates)}")
     if not np.isfinite(y).all():
         raise DockairError("rates", expected="finite samples", got=f"{np.count_nonzero(~np.isfinite(y))} that are not")
+    if not np.abs(y).max() < _LARGEST:
+        raise DockairError("rates", expected=f"samples below {_LARGEST:g} in size", got=float(np.abs(y).max()))
     if not (np.isfinite(sample_rate_hz) and sample_rate_hz > 0.0):
         raise DockairError("sample_rate_hz", expected="a rate > 0", got=sample_rate_hz)
     counts = _counts(taus_s, len(y), sample_rate_hz)

@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from dockair.errors import DockairError
 from dockair.scenarios.commands.options import Json, print_json
 
 
@@ -22,6 +23,8 @@ def allan(
     """Identify a gyro's noise terms by Allan deviation; write them as a parameter sheet."""
     from dockair.scenarios import allan_tool
 
+    if out is not None and out.exists() and record.exists() and out.samefile(record):
+        raise DockairError("--out", expected="another file than the record", got=str(out))
     found = allan_tool.report(record, rate_hz, unit, terms=terms, bias_correlation_s=bias_correlation_s)
     if out is not None:
         allan_tool.write_sheet(found, out)

@@ -239,3 +239,27 @@ def test_all_terms_of_the_whole_model_come_back_from_forty_units(tmp_path):
         ("gyro_rate_random_walk_rad_s_rts", 0.2),
     ):
         assert found[key] == pytest.approx(getattr(MTI, key), rel=within), key
+
+
+def test_a_record_of_a_blink_says_that_it_tells_little(tmp_path):
+    np.save(tmp_path / "gyro.npy", _white(n=999))
+    assert "all terms are uncertain" in allan_tool.report(tmp_path / "gyro.npy", 100.0, "rad/s").caution
+    np.save(tmp_path / "gyro.npy", _white(n=1001))
+    assert "all terms" not in allan_tool.report(tmp_path / "gyro.npy", 100.0, "rad/s").caution
+
+
+def test_a_mark_for_a_missing_sample_is_no_rate(command, tmp_path):
+    rates = _white()
+    rates[100, 1] = 1e300
+    np.save(tmp_path / "gyro.npy", rates)
+    status, out, err = command("allan", tmp_path / "gyro.npy", "--rate-hz", "100", "--unit", "rad/s")
+    assert (status, out) == (2, "") and "expected samples below 1e+09 in size, got 1e+300" in err
+
+
+def test_a_record_is_not_written_over_by_its_own_sheet(command, tmp_path):
+    record = tmp_path / "gyro.csv"
+    np.savetxt(record, _white(), delimiter=",", header="x_rad_s,y_rad_s,z_rad_s", comments="")
+    before = record.read_bytes()
+    status, out, err = command("allan", record, "--rate-hz", "100", "--out", record)
+    assert (status, out) == (2, "") and "--out: expected another file than the record" in err
+    assert record.read_bytes() == before
