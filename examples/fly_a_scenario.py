@@ -20,7 +20,8 @@ def main(scenario_name: str = "default", seed: str = "0") -> None:
     """Fly, then read what was written."""
     scenario = load_scenario(scenario_name, {"turbulence.sigma_m_s": 0.3})  # any key of the scenario can be changed
     result = fly(scenario, int(seed), "out/example")
-    print(f"{result.outcome} after {result.duration_s:.1f} s, {result.frames} frames")
+    over_s = result.duration_s if result.contact is None else result.contact.time_s  # hold and retreat follow
+    print(f"{result.outcome} after {over_s:.1f} s, {result.frames} frames")
     if result.contact is not None:
         print(f"  {result.contact.radial_offset_m:.3f} m off centre at {result.contact.closure_speed_m_s:.2f} m/s")
 

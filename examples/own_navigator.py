@@ -78,7 +78,8 @@ def main(scenario_name: str = "default", seed: str = "0") -> None:
 
     keys = {"navigation.navigator": "own_navigator:MyNavigator", "camera.sensing": "measurements"}
     result = fly(load_scenario(scenario_name, keys), int(seed))
-    print(f"{result.outcome} after {result.duration_s:.1f} s")
+    over_s = result.duration_s if result.contact is None else result.contact.time_s  # hold and retreat follow
+    print(f"{result.outcome} after {over_s:.1f} s")
     if result.contact is not None:
         print(f"  {result.contact.radial_offset_m:.3f} m off centre at {result.contact.closure_speed_m_s:.2f} m/s")
 

@@ -88,6 +88,23 @@ def test_the_environments_are_registered_whichever_is_imported_first(imports):
     assert run(code) == "dockair.scenarios.envs:DockEnv"
 
 
+def test_the_environments_are_registered_where_another_finder_knows_gymnasium():
+    """As an editable install of it brings along."""
+    code = (
+        "import sys, dockair\nfrom importlib.machinery import PathFinder\n"
+        "class Own:\n"
+        "    def find_spec(name, path=None, target=None):\n"
+        "        return PathFinder.find_spec(name, path, target) if name == 'gymnasium' else None\n"
+        "class Blind:\n"
+        "    def find_spec(name, path=None, target=None):\n"
+        "        return None if name == 'gymnasium' else PathFinder.find_spec(name, path, target)\n"
+        "sys.meta_path[sys.meta_path.index(PathFinder)] = Blind\n"
+        "sys.meta_path.append(Own)\n"
+        "import gymnasium\nprint(gymnasium.spec('dockair/Dock-v0').entry_point)"
+    )
+    assert run(code) == "dockair.scenarios.envs:DockEnv"
+
+
 def test_gymnasium_can_be_reloaded_after_dockair():
     assert run("import dockair, gymnasium, importlib; importlib.reload(gymnasium); print('fine')") == "fine"
 

@@ -6,6 +6,7 @@ One step is one control tick (or `ticks_per_step` of them). The world, the senso
 """
 
 from collections.abc import Mapping
+from contextlib import ExitStack
 from copy import deepcopy
 from dataclasses import replace
 from inspect import signature
@@ -121,10 +122,14 @@ class Episodes(gymnasium.Env[Obs, NDArray[np.float32]], Generic[Obs]):
         # a look ahead: only a reset that succeeds draws
         flight_seed = int(deepcopy(self.np_random).integers(LARGEST_SEED, endpoint=True)) if chosen is None else chosen
         flight, judge, tick = self._begun(scenario, flight_seed)
+        try:
+            self.close()
+        except BaseException:  # a view's context belongs to the thread that made it
+            flight.close()
+            raise
         super().reset(seed=seed)
         if chosen is None:
             self.np_random.integers(LARGEST_SEED, endpoint=True)
-        self.close()
         self._flight, self._judge, self._outcome, self.imu = flight, judge, None, None
         self._seed = flight_seed
         self.metadata = self._metadata_of(scenario)
@@ -179,10 +184,12 @@ class Episodes(gymnasium.Env[Obs, NDArray[np.float32]], Generic[Obs]):
 
     def close(self) -> None:
         """Free the off-screen contexts."""
-        for held in (self._view, self._flight):
-            if held is not None:
-                held.close()
+        held = self._flight, self._view
         self._view = self._flight = self._tick = None
+        with ExitStack() as closing:  # the flight, too, where the view cannot be
+            for one in held:
+                if one is not None:
+                    closing.callback(one.close)
 
     def observation(self) -> Obs:
         """Return what is observed now; new arrays."""

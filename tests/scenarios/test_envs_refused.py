@@ -230,6 +230,23 @@ def test_a_refused_reset_leaves_the_picture(monkeypatch):
     assert not again["picture"].any()
 
 
+def test_a_view_that_cannot_be_closed_keeps_neither_flight_open_nor_seeds(env, flights):
+    """Its context belongs to the thread that made it: another's reset fails, and the next one begins anew."""
+
+    class Foreign:
+        def close(self):
+            raise RuntimeError("EGL_BAD_ACCESS")
+
+    env.reset(seed=0)
+    env._view = Foreign()
+    drawn = env.np_random.bit_generator.state
+    with pytest.raises(RuntimeError, match="EGL_BAD_ACCESS"):
+        env.reset(seed=5)
+    assert env.np_random.bit_generator.state == drawn
+    assert flights == []
+    env.reset(seed=5)
+
+
 def test_what_needs_pictures_is_refused_with_the_environment_that_takes_them():
     instead = "dockair/Dock-v0 in place of dockair/DockFast-v0"
     with pytest.raises(DockairError, match=rf"navigation\.heading: expected false, or {instead}: a heading"):
