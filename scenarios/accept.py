@@ -200,9 +200,8 @@ _IN_WORDS = {
 
 
 def _good_contact() -> "RefereeLimits":
-    from dockair.scenarios.judgement.attempts import (
-        RefereeLimits,  # loads an engine, which who reads a scenario does not need
-    )
+    # loads an engine, which who reads a scenario does not need
+    from dockair.scenarios.judgement.attempts import RefereeLimits
 
     return RefereeLimits()
 
