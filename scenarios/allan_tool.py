@@ -20,6 +20,7 @@ from dockair.errors import DockairError
 from dockair.nav.heading.allan import GyroNoise, identify_gyro_noise
 from dockair.parameters import read_sheet
 from dockair.rotations import Array
+from dockair.scenarios.whole_file import write_text
 
 UNITS = {"rad/s": 1.0, "deg/s": float(np.pi / 180.0)}  #: in rad/s
 #: Whole units alone: "mdeg/s" is a thousandth of one, "rad/s^2" and "rad_s2" no rate.
@@ -168,12 +169,9 @@ def write_sheet(found: AllanReport, path: Path) -> None:
 
     Raises:
         DockairError: see there; a place that cannot be written to.
+        MachineError: there is no room.
     """
-    text = sheet_text(found)
-    try:
-        path.write_text(text, encoding="utf-8")
-    except (FileNotFoundError, IsADirectoryError, NotADirectoryError, PermissionError) as error:
-        raise DockairError(str(path), expected="a file to write to, in a folder that exists", got=str(error)) from None
+    write_text(sheet_text(found), path)
 
 
 def scenario_text(found: AllanReport) -> str:

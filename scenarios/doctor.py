@@ -17,7 +17,7 @@ from typing import Any
 
 from dockair.errors import MachineError
 from dockair.scenarios.tables.light import CameraOptions
-from dockair.sim.opengl import APT_PACKAGES, RENDER_SCRIPT, TIMEOUT_S, kind_of_context, try_drawing
+from dockair.sim.opengl import RENDER_SCRIPT, TIMEOUT_S, drawing_remedy, kind_of_context, try_drawing
 
 PYTHON_AT_LEAST = (3, 11)
 MEMORY_AT_LEAST_GB = 1.0  # a flight with its recording stays below this
@@ -90,14 +90,11 @@ def _opengl() -> str:
 
 
 def _rendering() -> Check:
-    name, kind = f"off-screen OpenGL ({_opengl()})", kind_of_context()
-    remedy = f"type: sudo apt-get install -y {APT_PACKAGES}"
-    if kind not in ("", "egl"):
-        remedy = "unset MUJOCO_GL, or set it to egl"
+    name = f"off-screen OpenGL ({_opengl()})"
     trial = try_drawing(_RENDER, RENDER_TIMEOUT_S)
     if trial.renderer:
         return Check(name, True, trial.renderer, needed=False)
-    return Check(name, False, trial.reason, remedy, needed=False, detail=trial.said)
+    return Check(name, False, trial.reason, drawing_remedy(), needed=False, detail=trial.said)
 
 
 def _camera(rendering: Check) -> Check:

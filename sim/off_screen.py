@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dockair.errors import MachineError
-from dockair.sim.opengl import REMEDY
+from dockair.sim.opengl import drawing_remedy
 
 _SMALLEST_FONT = 50
 
@@ -97,7 +97,9 @@ def open_renderer(model: mujoco.MjModel, width: int, height: int, font: int, whe
     except Exception as error:  # whatever the driver's loader raises, the cause is the machine
         if context is not None:
             context.free()
-        raise MachineError(where, expected=f"an off-screen OpenGL context ({error})", remedy=REMEDY) from error
+        raise MachineError(
+            where, expected=f"an off-screen OpenGL context ({error})", remedy=drawing_remedy()
+        ) from error
     finally:
         quality.offsamples = samples
     mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, renderer)

@@ -17,7 +17,6 @@ from functools import cache
 from dockair.errors import DockairError
 
 APT_PACKAGES = "libegl1 libgl1-mesa-dri libopengl0"
-REMEDY = f"install {APT_PACKAGES} (Debian, Ubuntu: apt-get install)"
 BACKENDS = ("auto", "mujoco", "analytic")
 TIMEOUT_S = 120.0
 _NO_OPENGL = ("disable", "disabled", "off", "false", "0")  # what MuJoCo takes for none
@@ -54,6 +53,13 @@ class Trial:
 def kind_of_context(environment: Mapping[str, str] = os.environ) -> str:
     """Return `egl`, `glfw` and so on: what would be tried here; empty for the window system's own."""
     return environment.get("MUJOCO_GL", "egl" if sys.platform.startswith("linux") else "").lower().strip()
+
+
+def drawing_remedy(environment: Mapping[str, str] = os.environ) -> str:
+    """Return what to do where nothing can be drawn: install the libraries, or no longer ask for others or for none."""
+    if kind_of_context(environment) not in ("", "egl"):
+        return "unset MUJOCO_GL, or set it to egl"
+    return f"type: sudo apt-get install -y {APT_PACKAGES}"
 
 
 def try_drawing(script: str = RENDER_SCRIPT, timeout_s: float = TIMEOUT_S) -> Trial:

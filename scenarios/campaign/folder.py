@@ -5,7 +5,7 @@ from pathlib import Path
 
 from dockair.errors import DockairError
 from dockair.scenarios.campaign import journal, manifest, table
-from dockair.scenarios.campaign.whole_file import PART
+from dockair.scenarios.whole_file import PART
 
 SUMMARY, TIMING = "summary.json", "timing.json"
 RESULTS = (table.FILE_NAME, SUMMARY, TIMING)  #: written at the end

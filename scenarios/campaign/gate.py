@@ -12,6 +12,7 @@ gusts and hardware. A flight that ends in an error is no success.
 Unsafe contacts and errors are counted, not tested: the bound says nothing of these limits.
 """
 
+import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -19,7 +20,7 @@ from typing import Any
 
 from dockair.errors import DockairError
 from dockair.scenarios.campaign.plan import Gate
-from dockair.scenarios.report.groups import Group, groups_of
+from dockair.scenarios.report.groups import Group, counted, groups_of
 from dockair.scenarios.statistics import largest_rejected_count, probability_of_at_most, trials_to_reject_none
 
 
@@ -70,9 +71,9 @@ def judge(gate: Gate, rows: Sequence[Mapping[str, Any]]) -> Verdict:
         if not test.passed
     ]
     if unsafe > gate.unsafe_max:
-        reasons.append(f"{unsafe} flights with an unsafe contact, allowed {gate.unsafe_max}")
+        reasons.append(f"{counted(unsafe, 'flight')} with an unsafe contact, allowed {gate.unsafe_max}")
     if errors > gate.errors_max:
-        reasons.append(f"{errors} flights ended in an error, allowed {gate.errors_max}")
+        reasons.append(f"{counted(errors, 'flight')} ended in an error, allowed {gate.errors_max}")
     return Verdict(
         passed=not reasons,
         false_alarm=gate.false_alarm,
@@ -102,7 +103,8 @@ def require_power(gate: Gate, rows: Sequence[Mapping[str, Any]], where: str) -> 
         test = _test(group, name, rate, false_alarm)
         if test.passed:
             needed = trials_to_reject_none(rate, false_alarm)
-            expected = f"{needed:.0f} flights or more, or another false_alarm: with fewer it never fails"
+            enough = f"{needed:.0f} flights or more" if math.isfinite(needed) else "a higher rate"
+            expected = f"{enough}, or another false_alarm: with fewer it never fails"
             raise DockairError(f"{where}.{name}", expected=expected, got=f"{test.flights} ({test.group})")
 
 

@@ -12,8 +12,8 @@ from typing import Any, Self
 
 from dockair.errors import DockairError, MachineError
 from dockair.scenarios.campaign.row import is_row
-from dockair.scenarios.campaign.whole_file import NO_ROOM
 from dockair.scenarios.file_lock import has_locked
+from dockair.scenarios.whole_file import NO_ROOM
 
 FILE_NAME = "journal.jsonl"
 _BEGINS = b'{"key": "'  # every entry, as `append` is given it

@@ -19,8 +19,8 @@ from dockair.scenarios.campaign.code import Code
 from dockair.scenarios.campaign.jobs import Job
 from dockair.scenarios.campaign.plan import Plan
 from dockair.scenarios.campaign.points import runs_of
-from dockair.scenarios.campaign.whole_file import write_whole
 from dockair.scenarios.judgement.result import versions
+from dockair.scenarios.whole_file import write_whole
 
 FILE_NAME = "manifest.json"
 SCHEMA_VERSION = 1

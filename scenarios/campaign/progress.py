@@ -8,7 +8,7 @@ from typing import Any, Self
 from rich.console import Console
 from rich.measure import Measurement
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
-from rich.table import Table
+from rich.table import Column, Table
 from rich.text import Text
 
 from dockair.scenarios.campaign.jobs import Job
@@ -18,6 +18,7 @@ from dockair.scenarios.report.groups import groups_of
 from dockair.scenarios.statistics import wilson_interval
 
 _LINE_INTERVAL_S = 30.0  # between two lines where stderr is no terminal
+_BAR = 20  # characters: the figures beside it fit on a terminal of 80
 _WIDEST = 1000  # characters that a table may ask for
 _CELL = 48  # characters of settings that a table's cell can hold
 
@@ -34,8 +35,8 @@ class CampaignProgress:
     def __init__(self, console: Console | None = None) -> None:
         self._console = console or Console(stderr=True, highlight=False, emoji=False)
         columns = (
-            TextColumn("{task.description}", markup=False),
-            BarColumn(),
+            TextColumn("{task.description}", markup=False, table_column=Column(no_wrap=False)),  # a long name gives way
+            BarColumn(bar_width=_BAR),
             MofNCompleteColumn(),
             TextColumn("{task.fields[said]}", markup=False),
         )

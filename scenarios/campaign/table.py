@@ -7,7 +7,7 @@ from typing import Any
 
 from dockair.errors import DockairError
 from dockair.scenarios.campaign.row import COLUMNS, column_names, is_row
-from dockair.scenarios.campaign.whole_file import write_whole
+from dockair.scenarios.whole_file import write_whole
 
 FILE_NAME = "flights.parquet"
 

@@ -24,7 +24,8 @@ def report(
     from dockair.scenarios.output_folder import is_flights_file
     from dockair.scenarios.report import evidence as table
     from dockair.scenarios.report.folders import read_campaigns
-    from dockair.scenarios.report.page import page, write_text
+    from dockair.scenarios.report.page import page
+    from dockair.scenarios.whole_file import write_text
 
     out = out or folders[0] / REPORT
     if evidence is not None and os.path.realpath(evidence) == os.path.realpath(out):

@@ -25,14 +25,15 @@ from dockair.sim.shapes import shapes_of
 _PORT = 9876  # of rerun's viewer
 _SHOWN_HZ = 20.0  # a viewer needs no more, and each costs a few milliseconds
 
-Sink = Callable[[Any], None]
+Sink = Callable[[Any], bool]
 
 
 class LiveViewer:
     """Shows episodes one after the other, each a recording of its own.
 
     Args:
-        sink: where a rerun recording goes; None opens the viewer, or finds the one that is open.
+        sink: sends a rerun recording somewhere, and returns whether nothing was sent there before; None opens the
+            viewer, or finds the one that is open.
     """
 
     def __init__(self, sink: Sink | None = None) -> None:
@@ -74,16 +75,21 @@ class LiveViewer:
 
     def _begin(self, flight: Flight) -> None:
         import rerun as rr  # 0.75 s, and only this needs it
+        from rerun_bindings import flush_and_cleanup_orphaned_recordings
 
-        self._flight, self._next_s, self._frame = flight, 0.0, None
+        self._next_s, self._frame = 0.0, None
         self._p_TE, self._path = hose_exit(flight.truth), []
         self._episode += 1
+        self._recording = None
+        flush_and_cleanup_orphaned_recordings()  # the last episode's: rerun keeps its threads and memory otherwise
         self._recording = rr.RecordingStream("dockair", recording_id=uuid4(), send_properties=False)
         self._recording.send_recording_name(f"{flight.scenario.name}, episode {self._episode}")
         self._recording.set_log_time_enabled(False)  # the timelines are the flight's
-        self._sink(self._recording)
-        self._recording.send_blueprint(blueprint(flight.sheets.camera))
+        is_new = self._sink(self._recording)
+        if is_new or self._episode == 1:  # the layout stays; rerun never frees what it took to send one
+            self._recording.send_blueprint(blueprint(flight.sheets.camera))
         log_still(self._recording, flight.sheets, shapes_of(flight.world.model))
+        self._flight = flight  # not before: what could not be begun is begun again with the next tick
 
     def _log_frame(self, frame: CameraFrame) -> None:
         import rerun as rr
@@ -113,11 +119,21 @@ def _is_open() -> bool:
         return False
 
 
-def _spawned(recording: Any) -> None:
-    """Send a recording to the viewer that is open, or open one: the program stands beside this Python."""
+def _spawned(recording: Any) -> bool:
+    """Send a recording to the viewer that is open, or open one; return whether it was opened.
+
+    Its program stands beside this Python.
+
+    Raises:
+        MachineError: there is no such program, or no display that it could open on.
+    """
     import rerun as rr
 
     beside = shutil.which("rerun", path=str(Path(sys.executable).parent)) or shutil.which("rerun")
     if beside is None:
         raise MachineError("render_mode", expected="the rerun viewer", remedy="install rerun-sdk")
+    is_open = _is_open()
+    if not is_open:
+        require_viewer()  # the one before may have been closed; without a display rerun waits for another in vain
     rr.spawn(executable_path=beside, recording=recording)
+    return not is_open

@@ -38,6 +38,11 @@ _NO_WORD = re.compile(r"[^\w.]+")
 _IN_COLUMNS = ("navigation.navigator", "camera.sensing", "guidance.controller")  # keys whose values have a column
 
 
+def counted(count: int, noun: str) -> str:
+    """Return "1 flight", "2 flights"."""
+    return f"{count} {noun}{'' if count == 1 else 's'}"
+
+
 @dataclass(frozen=True, slots=True)
 class Share:
     """So many of so many, with Wilson's 95 % interval."""
@@ -132,7 +137,7 @@ class Group:
     @property
     def flights_in_words(self) -> str:
         """How many flights, and of how many seeds where there are fewer."""
-        return f"{len(self.rows)} flights" + ("" if self.independent else f" of {self.seeds} seeds")
+        return counted(len(self.rows), "flight") + ("" if self.independent else f" of {counted(self.seeds, 'seed')}")
 
     @property
     def seeds_in_words(self) -> str:

@@ -5,19 +5,15 @@ One HTML file that needs no other.
 
 import json
 import math
-import os
 import re
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from dockair.errors import DockairError, MachineError
 from dockair.rotations import Array
-from dockair.scenarios.campaign.whole_file import NO_ROOM, write_whole
 from dockair.scenarios.report import figures
 from dockair.scenarios.report.acceptance import claim_of, shortfalls_of
 from dockair.scenarios.report.cause_words import meaning_of
@@ -27,6 +23,7 @@ from dockair.scenarios.report.groups import (
     Row,
     cause_without_attempt,
     causes_of,
+    counted,
     ending_without_attempt,
     groups_of,
 )
@@ -56,7 +53,9 @@ def page(title: str, campaigns: Sequence[Campaign]) -> str:
     beside_perfect = [(group, pair) for group in groups if (pair := beside_perfect_navigation(group, groups))]
     text = environment.get_template("page.html.jinja").render(
         title=title,
+        counted=counted,
         flights=len(rows),
+        planned=sum(_planned(campaign) for campaign in campaigns),
         crashed=sum(len(group.failed_to_fly) for group in groups),
         limits=LIMITS,
         groups=groups,
@@ -73,6 +72,12 @@ def page(title: str, campaigns: Sequence[Campaign]) -> str:
         manifests=[_manifest(campaign) for campaign in campaigns],
     )
     return _NO_TEXT.sub("\N{REPLACEMENT CHARACTER}", text)
+
+
+def _planned(campaign: Campaign) -> int:
+    """Return how many flights its plan has, which are more than its rows while it is not over."""
+    planned = campaign.manifest.get("flights")
+    return planned if isinstance(planned, int) and planned > len(campaign.rows) else len(campaign.rows)
 
 
 def _manifest(campaign: Campaign) -> dict[str, Any]:
@@ -157,26 +162,3 @@ def _quantile(values: Array, share: float) -> str:
 def _figure(value: float, form: str) -> str:
     """Return a figure as the form writes it, a dash where there is none."""
     return form.format(value) if math.isfinite(value) else "–"
-
-
-def write_text(text: str, path: Path) -> Path:
-    """Write a file whole or not at all, and return its path.
-
-    Raises:
-        DockairError: it cannot be written there.
-        MachineError: there is no room.
-    """
-    where, expected = str(path), "a file that can be written"
-    try:
-        if path.is_dir():
-            raise DockairError(where, expected=expected, got="a folder")
-        path.parent.mkdir(parents=True, exist_ok=True)
-        if path.exists() and not path.is_file():  # /dev/null or a pipe takes text, but nothing may be put in its place
-            path.write_text(text, encoding="utf-8")
-        else:
-            write_whole(Path(os.path.realpath(path)), text.encode())  # a link stays one
-    except OSError as error:
-        if error.errno in NO_ROOM:
-            raise MachineError(where, expected="room to write", remedy="make some") from None
-        raise DockairError(where, expected=expected, got=error.strerror) from None
-    return path

@@ -14,8 +14,11 @@ def main() -> None:
     if text:
         print(f"dockair: links not restored ({', '.join(text)}): clone with git", file=sys.stderr)
         sys.exit(3)
-    from dockair.scenarios.cli import main as command_line
-
+    try:
+        from dockair.scenarios.cli import main as command_line
+    except KeyboardInterrupt:  # while it is imported: later the command line takes it
+        print("dockair: stopped", file=sys.stderr)
+        sys.exit(130)
     command_line()
 
 

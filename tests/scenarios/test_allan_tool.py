@@ -1,5 +1,6 @@
 """`dockair allan`: records of known terms, of the simulator's gyros, and what a person may do wrong with a record."""
 
+import errno
 import json
 import tomllib
 from dataclasses import replace
@@ -10,7 +11,7 @@ from scipy.signal import lfilter
 
 from dockair.errors import DockairError
 from dockair.parameters import load_parameters
-from dockair.scenarios import allan_tool, cli
+from dockair.scenarios import allan_tool, cli, whole_file
 from dockair.sim.imu import Imu, ImuParameters
 
 MTI = load_parameters("imu_mti", ImuParameters)
@@ -194,8 +195,25 @@ def test_a_rate_or_a_folder_that_cannot_be_ends_with_status_two(command, tmp_pat
         assert (status, err.count("\n")) == (2, 1) and "'--rate-hz'" in err
     for rate_hz in ("1e-3", "1e6"):
         assert command(*record, "--rate-hz", rate_hz)[0] == 0
-    status, _, err = command(*record, "--rate-hz", "100", "--out", tmp_path / "none" / "sheet.toml")
-    assert status == 2 and err.count("\n") == 1
+    for place in (tmp_path / "gyro.npy" / "sheet.toml", tmp_path):
+        status, _, err = command(*record, "--rate-hz", "100", "--out", place)
+        assert (status, err.count("\n")) == (2, 1) and str(place) in err
+
+
+def test_a_sheet_s_folder_is_made_and_a_full_disk_leaves_the_sheet_that_was_there(command, tmp_path, monkeypatch):
+    np.save(tmp_path / "gyro.npy", _white())
+    sheet = tmp_path / "new" / "sheet.toml"
+    record = ("allan", tmp_path / "gyro.npy", "--unit", "rad/s", "--rate-hz", "100", "--out", sheet)
+    assert command(*record)[0] == 0
+    before = sheet.read_bytes()
+
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(whole_file.os, "fsync", full)
+    status, _, err = command(*record)
+    assert (status, err.count("\n")) == (3, 1) and "expected room to write" in err
+    assert sheet.read_bytes() == before and list(sheet.parent.iterdir()) == [sheet]
 
 
 def test_terms_beyond_the_sheet_s_range_are_refused_by_name(tmp_path):

@@ -78,9 +78,9 @@ def test_one_unsafe_contact_fails_the_gate_and_so_does_one_error():
     gate = Gate()
     assert judge(gate, rows(5, 5)).passed
     unsafe = judge(gate, rows(5, 5) + rows(1, 1, unsafe="3.1 m/s"))
-    assert unsafe.reasons == ("1 flights with an unsafe contact, allowed 0",)
+    assert unsafe.reasons == ("1 flight with an unsafe contact, allowed 0",)
     broken = judge(gate, rows(5, 5) + rows(0, 1, error="ValueError: no", outcome="error"))
-    assert broken.reasons == ("1 flights ended in an error, allowed 0",)
+    assert broken.reasons == ("1 flight ended in an error, allowed 0",)
     assert judge(Gate(errors_max=1), rows(0, 1, error="x", outcome="error")).passed
 
 
@@ -94,6 +94,11 @@ def test_a_gate_that_could_never_fail_is_refused_with_the_flights_it_needs():
     with pytest.raises(DockairError, match="gate.success_rate: expected 4 flights or more"):
         require_power(gate, rows(0, 3), "gate")
     require_power(gate, rows(0, 4), "gate")
+
+
+def test_a_gate_that_no_number_of_flights_could_fail_is_refused_without_a_number():
+    with pytest.raises(DockairError, match="expected a higher rate, or another false_alarm"):
+        require_power(Gate(success_rate=1e-320), rows(0, 3), "gate")
 
 
 def test_a_gate_that_asks_for_next_to_nothing_is_refused_at_once():

@@ -35,9 +35,9 @@ from dockair.scenarios.campaign.pool import Done, Pool
 from dockair.scenarios.campaign.progress import CampaignProgress, show_campaign
 from dockair.scenarios.campaign.run import run
 from dockair.scenarios.campaign.table import read_table
-from dockair.scenarios.campaign.whole_file import write_whole
 from dockair.scenarios.campaign.worker import Answer, one_line
 from dockair.scenarios.commands import campaign as campaign_command
+from dockair.scenarios.whole_file import write_whole
 from dockair.sim.opengl import Trial
 
 #: Flies nothing: answers after a while that the seed decides, or comes to the end that the seed decides.
@@ -948,6 +948,18 @@ def test_flights_that_are_flown_again_count_once(here, tmp_path):
     assert progress._pace().endswith(" 0 s left")
     assert "2 of 4 docked" in progress._rates()
     assert "were done before" not in text.getvalue()
+
+
+def test_on_a_terminal_of_eighty_columns_a_long_name_leaves_room_for_the_pace(tmp_path):
+    flown = '{ scenario = "default", set = { "guidance.hold_s" = 2.0, "parameters.as_built.led_position_sigma_m" = 0.001 } }'
+    text = io.StringIO()
+    progress = CampaignProgress(Console(file=text, width=80, force_terminal=True))
+    progress.begin(jobs_of(plan(tmp_path, 400, "", flown)), {})
+    progress._bars.stop()
+    progress._bars.update(progress._overall, said="11.4 a minute, 12 h 35 min left, 12 errors")
+    progress._bars.console.print(progress._bars.get_renderable())
+    (line,) = [line for line in text.getvalue().splitlines() if "a minute" in line]
+    assert line.startswith("all") and "12 errors" in line
 
 
 def test_before_the_first_flight_is_done_a_log_says_just_that(tmp_path, monkeypatch):

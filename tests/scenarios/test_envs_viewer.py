@@ -1,6 +1,7 @@
 """The live viewer: what it logs while an episode is flown, and that each episode is a recording of its own."""
 
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,6 +12,7 @@ from dockair.rotations import matrix_from_yaw_pitch_roll
 from dockair.scenarios.envs import viewer as envs_viewer
 from dockair.scenarios.envs.viewer import LiveViewer
 from dockair.scenarios.loop import Tick
+from dockair.scenarios.recording.layout import blueprint
 
 SECONDS = 0.5
 
@@ -33,10 +35,11 @@ def shown(hand_made, monkeypatch, tmp_path):
     monkeypatch.setattr(envs_viewer, "shapes_of", lambda model: ())
     paths, recordings = [], []
 
-    def keep(recording) -> None:
+    def keep(recording) -> bool:
         paths.append(tmp_path / f"{len(paths)}.rrd")
         recordings.append(recording)
         recording.save(paths[-1])
+        return True
 
     viewer = LiveViewer(keep)
     for _ in range(2):
@@ -82,6 +85,43 @@ def test_without_the_viewers_program_the_machine_is_said_to_lack_it(hand_made, m
         _show(LiveViewer(), hand_made, _flight(hand_made), 1)
 
 
+def test_a_viewer_that_was_closed_where_none_can_be_opened_is_said_to_be_missing_tick_by_tick(hand_made, monkeypatch):
+    """Rerun itself would wait for eleven seconds and go on without a word."""
+    monkeypatch.setattr(envs_viewer.shutil, "which", lambda *args, **kwargs: "rerun")
+    monkeypatch.setattr(envs_viewer, "_is_open", lambda: False)
+    monkeypatch.setattr(envs_viewer, "has_display", lambda: False)
+    viewer, flight = LiveViewer(), _flight(hand_made)
+    for _ in range(2):
+        with pytest.raises(MachineError, match="render_mode: expected a display, or a rerun viewer that is open"):
+            _show(viewer, hand_made, flight, 1)
+
+
+@pytest.mark.parametrize(
+    ("new", "sent"), [((True, False, False), 1), ((False, False, False), 1), ((True, False, True), 2)]
+)
+def test_the_layout_is_sent_once_to_each_viewer(hand_made, monkeypatch, new, sent):
+    monkeypatch.setattr(envs_viewer, "shapes_of", lambda model: ())
+    layouts = []
+    monkeypatch.setattr(envs_viewer, "blueprint", lambda camera: layouts.append(1) or blueprint(camera))
+    answers = iter(new)
+    viewer = LiveViewer(lambda recording: recording.memory_recording() and next(answers))
+    for _ in new:
+        _show(viewer, hand_made, _flight(hand_made), 2)
+    assert len(layouts) == sent
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="counts threads where Linux lists them")
+def test_episodes_leave_no_threads_behind(hand_made, monkeypatch, tmp_path):
+    monkeypatch.setattr(envs_viewer, "shapes_of", lambda model: ())
+    numbers = iter(range(100))
+    viewer = LiveViewer(lambda recording: recording.save(tmp_path / f"{next(numbers)}.rrd") or False)
+    counts = []
+    for _ in range(6):
+        _show(viewer, hand_made, _flight(hand_made), 10)
+        counts.append(len(list(Path("/proc/self/task").iterdir())))
+    assert counts[-1] == counts[1]
+
+
 def test_a_viewer_that_is_asked_twice_for_one_tick_draws_it_once(hand_made, monkeypatch):
     monkeypatch.setattr(envs_viewer, "shapes_of", lambda model: ())
     opened = []
@@ -100,9 +140,10 @@ def _episode(hand_made, monkeypatch, path, ticks):
     monkeypatch.setattr(envs_viewer, "shapes_of", lambda model: ())
     recordings = []
 
-    def keep(recording) -> None:
+    def keep(recording) -> bool:
         recordings.append(recording)
         recording.save(path)
+        return True
 
     viewer, flight = LiveViewer(keep), _flight(hand_made)
     flight.truth = ticks[0][0]

@@ -101,6 +101,17 @@ def test_sensing_is_never_pooled():
     assert [(group.sensing, len(group.rows)) for group in groups] == [("camera", 3), ("measurements", 3), ("truth", 3)]
 
 
+def test_a_campaign_that_is_not_over_says_how_many_flights_it_plans():
+    def first_line(flown: int, planned: int) -> str:
+        manifest = {"plan": {"name": "made"}, "flights": planned}
+        campaign = Campaign(name="made", manifest=manifest, rows=[_row(seed) for seed in range(flown)])
+        return page("made", [campaign]).split('<p class="note">')[1].split("\n")[0]
+
+    assert first_line(3, 8) == "3 of 8 flights planned."
+    assert first_line(3, 3) == "3 flights."
+    assert first_line(1, 1) == "1 flight."
+
+
 def test_the_seeds_of_a_group_are_told_with_their_gaps():
     (group,) = groups_of([_row(seed) for seed in (12, 13, 14, 9, 1, 2, 3, 4)])
     assert group.seeds_in_words == "1 to 4, 9, 12 to 14"
@@ -108,7 +119,7 @@ def test_the_seeds_of_a_group_are_told_with_their_gaps():
     drawn = {"set.start.aft_m": 5.0}
     (twice,) = groups_of([_row(3, command=_command("light_gusts", 3, **{"start.aft_m": 5.0})) | drawn] * 2)
     assert twice.seeds_in_words == "3"
-    assert "2 flights of 1 seeds, seed 3; navigator" in page("made", [_campaign(twice.rows)])
+    assert "2 flights of 1 seed, seed 3; navigator" in page("made", [_campaign(twice.rows)])
 
 
 @pytest.mark.parametrize("rims_m", [[0.25], [0.305], [0.25, 0.305], []])

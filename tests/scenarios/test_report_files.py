@@ -14,7 +14,7 @@ from dockair.scenarios.campaign import journal, manifest, table
 from dockair.scenarios.campaign.folder import rows_of
 from dockair.scenarios.campaign.row import COLUMNS
 from dockair.scenarios.report.folders import read_campaigns
-from dockair.scenarios.report.page import write_text
+from dockair.scenarios.whole_file import write_text
 
 
 @pytest.fixture

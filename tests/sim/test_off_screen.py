@@ -35,7 +35,7 @@ def test_a_renderer_that_fails_leaves_no_context_behind(monkeypatch: pytest.Monk
             freed.append(self)
 
     monkeypatch.setattr(off_screen, "gl_context", lambda width, height: Context())
-    with pytest.raises(MachineError, match="render: .*no surface"):
+    with pytest.raises(MachineError, match="render: .*no surface.*; type: sudo apt-get install -y libegl1"):
         open_renderer(MODEL, 8, 8, FONT, "render")
     assert len(freed) == 1
     assert MODEL.vis.quality.offsamples == 4

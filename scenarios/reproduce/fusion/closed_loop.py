@@ -31,6 +31,7 @@ from dockair.scenarios.campaign.jobs import scenario_hash
 from dockair.scenarios.judgement.metrics import normalised_error_squared, state_error
 from dockair.scenarios.loop import Flight
 from dockair.scenarios.output_folder import made_folder
+from dockair.scenarios.reproduce.fusion.wanted import WANTED
 from dockair.scenarios.reproduce.reference import picture_name
 from dockair.scenarios.schema import Scenario, load_scenario
 from dockair.sim.truth import Truth
@@ -62,14 +63,6 @@ _BINS_M = (2.4, 3.0, 4.0, 5.0, 7.5, 9.0, 11.0, 16.0)
 _FAR_M, _NEAR_M, _INSIDE_M = (9.0, 11.0), 5.0, 10.0
 _EPOCH_M = 0.1  # of range: one frame of each seed in each of these
 _BAND = (0.025, 0.975)
-_WANTED = {
-    "range_rmse_mm_at_10_m": 50.0,
-    "range_bias_mm_at_10_m": 20.0,
-    "range_rmse_mm_inside_5_m": 10.0,
-    "lateral_rmse_mm_inside_5_m": 5.0,
-    "attitude_rmse_deg_inside_10_m": 0.5,
-    "wrong_minimum_percent": 0.1,
-}
 _SIZE_IN, _DPI = (11.0, 7.4), 110
 _COLUMNS = (
     "time_s", "range_m", "range_error_m", "left_error_m", "up_error_m", "miss_left_m", "miss_up_m", "attitude_rad",
@@ -96,7 +89,7 @@ def reproduce(out: Path | None, seeds: int = SEEDS) -> dict[str, Any]:
         folder = folders[name]
         count, flown_by = 2 * seeds if "camera.sensing" in overrides else seeds, _flown_by(code, overrides)
         flown = [_kept(folder, seed, flown_by, partial(fly, overrides, seed)) for seed in range(count)]
-        rows.append({"case": name, "ours": figures(flown) | {"flights": len(flown)}, "reference": _WANTED})
+        rows.append({"case": name, "ours": figures(flown) | {"flights": len(flown)}, "reference": dict(WANTED)})
         rows += [
             {"case": f"{name}, {low:g}-{high:g} m from the camera", "ours": _between(flown, low, high), "reference": {}}
             for low, high in zip(_BINS_M[:-1], _BINS_M[1:], strict=True)
