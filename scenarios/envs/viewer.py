@@ -18,6 +18,7 @@ from dockair.scenarios.flight_log import FlightLog
 from dockair.scenarios.loop import Flight, Tick
 from dockair.scenarios.recording.frames import shown_pixels
 from dockair.scenarios.recording.layout import blueprint
+from dockair.scenarios.recording.overlays import log_overlay_looks, log_overlays
 from dockair.scenarios.recording.plots import log_plots
 from dockair.scenarios.recording.scene import hose_exit, log_moving, log_still, log_tip_path, tip_place
 from dockair.sim.shapes import shapes_of
@@ -66,6 +67,7 @@ class LiveViewer:
         self._recording.set_time("sim_time", duration=tick.truth.time_s)
         times = [rr.TimeColumn("sim_time", duration=[tick.truth.time_s])]
         log_moving(self._recording, log, [0], times, flight.sheets, self._p_TE)
+        log_overlays(self._recording, log, [0], times, flight.sheets)
         self._path.append(tip_place(tick.truth, self._p_TE))
         log_tip_path(self._recording, self._path)
         log_plots(self._recording, log)
@@ -89,6 +91,7 @@ class LiveViewer:
         if is_new or self._episode == 1:  # the layout stays; rerun never frees what it took to send one
             self._recording.send_blueprint(blueprint(flight.sheets.camera))
         log_still(self._recording, flight.sheets, shapes_of(flight.world.model))
+        log_overlay_looks(self._recording, flight.sheets)
         self._flight = flight  # not before: what could not be begun is begun again with the next tick
 
     def _log_frame(self, frame: CameraFrame) -> None:

@@ -951,7 +951,8 @@ def test_flights_that_are_flown_again_count_once(here, tmp_path):
 
 
 def test_on_a_terminal_of_eighty_columns_a_long_name_leaves_room_for_the_pace(tmp_path):
-    flown = '{ scenario = "default", set = { "guidance.hold_s" = 2.0, "parameters.as_built.led_position_sigma_m" = 0.001 } }'
+    settings = '"guidance.hold_s" = 2.0, "parameters.as_built.led_position_sigma_m" = 0.001'
+    flown = f'{{ scenario = "default", set = {{ {settings} }} }}'
     text = io.StringIO()
     progress = CampaignProgress(Console(file=text, width=80, force_terminal=True))
     progress.begin(jobs_of(plan(tmp_path, 400, "", flown)), {})

@@ -77,6 +77,8 @@ def test_each_episode_is_a_recording_with_truth_and_belief_at_the_viewers_rate(s
         np.testing.assert_allclose(ranges[0], hand_made.tick(1)[3].p_PD_B[0])
         assert any(key.startswith("/world/receiver/belief:") for key in rows)
         assert any(key.startswith("/camera/window/pixels:") for key in rows)
+        for drawn in ("ring:LineStrips2D:strips", "leds:Points2D:positions", "close_up:Transform3D:translation"):
+            assert len(rows[f"/camera/{drawn}"]) == len(ranges)  # as over a recorded frame
 
 
 def test_without_the_viewers_program_the_machine_is_said_to_lack_it(hand_made, monkeypatch):
