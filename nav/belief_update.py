@@ -50,6 +50,8 @@ class BeliefUpdate:
             raise DockairError("navigator.learnt_place_sigmas", expected="a number, 0 or more", got=learnt_sigmas)
         self._sheets, self._settings, self._filter, self._contact = sheets, settings, belief, contact
         self._points_D = sheets.ring.positions_D
+        #: LEDs that make a pose without a belief; a loose filter would take for news what fewer have of its attitude
+        self.pose_leds = POSE_LEDS if settings.fusion.coupling == "tight" else settings.alone_leds
         self.used_time_s = float("nan")  #: stamp of the newest frame that has corrected the belief
         self.led_pixels_px = self._none()  #: (count, 2) of the newest frame's LEDs that were believed, NaN for the rest
 
@@ -84,9 +86,9 @@ class BeliefUpdate:
         R_CD, p_CD, covariance = self._filter.predicted_pose(time_s)
         attitude = self._attitude_known(len(named), time_s, R_CD, covariance)
         tight = self._settings.fusion.coupling == "tight"
-        few = len(named) < (POSE_LEDS if tight else self._settings.alone_leds)
+        few = len(named) < self.pose_leds
         if few and (attitude is None or len(named) < _LEAST_POSE_LEDS or not tight):
-            return self._use_few(seen, R_CD, p_CD)  # a loose filter would take the believed attitude of fewer for new
+            return self._use_few(seen, R_CD, p_CD)
         pose = solve_pose(
             seen.centroids_px,
             self._believed_points_D(time_s)[named],
@@ -158,7 +160,8 @@ class BeliefUpdate:
             return "pose too few LEDs"
         sigma_px = self._unlearnt_px(seen, R_CD, p_CD)
         if not self._filter.update_leds(seen.centroids_px, self._points_D[seen.led_numbers], sigma_px, time_s):
-            self._contact.contradicted(time_s)
+            if self._filter.was_contradicted:
+                self._contact.contradicted(time_s)
             return "LEDs refused by the gate"
         self.used_time_s = max(time_s, self.used_time_s)
         self._contact.corrected(time_s)

@@ -90,6 +90,7 @@ class RelativeFilter:
         )
         self._refusals, self._felt, self._doubted_s = 0, False, -math.inf
         self._last: Correction | None = None
+        self._was_contradicted = False
         self._shown: tuple[Belief, Apparent] | None = None  # of the belief asked for last
 
     @property
@@ -101,6 +102,11 @@ class RelativeFilter:
     def doubted_s(self) -> float:
         """Stamp of the newest frame that was taken on a widened belief; -inf before the first."""
         return self._doubted_s
+
+    @property
+    def was_contradicted(self) -> bool:
+        """Whether the gate refused the newest frame offered; a second of one stamp, or one too old, asks no gate."""
+        return self._was_contradicted
 
     @property
     def innovation(self) -> tuple[float, int] | None:
@@ -152,6 +158,7 @@ class RelativeFilter:
         if self._settings.coupling != "tight":
             raise DockairError("fusion.coupling", expected="tight, to use single LEDs", got=self._settings.coupling)
         sight = lines_of_sight_from_pixels(pixels, points_D, self._sheets.camera, np.asarray(sigma_px, dtype=float))
+        self._was_contradicted = False
         return len(sight.rays) > 0 and self._offer(sight, time_stamp_s)
 
     def turn_drogue(self, roll_rad: float, time_s: float) -> None:
@@ -280,6 +287,7 @@ class RelativeFilter:
             self._buffer.change_all(lambda belief: felt_first(belief, force_B))
 
     def _offer(self, frame: Frame, time_s: float) -> bool:
+        self._was_contradicted = False
         if not self._frame_stamps.believed(time_s, self._buffer.newest_s):
             return False
         before, doubted = self._buffer.before_frame(time_s), False
@@ -292,6 +300,7 @@ class RelativeFilter:
             correction, doubted = self._corrected(self._widened(before), frame), True
         if not correction.beliefs:
             self._refusals += is_pose
+            self._was_contradicted = True
             return False
         self._refusals = 0
         if doubted:

@@ -128,7 +128,7 @@ class Navigator:
         if not (isinstance(frame, CameraFrame) and heading.was_asked(frame)):
             heading.step(taken, None, np.zeros(3))
             return frame
-        heading.step(taken, frame, self._filter.predicted_pose(self._time_s)[1])
+        heading.step(taken, frame, self._filter.predicted_pose(frame.time_stamp_s)[1])
         return None
 
     def _look(self, frame: CameraFrame | LedObservation) -> str:
@@ -144,7 +144,7 @@ class Navigator:
             seen = with_numbers(frame)
             self._candidates_px = seen.centroids_px
         self._not_shown = self._shows_no_ring(frame)
-        if lost and len(seen.led_numbers) >= POSE_LEDS:
+        if lost and len(seen.led_numbers) >= self._update.pose_leds:
             self._update.begin_again(seen)
         if len(seen.led_numbers) > 0:
             return self._update.use(seen)

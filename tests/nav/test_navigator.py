@@ -1124,6 +1124,37 @@ def test_while_the_newest_frames_contradict_the_belief_contact_is_not_claimed(nu
     assert step_on_leds(sky, range(8)).contact_usable
 
 
+def test_a_second_frame_of_one_or_two_leds_with_one_stamp_contradicts_nothing():
+    """Until a pose was used again, which two LEDs never are, contact was not claimed."""
+    sky = Sky(None, still)
+    for _ in range(500):
+        step_on_leds(sky, range(8))
+    for _ in range(8):
+        seen = step_on_leds(sky, (0, 3))
+    assert seen.status == "LEDs used" and seen.contact_usable
+    imu = (*sky.imu(), *sky.imu())
+    assert sky.navigator.step(imu, named(sky, (0, 3), imu[-1].time_stamp_s)).status == "LEDs used"
+    again = sky.navigator.step(sky.imu(), named(sky, (0, 3), imu[-1].time_stamp_s))
+    assert again.status == "LEDs refused by the gate" and again.contact_usable
+
+
+@pytest.mark.parametrize(("count", "begins"), [(5, False), (6, True)])
+def test_a_loose_filter_that_is_lost_begins_again_on_what_it_can_use_alone(count, begins):
+    """Begun anew by each frame and corrected by none, it would have started from rest at each."""
+    sky = Sky(None, still)
+    fusion = FusionSettings(coupling="loose")
+    sky.navigator = Navigator(sky.sheets, NavigatorSettings(fusion=fusion))
+    for _ in range(60):
+        step_on_leds(sky, range(8))
+    for _ in range(400):
+        sky.navigator.step(sky.imu(), None)
+    begun = []
+    begin_again = sky.navigator._filter.begin_again
+    sky.navigator._filter.begin_again = lambda *asked: begun.append(begin_again(*asked))
+    status = [step_on_leds(sky, range(count)).status for _ in range(6)][-1]
+    assert (len(begun), status) == ((1, "pose used") if begins else (0, "pose too few LEDs"))
+
+
 @pytest.mark.parametrize("bent_px", [3.0, 3.5, 4.0])
 def test_a_pose_that_is_refused_for_millimetres_says_that_the_belief_is_off_by_no_more(bent_px):
     """By camera one contact in eighty had been made on a solution marked unusable, the belief some millimetres off."""
