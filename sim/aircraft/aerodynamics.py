@@ -1,11 +1,11 @@
 """Receiver's aerodynamic force and moment from the tables of an F-16-class airframe.
 
 With the air-relative velocity (U, V, W) of the centre of gravity and the rates (P, Q, R) beyond those of the air,
-forward-right-down, da = aileron/20 deg, dr = rudder/30 deg, e elevator:
+forward-right-down, aileron a and rudder r in radians, da = a/20 deg, dr = r/30 deg, e elevator:
 
     Va^2 = U^2 + V^2 + W^2,   alpha = atan(W / U),   beta = asin(V / Va),   qbar = rho Va^2 / 2          (1)
     CX = CX(alpha, e)                                          + CXq Q c/2Va                             (2)
-    CY = CYb beta + CYda da + CYdr dr                          + (CYr R + CYp P) b/2Va                   (3)
+    CY = CYb beta + CYail a + CYrud r                          + (CYr R + CYp P) b/2Va                   (3)
     CZ = CZ(alpha) (1 - beta^2) + CZe e                        + CZq Q c/2Va                             (4)
     Cl = Cl(alpha, beta) + Clda(alpha, beta) da + Cldr(alpha, beta) dr + (Clr R + Clp P) b/2Va           (5)
     Cm = Cm(alpha, e) + CZ (x_r - x_cg)                        + Cmq Q c/2Va                             (6)

@@ -8,7 +8,7 @@ angle X from the Sun, s the sine of the elevation.
                 below level, down to the lowest point and up:  80 exp(D/H) - m,   D = r (1 - sqrt(1 - s^2))
     cloud above at (x, y) = height (d_x, d_y)/(s + w), crossed at mu = (s + w)/(1 + w)                             (3)
     surface below, depth h down:  d = -r s - sqrt(q),  q = (r - h)^2 - r^2 (1 - s^2),  mu = sqrt(q)/(r - h)          (4)
-    deck        R min(mu_0 (1 + w n), 1) + (1 - R) (what is below),   R = 1 - T(tau/mu)                           (5)
+    deck        R min(mu_0 (1 + w n), 1) + (1 - R) (what is below),   R = 1 - T(tau (1 + w)/(mu + w))             (5)
     air before  L <- L exp(-b' m) + J' (1 - exp(-b' m)),   b' = aerosol (exp(-z_1/H) - exp(-z_2/H))                (6)
     haze        L <- L exp(-b_h m) + J_h (1 - exp(-b_h m)),   b_h = (3.912/V - 3.912/V_clear) depth, not below 0   (7)
 

@@ -89,6 +89,9 @@ class DrogueParameters:
         if not self.rim_tube_radius_m < self.rim_x_m:
             expected = f"more than drogue.rim_tube_radius_m = {self.rim_tube_radius_m}, or the rim hides the LEDs"
             raise DockairError("drogue.rim_x_m", expected=expected, got=self.rim_x_m)
+        if not self.led_housing_gap_m < self.rim_x_m:
+            expected = f"less than drogue.rim_x_m = {self.rim_x_m}, to which the housing reaches from there"
+            raise DockairError("drogue.led_housing_gap_m", expected=expected, got=self.led_housing_gap_m)
         if not self.rim_x_m < self.throat_x_m:
             expected = f"more than drogue.rim_x_m = {self.rim_x_m}"
             raise DockairError("drogue.throat_x_m", expected=expected, got=self.throat_x_m)

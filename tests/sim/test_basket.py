@@ -33,6 +33,11 @@ def test_tip_anywhere_at_the_bottom_of_the_bore_is_near_enough_to_latch():
     [
         ({"rim_x_m": 0.01}, {}, "drogue.rim_x_m: expected more than drogue.rim_tube_radius_m = 0.02"),
         ({"rim_x_m": 0.02}, {}, "drogue.rim_x_m"),
+        (
+            {"rim_x_m": 0.01, "rim_tube_radius_m": 0.005, "led_housing_gap_m": 0.01},
+            {},
+            "drogue.led_housing_gap_m: expected less than drogue.rim_x_m = 0.01",
+        ),
         ({"rim_x_m": 0.1, "throat_x_m": 0.1}, {}, "drogue.throat_x_m: expected more than drogue.rim_x_m = 0.1"),
         ({"throat_x_m": 0.3}, {}, "parameters.coupling.depth_m: expected more than drogue.throat_x_m = 0.3"),
         ({}, {"depth_m": 0.6}, "parameters.coupling.depth_m: expected less than drogue.hose_joint_x_m = 0.55"),
