@@ -4,7 +4,7 @@ A drogue that is held aside of where it would trail turns on the probe until it 
 where the hose comes from. With a the angles of that axis to the left and up, in axes that do not turn with the
 receiver, and a' their mean over some swings before contact, the tip goes across at
 
-    v = k (a - a'),     each axis within v_max                                                                      (1)
+    v = k (a - a'),     each axis within v_max                                                              (1)
 
 so that the hose is let go from about where it trails, and does not throw the drogue aside as it comes off. Nobody sees
 the hose, and what the receiver drifts by on the probe is not seen either: without Eq. (1) it comes off from farther
