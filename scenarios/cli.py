@@ -5,7 +5,6 @@ has failed; 2 bad input; 3 the machine lacks something; 130 stopped. With `--jso
 else; progress and errors go to stderr. Modules that are slow to import are imported by the command that needs them.
 """
 
-import errno
 import json
 import sys
 from dataclasses import asdict
@@ -23,6 +22,7 @@ from dockair.scenarios.commands.design_ring import design_ring
 from dockair.scenarios.commands.options import Json, ScenarioName, Seed, Settings, overrides, print_json, stdout_kept
 from dockair.scenarios.commands.report import report
 from dockair.scenarios.std_streams import outlive_readers
+from dockair.scenarios.whole_file import NO_ROOM
 
 if TYPE_CHECKING:
     from dockair.scenarios.schema import Scenario
@@ -302,7 +302,7 @@ def main() -> None:
         print(f"dockair: {path}: expected a file that may be used, got {error.strerror}", file=sys.stderr)
         sys.exit(2)
     except OSError as error:
-        if error.errno not in (errno.ENOSPC, errno.EDQUOT):
+        if error.errno not in NO_ROOM:
             raise
         print(f"dockair: {error.filename or 'disk'}: expected room to write, got a full disk", file=sys.stderr)
         sys.exit(3)

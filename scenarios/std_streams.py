@@ -7,6 +7,8 @@ import os
 import sys
 from typing import TYPE_CHECKING, TextIO
 
+from dockair.scenarios.whole_file import NO_ROOM
+
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer
 
@@ -36,7 +38,7 @@ class _Outliving(io.FileIO):
         try:
             return super().write(data)
         except OSError as error:
-            if error.errno not in (errno.EPIPE, errno.ENOSPC, errno.EDQUOT):
+            if error.errno not in (errno.EPIPE, *NO_ROOM):
                 raise
             nowhere = os.open(os.devnull, os.O_WRONLY)
             os.dup2(nowhere, self.fileno())

@@ -53,9 +53,7 @@ def page(title: str, campaigns: Sequence[Campaign]) -> str:
     beside_perfect = [(group, pair) for group in groups if (pair := beside_perfect_navigation(group, groups))]
     text = environment.get_template("page.html.jinja").render(
         title=title,
-        counted=counted,
-        flights=len(rows),
-        planned=sum(_planned(campaign) for campaign in campaigns),
+        flights=_flights_in_words(campaigns),
         crashed=sum(len(group.failed_to_fly) for group in groups),
         limits=LIMITS,
         groups=groups,
@@ -74,10 +72,12 @@ def page(title: str, campaigns: Sequence[Campaign]) -> str:
     return _NO_TEXT.sub("\N{REPLACEMENT CHARACTER}", text)
 
 
-def _planned(campaign: Campaign) -> int:
-    """Return how many flights its plan has, which are more than its rows while it is not over."""
-    planned = campaign.manifest.get("flights")
-    return planned if isinstance(planned, int) and planned > len(campaign.rows) else len(campaign.rows)
+def _flights_in_words(campaigns: Sequence[Campaign]) -> str:
+    """Return how many were flown, and of how many planned while a campaign is not over."""
+    flown = sum(len(campaign.rows) for campaign in campaigns)
+    asked = [(campaign.manifest.get("flights"), len(campaign.rows)) for campaign in campaigns]
+    planned = sum(max(plan, done) if isinstance(plan, int) else done for plan, done in asked)  # any file may be damaged
+    return counted(flown, "flight") if planned == flown else f"{flown} of {counted(planned, 'flight')} planned"
 
 
 def _manifest(campaign: Campaign) -> dict[str, Any]:
