@@ -2,15 +2,15 @@
 
 A hose that is taken up stays taut, and holds the drogue along itself. One that is not is slack within a tenth of a
 second: it sags and lets the drogue's nose down, on the probe, and turns it with every wave that the blow of contact
-sends up and down it, long before they tear it off. With the drogue's axis a, forward, in axes that do not turn with the
-receiver, and its mean a' before contact,
+sends up and down it, long before they tear it off. With the mean a' of the drogue's axis before contact, forward, in
+axes that do not turn with the receiver, and its mean a'' from when the blow of contact is over, for that turns the
+drogue on a taut hose, too,
 
-    drop = median of (elevation of a' - elevation of a),     tilt = median angle between a and a'          (1)
+    drop = elevation of a' - elevation of a'',     tilt = angle between a' and a''                          (1)
 
-since the blow of contact, which turns the drogue on a taut hose, too, is over. Gusts turn it there as well, up more
-than down: so a nose that is up has to be so by more. It is asked for some time, for a slack hose may lie straight for a
-moment between two waves. The hose is told only while the drogue is still turned by half of that angle: where the
-medians are a blow's that has lasted, it has come back meanwhile.
+The hose is told to be slack as soon as one of them is too large. Both are of a mean, for the waves turn the drogue to
+and fro, and what is left of that is the sag. Gusts turn it on a taut hose, too; a nose that is down has to be so by
+less than one that is up or aside, where no sag takes it.
 
 Nothing is said where the drogue has not been seen on the probe for half of that time.
 
@@ -43,7 +43,7 @@ class SlackHose:
         self._before: deque[Array] = deque(maxlen=round(limits.slack_before_s / step_s))
         self._rest: Array | None = None  # their sum, made once they are all there
         self._contact_s = -np.inf  # since contact; -inf before it
-        self._turns_rad: list[tuple[float, float]] = []  # since the blow was over, where it was seen on the probe
+        self._since, self._seen = np.zeros(3), 0  # sum since the blow was over, of so many that were seen on the probe
         self._far_s = 0.0  # for which the drogue has been turned far, later
         self.is_slack = False  #: nothing takes up the hose
 
@@ -59,7 +59,7 @@ class SlackHose:
         self._contact_s += self._step_s
         if phase in BEFORE_CONTACT:
             self._contact_s, self._far_s, self.is_slack = -np.inf, 0.0, False
-            self._turns_rad.clear()
+            self._since, self._seen = np.zeros(3), 0
             if seen:
                 self._before.append(along)
                 self._rest = None
@@ -71,33 +71,33 @@ class SlackHose:
         if self.is_slack or self._contact_s < limits.slack_from_s or (late and phase not in ON_THE_PROBE):
             return
         if self._rest is None:
-            self._rest = np.sum(self._before, axis=0) if self._before else None
+            if not self._before:
+                return
+            self._rest = np.sum(self._before, axis=0)
         on_the_probe = seen and not is_off_the_probe(limits, ahead_m, beside_m)
-        turn = turn_rad(along, self._rest) if on_the_probe and self._rest is not None else None
         if not late:
-            self._look(turn)
-        elif turn is not None:
-            self._far_s = self._far_s + self._step_s if turn[1] > limits.slack_far_rad else 0.0
-            self.is_slack = self._far_s >= limits.slack_over_s
+            self._look(along if on_the_probe else None, self._rest)
+        elif on_the_probe:
+            _, turned_rad = turn_rad(along, self._rest)
+            self._far_s = self._far_s + self._step_s if turned_rad > limits.slack_far_rad else 0.0
+            self.is_slack = self._far_s >= limits.slack_far_s
 
-    def _look(self, turn: tuple[float, float] | None) -> None:
+    def _look(self, along: Array | None, rest: Array) -> None:
         """Eq. (1), and whether it says that the hose is slack."""
         limits = self._limits
-        if turn is not None:
-            self._turns_rad.append(turn)
+        if along is not None:
+            self._since, self._seen = self._since + along, self._seen + 1
         looked = round((self._contact_s - limits.slack_from_s) / self._step_s) + 1
-        if looked >= round(limits.slack_over_s / self._step_s) and len(self._turns_rad) >= 0.5 * looked:
-            drop_rad, tilt_rad = np.median(self._turns_rad, axis=0)
-            limit_rad = limits.slack_tilt_rad if drop_rad > 0.0 else limits.slack_tilt_up_rad
-            still_rad = self._turns_rad[-1][1]
-            self.is_slack = bool(tilt_rad > limit_rad and still_rad > limits.slack_still * limit_rad)
+        if looked >= round(limits.slack_over_s / self._step_s) and self._seen >= 0.5 * looked:
+            drop_rad, tilt_rad = turn_rad(self._since, rest)
+            self.is_slack = drop_rad > limits.slack_drop_rad or tilt_rad > limits.slack_tilt_rad
 
 
 def turn_rad(along: Array, before: Array) -> tuple[float, float]:
-    """How far the axis has dropped and by what angle it has turned [rad], Eq. (1) but for the medians.
+    """How far the axis has dropped and by what angle it has turned [rad], Eq. (1).
 
     Args:
-        along: (3,) the axis, forward, of any length; z up.
+        along: (3,) the axis, or its mean, forward, of any length; z up.
         before: (3,) the same before contact.
     """
     across = cross(along, before)

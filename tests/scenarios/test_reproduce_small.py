@@ -195,10 +195,10 @@ def test_the_drogue_turns_its_nose_down_on_a_slack_hose_and_hardly_on_a_taut_one
     less(guidance_slack_hose, FLOWN={"dead_reel_unnoticed": 1, "default": 1})
     rows = made("guidance/slack-hose", tmp_path)
     slack, taut = (rows[name]["ours"] for name in ("dead_reel_unnoticed", "default"))
-    limit_deg = np.degrees(PhaseLimits().slack_tilt_rad)
+    limit_deg = np.degrees(PhaseLimits().slack_drop_rad)
     assert slack["contacts"] == slack["told_slack"] == taut["contacts"] == 1 and taut["told_slack"] == 0
-    assert taut["most_tilt_deg"] < 0.5 * limit_deg and slack["least_tilt_deg"] > 1.1 * limit_deg
-    assert slack["least_drop_deg"] > 0.0
+    assert taut["most_drop_deg"] < 0.5 * limit_deg and slack["least_drop_deg"] > 1.1 * limit_deg
+    assert taut["most_tilt_deg"] < 0.5 * np.degrees(PhaseLimits().slack_tilt_rad)
 
 
 def test_a_drogue_that_is_brought_back_to_where_it_trails_is_let_go_without_the_tip_leaving_over_the_rim(

@@ -27,7 +27,7 @@ FLOWN: Mapping[str, int] = {"dead_reel_unnoticed": 8, "default": 4, "moderate_gu
 _FIRST_SEED = 25867
 _OVERRIDES = {"camera.sensing": "measurements"}
 _AFTER_S, _LONGEST_S = 0.6, 90.0
-_SIZE_IN, _DPI = (9.0, 4.2), 110
+_SIZE_IN, _DPI = (11.0, 4.0), 100
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -42,15 +42,14 @@ class Contact:
 
 def reproduce(out: Path | None) -> dict[str, Any]:
     """Fly; the angles over time in `out`."""
-    turned: dict[str, list[Array]] = {}
+    contacts: dict[str, list[Contact]] = {}
     rows = []
     for name, seeds in FLOWN.items():
         flown = [contact(name, seed) for seed in range(_FIRST_SEED, _FIRST_SEED + seeds)]
-        contacts = [found for found in flown if found is not None]
-        turned[name] = [turn_deg(found) for found in contacts]
-        rows.append({"case": name, "ours": _figures(contacts), "reference": {}})
+        contacts[name] = [found for found in flown if found is not None]
+        rows.append({"case": name, "ours": _figures(contacts[name]), "reference": {}})
     if out is not None:
-        _draw(turned, out / picture_name(ID))
+        _draw(contacts, out / picture_name(ID))
     return {"id": ID, "source": _SOURCE, "rows": rows}
 
 
@@ -84,19 +83,19 @@ def turn_deg(found: Contact) -> Array:
     return np.column_stack([found.step_s * np.arange(len(turned)), turned])
 
 
-def medians_deg(found: Contact) -> Array:
-    """(2,) drop and tilt of Eq. (1) of `nav.guidance.slack_hose`, the greatest."""
-    limits, turned = PhaseLimits(), turn_deg(found)
-    looked_at = turned[(turned[:, 0] >= limits.slack_from_s) & (turned[:, 0] <= limits.slack_to_s), 1:]
-    least = round(limits.slack_over_s / found.step_s)
-    greatest: Array = np.max([np.median(looked_at[:n], axis=0) for n in range(least, len(looked_at) + 1)], axis=0)
-    return greatest
+def mean_turn_deg(found: Contact) -> Array:
+    """(k, 3) time since contact [s], drop and tilt of Eq. (1) of `nav.guidance.slack_hose` [deg], at each look."""
+    limits, rest = PhaseLimits(), found.before.mean(axis=0)
+    first, last = (round(t / found.step_s) for t in (limits.slack_from_s, limits.slack_to_s))
+    sums = np.cumsum(found.after[first : last + 1], axis=0)[round(limits.slack_over_s / found.step_s) - 1 :]
+    times_s = limits.slack_to_s - found.step_s * np.arange(len(sums))[::-1]
+    return np.column_stack([times_s, np.degrees([turn_rad(axis, rest) for axis in sums])])
 
 
 def _figures(contacts: list[Contact]) -> dict[str, float]:
     if not contacts:
         return {"contacts": 0}
-    drop, tilt = np.transpose([medians_deg(found) for found in contacts])
+    drop, tilt = np.transpose([mean_turn_deg(found)[:, 1:].max(axis=0) for found in contacts])
     return {
         "contacts": len(contacts),
         "least_drop_deg": drop.min(),
@@ -107,22 +106,25 @@ def _figures(contacts: list[Contact]) -> dict[str, float]:
     }
 
 
-def _draw(turned: Mapping[str, list[Array]], path: Path) -> None:
+def _draw(contacts: Mapping[str, list[Contact]], path: Path) -> None:
     from matplotlib.figure import Figure
 
     limits = PhaseLimits()
     figure = Figure(figsize=_SIZE_IN, dpi=_DPI, layout="constrained")
-    panels = figure.subplots(1, 2)
-    panels[0].axhline(0.0, color="black", lw=0.6)
-    for limit_rad, style, nose in ((limits.slack_tilt_rad, "--", "down"), (limits.slack_tilt_up_rad, ":", "up")):
-        told = f"told slack, nose {nose}: median above"
-        panels[1].axhline(np.degrees(limit_rad), color="black", ls=style, lw=1.0, label=told)
-    for column, (panel, label) in enumerate(zip(panels, ("nose dropped", "turned"), strict=True), start=1):
+    panels = figure.subplots(1, 3)
+    for panel in panels[:2]:
+        panel.axhline(0.0, color="black", lw=0.6)
         panel.axvspan(limits.slack_from_s, limits.slack_to_s, color="0.92", label="looked at")
-        for k, (name, flights) in enumerate(turned.items()):
-            for number, flown in enumerate(flights):
-                colour, first = f"C{(3, 0, 1, 2, 4)[k % 5]}", name if number == 0 else None
-                panel.plot(flown[:, 0], flown[:, column], color=colour, lw=0.9, label=first)
+    for panel, limit_rad in ((panels[1], limits.slack_drop_rad), (panels[2], limits.slack_tilt_rad)):
+        panel.axhline(np.degrees(limit_rad), color="black", ls="--", lw=1.0, label="told slack above")
+    for k, (name, flights) in enumerate(contacts.items()):
+        for number, flown in enumerate(flights):
+            style = {"color": f"C{(3, 0, 1, 2, 4)[k % 5]}", "lw": 0.9, "label": name if number == 0 else None}
+            means = mean_turn_deg(flown)
+            panels[0].plot(*turn_deg(flown)[:, :2].T, **style)
+            panels[1].plot(means[:, 0], means[:, 1], **style)
+            panels[2].plot(means[:, 0], means[:, 2], **style)
+    for panel, label in zip(panels, ("nose dropped", "its mean dropped", "its mean turned"), strict=True):
         panel.set(xlabel="since contact [s]", ylabel=f"{label} on the probe [deg]")
     handles, labels = panels[1].get_legend_handles_labels()
     figure.legend(handles, labels, frameon=False, fontsize=8, loc="outside upper center", ncols=4)
