@@ -15,10 +15,26 @@ import mujoco
 import numpy as np
 
 from dockair.messages import CameraFrame, LedObservation, Window
-from dockair.scenarios.measured_leds import Senses
 
 Frame = CameraFrame | LedObservation
 _F = TypeVar("_F")
+
+
+class Senses(Protocol):
+    """What a flight has in the camera's place: the camera, or a model of what is made of its frames."""
+
+    def expose(
+        self,
+        data: mujoco.MjData,
+        time_s: float,
+        frame_number: int,
+        window: Window | None,
+        exposure_s: float = np.nan,
+    ) -> Any:
+        """Return a message with a time stamp; None when there is none."""
+
+    def latency_s(self, frame: Any) -> float:
+        """Draw the time [s] from the message's stamp until it has arrived."""
 
 
 class Exposures(Protocol):

@@ -30,7 +30,7 @@ Source: fitted to the camera and the image stages by the reproduction measuremen
 """
 
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -104,23 +104,6 @@ class View:
     depth_m: Array  #: (n,)
     electrons: Array  #: (n,) of each whole spot
     clear: NDArray[np.bool_]  #: (n,) on the sensor and hidden by nothing
-
-
-class Senses(Protocol):
-    """What a flight has in the camera's place: the camera, or a model of what is made of its frames."""
-
-    def expose(
-        self,
-        data: mujoco.MjData,
-        time_s: float,
-        frame_number: int,
-        window: Window | None,
-        exposure_s: float = np.nan,
-    ) -> Any:
-        """Return a message with a time stamp; None when there is none."""
-
-    def latency_s(self, frame: Any) -> float:
-        """Draw the time [s] from the message's stamp until it has arrived."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
