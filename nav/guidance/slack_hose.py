@@ -12,7 +12,8 @@ The hose is told to be slack as soon as one of them is too large. Both are of a 
 and fro, and what is left of that is the sag. Gusts turn it on a taut hose, too; a nose that is down has to be so by
 less than one that is up or aside, where no sag takes it.
 
-Nothing is said where the drogue has not been seen on the probe for half of that time.
+Contact is when the tip has come to the coupling: one that is still on its way there along the funnel turns the drogue
+by itself. Nothing is said where the drogue has not been seen on the probe for half of that time.
 
 Some slack hoses lie straight for all of it. Later, as long as the drogue is pushed in or held, it is told by a drogue
 that stays turned by more than any taut hose turns it once the receiver goes back to where it trails
@@ -65,7 +66,8 @@ class SlackHose:
                 self._rest = None
             return
         limits, ahead_m, beside_m = self._limits, float(coupling[0]), float(np.hypot(coupling[1], coupling[2]))
-        if self._contact_s == -np.inf and (phase is Phase.CONTACT or is_reached(limits, ahead_m, beside_m)):
+        at_the_coupling = is_reached(limits, ahead_m, beside_m) and beside_m <= limits.coupling_reached_m
+        if self._contact_s == -np.inf and at_the_coupling:
             self._contact_s = 0.0
         late = self._contact_s > limits.slack_to_s
         if self.is_slack or self._contact_s < limits.slack_from_s or (late and phase not in ON_THE_PROBE):

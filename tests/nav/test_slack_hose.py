@@ -170,6 +170,18 @@ def test_a_receiver_that_was_called_back_is_in_contact_from_when_it_comes_to_the
     assert first_s == pytest.approx(TOLD_S - LIMITS.coupling_reached_m, abs=2 * STEP_S)
 
 
+@pytest.mark.parametrize(("funnel_s", "expected"), [(0.0, True), (0.12, False)])
+def test_while_the_tip_is_on_its_way_along_the_funnel_the_blow_is_not_over(funnel_s, expected):
+    """As 29312 of moderate_gusts by camera: 0.12 m off the coupling's line when it is 0.05 m ahead, taut."""
+    hose = SlackHose(LIMITS, STEP_S)
+    for _ in range(200):
+        hose.step(Phase.APPROACH, np.array([0.5, 0.0, 0.0]), REST, seen=True)
+    for t in np.arange(0.0, 0.7, STEP_S):
+        coupling = np.array([0.0, 0.0, 0.12 if t < funnel_s else 0.0])
+        hose.step(Phase.CONTACT, coupling, turned(8.0 if t < 0.3 else 0.0), seen=True)
+    assert hose.is_slack is expected
+
+
 def test_a_drogue_beside_the_probe_is_not_in_contact():
     hose = SlackHose(LIMITS, STEP_S)
     for phase, degrees in ((Phase.APPROACH, 0.0), (Phase.BACK_OFF, 10.0)):
