@@ -2,7 +2,8 @@
 
 Each flight is flown on measured LEDs until little more than half a second after contact, and the navigation's own
 belief of the drogue's axis is held against its mean of the second before, as `nav.guidance.slack_hose` does; the
-receiver's attitude, by which the axis is told in axes that do not turn, is the true one here.
+receiver's attitude, by which the axis is told in axes that do not turn, is the true one here, and contact is the
+phase's.
 """
 
 from collections.abc import Mapping
