@@ -47,7 +47,7 @@ def test_a_drogue_that_turns_on_the_probe_is_on_a_slack_hose_whatever_phase_foll
 @pytest.mark.parametrize(
     ("to", "limit_deg"), [(DOWN, LIMIT_DEG), (UP, SIDE_LIMIT_DEG), (LEFT, SIDE_LIMIT_DEG), (UP + 60.0, SIDE_LIMIT_DEG)]
 )
-def test_a_drogue_that_a_gust_turns_up_or_aside_is_on_a_taut_hose_unless_it_turns_by_much(to, limit_deg):
+def test_a_drogue_that_a_gust_turns_is_on_a_taut_hose_unless_by_much_and_by_more_up_or_aside(to, limit_deg):
     """As 26312, 26356, 26406 and 26419 of moderate_gusts on perfect navigation: taut, up by 3 to 6 degrees."""
     assert not told(lambda t: limit_deg - 0.5, to=to).any()
     assert told(lambda t: limit_deg + 0.5, to=to).any()
@@ -101,7 +101,7 @@ FAR_DEG = np.degrees(LIMITS.slack_far_rad)
 @pytest.mark.parametrize("phase", [Phase.CONTACT, Phase.HOLD])
 @pytest.mark.parametrize("to", [DOWN, UP, LEFT])
 def test_a_hose_that_lay_straight_at_first_is_told_later_by_a_drogue_that_stays_turned_far(phase, to):
-    """As 27935 of dead_reel_drawn_hoses, turned by 19 degrees from 0.8 s on."""
+    """As 27935, a dead reel on a drawn hose, turned by 19 degrees from 0.8 s on."""
     assert late(lambda t: FAR_DEG + 1.0 if t > 0.8 else 0.0, phase=phase, to=to) == pytest.approx(
         0.8 + LIMITS.slack_far_s, abs=2 * STEP_S
     )

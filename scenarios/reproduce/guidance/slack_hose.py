@@ -77,11 +77,11 @@ def contact(scenario: str, seed: int) -> Contact | None:
     return Contact(before=np.array(axes[first:start]), after=np.array(axes[start:]), step_s=step_s, told_slack=told)
 
 
-def turn_deg(found: Contact) -> Array:
-    """(m, 3) time since contact [s], drop and angle from the mean axis before it [deg]."""
+def drop_deg(found: Contact) -> Array:
+    """(m, 2) time since contact [s], and how far the nose has dropped from the mean axis before it [deg]."""
     rest = found.before.mean(axis=0)
-    turned = np.degrees([turn_rad(axis, rest) for axis in found.after])
-    return np.column_stack([found.step_s * np.arange(len(turned)), turned])
+    dropped = np.degrees([turn_rad(axis, rest)[0] for axis in found.after])
+    return np.column_stack([found.step_s * np.arange(len(dropped)), dropped])
 
 
 def mean_turn_deg(found: Contact) -> Array:
@@ -122,7 +122,7 @@ def _draw(contacts: Mapping[str, list[Contact]], path: Path) -> None:
         for number, flown in enumerate(flights):
             style = {"color": f"C{(3, 0, 1, 2, 4)[k % 5]}", "lw": 0.9, "label": name if number == 0 else None}
             means = mean_turn_deg(flown)
-            panels[0].plot(*turn_deg(flown)[:, :2].T, **style)
+            panels[0].plot(*drop_deg(flown).T, **style)
             panels[1].plot(means[:, 0], means[:, 1], **style)
             panels[2].plot(means[:, 0], means[:, 2], **style)
     for panel, label in zip(panels, ("nose dropped", "its mean dropped", "its mean turned"), strict=True):
