@@ -36,6 +36,7 @@ class PredictiveSettings:
     #: T_L, in which a drift is learnt: the filter knows 0.8 of one 4 s after it shows, and what is felt as the
     #: receiver's velocity comes to its bias is taken for straying at first, and forgotten as slowly.
     learnt_s: float = 4.0
+    least_learnt: float = 0.1  # share of it that is made up for, after 2.6 s; less is noise of the first moments
     unseen_s: float = 0.5  # after which the swing is begun anew: what has come of it would be taken for drift
     #: T_e of `own_path`: in moderate gusts the tip, astern, went on by 0.41, 0.36, 0.30 m in half a second for each m/s
     #: that it strayed at.

@@ -54,6 +54,17 @@ def test_a_bias_that_shows_a_second_late_is_held_though_it_is_still_being_learnt
     np.testing.assert_allclose(controller.steady_drift_m_s, drift, rtol=0.2)
 
 
+@pytest.mark.parametrize("seconds", [0.05, 0.1, 0.3, 0.6, 1.0])
+@pytest.mark.parametrize("seed", range(5))
+def test_from_a_glimpse_of_a_drogue_at_rest_no_drift_is_made_up_of_its_noise(seconds, seed):
+    """Places to 1 mm, rates to 0.1 m/s: what is not learnt yet is made up for, but not what nothing is known of."""
+    rng = np.random.default_rng(seed)
+    controller = shown(
+        lambda _: np.array([4.0, 0.0, 0.0]) + rng.normal(0.0, 0.001, 3), lambda _: rng.normal(0.0, 0.1, 3), seconds
+    )
+    assert np.abs(controller.steady_drift_m_s).max() < 0.3
+
+
 def test_the_middle_of_the_swing_is_seen_from_the_tip():
     """A drogue 4 m ahead and 1 m left swings by 0.3 m: out of view it is sought in the middle."""
     omega = 2.0 * np.pi * np.array(SETTINGS.predictive.swing.modes[0].frequency_hz[1])
