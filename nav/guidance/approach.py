@@ -273,7 +273,8 @@ class Guidance:
 
     def _follows(self, state: RelativeState, ring: Array) -> bool:
         """Whether the drogue is followed; not while it is on the probe or about it, or out of view."""
-        on_its_way = self._is_recalled and self._u[0] > 0.0  # may still come to the ring: then inside the rim
+        closes = self._u[0] > self._controller.steady_drift_m_s[0]
+        on_its_way = self._is_recalled and closes  # may still come to the ring: then inside the rim
         clear_m = 0.0 if on_its_way else self._settings.limits.off_axis_range_m
         clear = self.phase in (Phase.BACK_OFF, Phase.BREAKAWAY) and ring[0] > clear_m
         past = self.phase is Phase.APPROACH and self._clocks.inside_s > self._settings.funnel_s

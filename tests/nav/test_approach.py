@@ -852,15 +852,20 @@ def test_a_belief_that_a_blow_unsettles_does_not_end_an_entry_inside_the_rim():
     assert guidance.phase is Phase.HOLD and Phase.BREAKAWAY not in phases
 
 
-def test_who_is_called_back_by_a_red_light_follows_the_drogue_until_it_stands():
-    """Committed, 1.2 m before the ring, at 1.2 m/s: it still comes to the ring, which has gone 0.3 m aside by then."""
+@pytest.mark.parametrize("bias_m_s", [-0.57, 0.0, 0.57])
+def test_who_is_called_back_by_a_red_light_follows_the_drogue_until_it_stands(bias_m_s):
+    """Committed, 1.2 m before the ring, at 1.2 m/s: it still comes to the ring, which has gone 0.3 m aside by then.
+
+    To stand is to keep company with the drogue, whatever the receiver's own velocity is said to be.
+    """
     red_s = np.inf
 
     def aside(t):
         share = 0.5 - 0.5 * np.cos(np.pi * np.clip((t - red_s) / 1.5, 0.0, 1.0)) if t > red_s else 0.0
         return np.array([0.0, 0.3 * share, 0.0])
 
-    plant, guidance = Plant(drogue=aside, holds=False), Guidance(SETTINGS, RATE_HZ)
+    plant = Plant(drogue=aside, holds=False, bias=(bias_m_s, 0.0, 0.0))
+    guidance = Guidance(SETTINGS, RATE_HZ)
     now = plant.step(ReceiverCommand())
     while not (guidance._closure.committed and now.p_PD_B[0] < 1.2):
         now = plant.step(guidance.step(now))
@@ -873,7 +878,7 @@ def test_who_is_called_back_by_a_red_light_follows_the_drogue_until_it_stands():
         ahead.append(float(now.p_PD_B[0]))
     assert guidance.phase in (Phase.BACK_OFF, Phase.PRE_CONTACT) and guidance.phase_reason
     assert -DEPTH_M < min(ahead) < 0.2
-    assert offsets[int(np.argmin(ahead))] < 0.12
+    assert offsets[int(np.argmin(ahead))] < 0.06
 
 
 @pytest.mark.parametrize("red", [False, True])
