@@ -25,6 +25,8 @@ from dockair.scenarios.plug_in import announce_to, signal_to, step_navigator
 from dockair.scenarios.recorder import Recorder
 from dockair.scenarios.schema import Scenario
 from dockair.scenarios.truth_navigation import TruthNavigator
+from dockair.sim.basket import throat_radius_m
+from dockair.sim.parts import WorldParameters
 from dockair.sim.truth import Truth
 from dockair.sim.world import DivergedError
 from dockair.streams import LARGEST_SEED
@@ -62,7 +64,7 @@ class Flight:
         self.world, self.camera, self.imu, self.navigator = parts.world, parts.camera, parts.imu, parts.navigator
         self.as_built, self._faults, self._announcer = parts.as_built, parts.faults, parts.announcer
         self._pod_light = parts.pod_light
-        self.referee = Referee(RefereeLimits(rim_radius_m=0.5 * parts.sheets.ring.diameter_m))
+        self.referee = Referee(_limits(parts.world.parameters, parts.sheets.ring.diameter_m))
         self._full_frames = full_frames
         self._periods = parts.periods
         self._command = self._next_command = ReceiverCommand()
@@ -165,6 +167,16 @@ class Flight:
         window = None if self._full_frames else self._window
         self._exposures.begin(self.world.data, time_s, self._frame_number, window, self._exposure_s)
         self._frame_number += 1
+
+
+def _limits(world: WorldParameters, ring_diameter_m: float) -> RefereeLimits:
+    """What is unsafe with this drogue's basket."""
+    return RefereeLimits(
+        rim_radius_m=0.5 * ring_diameter_m,
+        rim_x_m=world.drogue.rim_x_m,
+        throat_x_m=world.drogue.throat_x_m,
+        throat_radius_m=throat_radius_m(world.drogue, world.coupling),
+    )
 
 
 def fly(

@@ -36,6 +36,11 @@ def require_fit(drogue: DrogueParameters, coupling: CouplingParameters) -> None:
         raise DockairError(where, expected=f"less than {end} by more than {gap}", got=coupling.depth_m)
 
 
+def throat_radius_m(drogue: DrogueParameters, coupling: CouplingParameters) -> float:
+    """Of the circle on which the middles of the ribs end, around the coupling's bore."""
+    return coupling.socket_radius_m + drogue.rib_radius_m
+
+
 def grey(reflectance: float) -> list[float]:
     """RGBA of a reflectance."""
     return [reflectance, reflectance, reflectance, 1.0]
@@ -117,7 +122,7 @@ def _circle(count: int, radius: float) -> Array:
 def _add_basket(body: Any, drogue: DrogueParameters, coupling: CouplingParameters, solid: dict[str, Any]) -> None:
     """Rim of capsules; ribs from the rim to the coupling's mouth, too close together for a probe's tip."""
     rim = _circle(drogue.ribs, 0.5 * drogue.ring_diameter_m)
-    throat = _circle(drogue.ribs, coupling.socket_radius_m + drogue.rib_radius_m)
+    throat = _circle(drogue.ribs, throat_radius_m(drogue, coupling))
     for k in range(drogue.ribs):
         here, there = rim[k], rim[(k + 1) % drogue.ribs]
         for name, to, radius in (

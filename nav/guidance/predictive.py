@@ -151,8 +151,8 @@ class Predictive:
     def steady_drift_m_s(self) -> Array:
         """(3,) its mean over the last seconds: what lasts is the bias of the receiver's inertial velocity.
 
-        Of the mean of a drift that is being learnt, 1 - exp(-t/T_L) of it after t, so much is made up for; where that is
-        less than a least share, no more than that, and a glimpse says next to nothing.
+        Of the mean of a drift that is being learnt, 1 - exp(-t/T_L) of it after t, so much is made up for, or a
+        least share where that is less: a glimpse says next to nothing.
         """
         return np.asarray(self._drift / max(self._drift_seen, self._settings.least_learnt))
 

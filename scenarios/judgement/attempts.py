@@ -46,9 +46,19 @@ class RefereeLimits:
     radial_offset_m: float = 0.15  # whatever the drogue; one of 0.5 m leads a tip within it to the coupling at 2.4 m/s
     angle_deg: float = 10.0  # of the coupling
     closure_speed_m_s: float = 2.6  # 5 kt, service limit; above it a touch is unsafe
-    rim_radius_m: float = 0.25  # half the ring's diameter: what is touched from farther out is the basket's outside
+    rim_radius_m: float = 0.25  # half the ring's diameter
+    #: The basket narrows from its rim, so far ahead of the ring's centre, to its throat, and goes on as wide as that:
+    #: what is touched from farther out than the middle of its ribs is its outside.
+    rim_x_m: float = 0.03
+    throat_x_m: float = 0.25
+    throat_radius_m: float = 0.058
     #: As of breakaway practice: who crosses the plane farther off, and is in no approach, tries nothing.
     aside_m: float = 1.0
+
+    def basket_radius_m(self, x_m: float) -> float:
+        """Of the basket so far ahead of the ring's centre along the drogue's axis; aft of it, of its rim."""
+        ends = (self.rim_x_m, self.throat_x_m), (self.rim_radius_m, self.throat_radius_m)
+        return float(np.interp(x_m, *ends))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

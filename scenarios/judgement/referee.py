@@ -10,9 +10,10 @@ clear, when the receiver collides, when time is over.
 Radial offset and closure speed are taken where the tip crosses the ring's plane from behind (the last crossing before
 the coupling holds); the angle between probe and drogue axis when it holds.
 
-Unsafe is a touch at more than 2.6 m/s along the drogue's axis, one with the tip outside the rim (also by a drogue that
-the coupling has let go), a contact while the navigation itself marked its solution unusable (as the tip entered the
-basket or as it was held), any collision, and a receiver that departs from controlled flight (`departure`).
+Unsafe is a touch at more than 2.6 m/s along the drogue's axis, held or not, one with the tip outside the rim or, ahead
+of it, outside the basket (also by a drogue that the coupling has let go), a contact while the navigation itself marked
+its solution unusable (as the tip entered the basket or as it was held), any collision, and a receiver that departs from
+controlled flight (`departure`).
 """
 
 import math
@@ -144,7 +145,7 @@ class Referee:
         if self._fastest_m_s > self.limits.closure_speed_m_s:
             unsafe.append(f"touch at {self._fastest_m_s:.2f} m/s")
         if self._outside_m > 0.0:
-            unsafe.append(f"touch outside the rim, {self._outside_m:.2f} m off the axis")
+            unsafe.append(f"touch outside the basket, {self._outside_m:.2f} m off the axis")
         if departed_s is not None:
             unsafe.append(f"departed from controlled flight at {departed_s:.1f} s")
         return tuple(unsafe)
@@ -183,12 +184,13 @@ class Referee:
         attempt, now = self._attempt(truth), passing(truth)
         attempt.touched = attempt.touched or attempt.latched is None  # one that was held is no rim strike afterwards
         self._fastest_m_s = max(self._fastest_m_s, now.closure_speed_m_s)
-        if now.radial_offset_m > self.limits.rim_radius_m:
+        if now.radial_offset_m > self.limits.basket_radius_m(float(now.p_DP[0])):
             self._outside_m = max(self._outside_m, now.radial_offset_m)
 
     def _latch(self, truth: Truth) -> None:
         attempt, held = self._attempt(truth), passing(truth)
         attempt.latch(held)
+        self._fastest_m_s = max(self._fastest_m_s, held.closure_speed_m_s)
         if not (self._usable and self._entered_usable):
             self._unsafe.append("contact on a solution marked unusable")
         if self.contact is None:

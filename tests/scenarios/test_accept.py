@@ -119,7 +119,7 @@ def test_a_flight_that_crashed_falls_short_of_any_figure_that_every_flight_must_
 
 
 def test_one_unsafe_flight_is_too_many_unless_the_scenario_grants_it_whatever_else_is_asked_for():
-    flights = rows(99, 1, {"unsafe": "touch outside the rim, 0.27 m off the axis"})
+    flights = rows(99, 1, {"unsafe": "touch outside the basket, 0.27 m off the axis"})
     assert Accept().judge(flights) == ["unsafe in 1 of 100 flights, wanted at most 0: seeds 99"]
     assert Accept(unsafe_max=1).judge(flights) == []
 

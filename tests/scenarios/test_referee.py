@@ -27,7 +27,9 @@ def truth_at(time_s, tip_D, v_tip=(1.2, 0.0, 0.0), *, latched=False, touches=Fal
 def through(referee, lateral, *, latch=False, touches=False, speed=1.2):
     for k, x in enumerate(np.arange(-0.5, 1.2, 0.01)):
         held = latch and x > 0.3
-        truth = truth_at(k * 0.01 / speed, (x, lateral, 0.0), (speed, 0, 0), latched=held, touches=touches and x > 0)
+        truth = truth_at(
+            k * 0.01 / speed, (x, lateral, 0.0), (speed, 0, 0), latched=held, touches=touches and 0 < x < 0.04
+        )
         referee.watch(truth)
         if held:
             return truth
@@ -155,7 +157,7 @@ def unsafe_of(referee, lateral, *, speed=1.2, latch=False, touches=True, usable=
     judge(truth_at(0.0, (-0.6, lateral, 0.0)), usable=usable[0])
     for k, x in enumerate(np.arange(-0.5, 0.4, 0.01)):
         held = latch and x > 0.3
-        tick = truth_at(0.01 * k, (x, lateral, 0.0), (speed, 0, 0), latched=held, touches=touches and x > 0.02)
+        tick = truth_at(0.01 * k, (x, lateral, 0.0), (speed, 0, 0), latched=held, touches=touches and 0.02 < x < 0.04)
         referee.watch(tick)
         judge(tick, usable=usable[int(x > 0.1)])
     return referee.unsafe
@@ -173,7 +175,7 @@ def test_a_touch_at_more_than_five_knots_is_unsafe_whether_it_is_held_or_not(spe
 
 def test_a_touch_with_the_tip_beyond_the_rim_is_unsafe_and_told_once_with_the_farthest_place():
     assert unsafe_of(Referee(), 0.24) == ()
-    assert unsafe_of(Referee(), 0.26) == ("touch outside the rim, 0.26 m off the axis",)
+    assert unsafe_of(Referee(), 0.26) == ("touch outside the basket, 0.26 m off the axis",)
     assert unsafe_of(Referee(RefereeLimits(rim_radius_m=0.305)), 0.26) == ()
     assert unsafe_of(Referee(), 0.40, touches=False) == ()  # a miss is none
 
@@ -181,9 +183,9 @@ def test_a_touch_with_the_tip_beyond_the_rim_is_unsafe_and_told_once_with_the_fa
 @pytest.mark.parametrize(
     ("tip", "speed", "expected"),
     [
-        ((0.4, 0.3, 0.0), 0.5, ("touch outside the rim, 0.30 m off the axis",)),
-        ((0.3, 0.1, 0.0), 2.7, ("touch at 2.70 m/s",)),
-        ((0.3, 0.1, 0.0), -5.0, ()),
+        ((0.4, 0.3, 0.0), 0.5, ("touch outside the basket, 0.30 m off the axis",)),
+        ((0.3, 0.05, 0.0), 2.7, ("touch at 2.70 m/s",)),
+        ((0.3, 0.05, 0.0), -5.0, ()),
     ],
 )
 def test_a_drogue_that_the_coupling_has_let_go_may_still_strike(tip, speed, expected):
@@ -193,6 +195,34 @@ def test_a_drogue_that_the_coupling_has_let_go_may_still_strike(tip, speed, expe
     referee.watch(truth_at(3.0, tip, (speed, 0.0, 0.0), touches=True))
     assert referee.unsafe == expected
     assert judged(referee, truth_at(9.0, (-3.0, 0.0, 0.0)), "clear") is Outcome.CONTACT
+
+
+@pytest.mark.parametrize(
+    ("tip", "outside"),
+    [
+        ((0.02, 0.24, 0.0), False),
+        ((0.12, 0.16, 0.0), False),  # in the funnel, whose ribs are 0.171 m off the axis there
+        ((0.12, 0.0, -0.18), True),
+        ((0.24, 0.07, 0.0), True),
+        ((0.30, 0.04, 0.0), False),  # in the bore
+        ((0.40, 0.104, 0.0), True),  # beside the coupling
+    ],
+)
+def test_what_is_touched_from_beside_the_basket_is_its_outside_however_near_the_axis(tip, outside):
+    """The tip passes the ring's plane beyond the rim, touches nothing, and comes in toward the axis from the side."""
+    referee = Referee()
+    referee.watch(truth_at(1.0, (-0.1, 0.32, 0.0), (1.2, 0.0, 0.0)))
+    referee.watch(truth_at(1.1, (0.01, 0.32, 0.0), (1.2, 0.0, 0.0)))
+    referee.watch(truth_at(1.2, tip, (1.2, 0.0, 0.0), touches=True))
+    told = f"touch outside the basket, {np.hypot(*tip[1:]):.2f} m off the axis"
+    assert referee.unsafe == ((told,) if outside else ())
+
+
+def test_a_probe_that_is_taken_too_fast_is_unsafe_though_it_touched_nothing_before():
+    referee = Referee()
+    referee.watch(truth_at(1.0, (0.29, 0.0, 0.0), (4.0, 0.0, 0.0)))
+    referee.watch(truth_at(1.1, (0.30, 0.0, 0.0), (4.0, 0.0, 0.0), latched=True))
+    assert referee.unsafe == ("touch at 4.00 m/s",)
 
 
 def test_what_touches_while_the_coupling_holds_is_no_strike():
