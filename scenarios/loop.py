@@ -176,6 +176,7 @@ def _limits(world: WorldParameters, ring_diameter_m: float) -> RefereeLimits:
         rim_x_m=world.drogue.rim_x_m,
         throat_x_m=world.drogue.throat_x_m,
         throat_radius_m=throat_radius_m(world.drogue, world.coupling),
+        rib_radius_m=world.drogue.rib_radius_m,
     )
 
 

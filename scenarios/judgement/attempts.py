@@ -48,17 +48,19 @@ class RefereeLimits:
     closure_speed_m_s: float = 2.6  # 5 kt, service limit; above it a touch is unsafe
     rim_radius_m: float = 0.25  # half the ring's diameter
     #: The basket narrows from its rim, so far ahead of the ring's centre, to its throat, and goes on as wide as that:
-    #: what is touched from farther out than the middle of its ribs is its outside.
+    #: what is touched from farther out than its ribs reach is its outside. A tip that slides out along two ribs lies
+    #: between them, from inside, with its middle where theirs are.
     rim_x_m: float = 0.03
     throat_x_m: float = 0.25
     throat_radius_m: float = 0.058
+    rib_radius_m: float = 0.008
     #: As of breakaway practice: who crosses the plane farther off, and is in no approach, tries nothing.
     aside_m: float = 1.0
 
     def basket_radius_m(self, x_m: float) -> float:
-        """Of the basket so far ahead of the ring's centre along the drogue's axis; aft of it, of its rim."""
+        """Of the basket's outside so far ahead of the ring's centre along the drogue's axis; aft of that, of its rim."""
         ends = (self.rim_x_m, self.throat_x_m), (self.rim_radius_m, self.throat_radius_m)
-        return float(np.interp(x_m, *ends))
+        return min(self.rim_radius_m, float(np.interp(x_m, *ends)) + self.rib_radius_m)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

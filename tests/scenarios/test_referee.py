@@ -201,9 +201,10 @@ def test_a_drogue_that_the_coupling_has_let_go_may_still_strike(tip, speed, expe
     ("tip", "outside"),
     [
         ((0.02, 0.24, 0.0), False),
-        ((0.12, 0.16, 0.0), False),  # in the funnel, whose ribs are 0.171 m off the axis there
-        ((0.12, 0.0, -0.18), True),
-        ((0.24, 0.07, 0.0), True),
+        ((0.12, 0.16, 0.0), False),  # in the funnel, the middles of whose ribs are 0.171 m off the axis there
+        ((0.067, 0.218, 0.0), False),  # as 29199 of dead_reel_drawn_hoses: sliding out between two ribs, from inside
+        ((0.12, 0.0, -0.19), True),
+        ((0.24, 0.08, 0.0), True),
         ((0.30, 0.04, 0.0), False),  # in the bore
         ((0.40, 0.104, 0.0), True),  # beside the coupling
     ],
