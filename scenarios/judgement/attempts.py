@@ -58,7 +58,7 @@ class RefereeLimits:
     aside_m: float = 1.0
 
     def basket_radius_m(self, x_m: float) -> float:
-        """Of the basket's outside so far ahead of the ring's centre along the drogue's axis; aft of that, of its rim."""
+        """Of the basket's outside, so far forward of the ring's centre along its axis; aft of that, of its rim."""
         ends = (self.rim_x_m, self.throat_x_m), (self.rim_radius_m, self.throat_radius_m)
         return min(self.rim_radius_m, float(np.interp(x_m, *ends)) + self.rib_radius_m)
 
