@@ -11,6 +11,8 @@ hose that has whipped once is not tried again (`phases`): nothing says that it w
 Not modelled: where the hose is; how long it whips.
 """
 
+import math
+
 from dockair.nav.guidance.guidance_settings import GuidanceSettings
 from dockair.nav.guidance.phases import (
     GOING_BACK,
@@ -64,19 +66,19 @@ def _is_seen_ahead(s: Situation) -> bool:
     return s.unusable_s == 0.0 and s.ring_ahead_m > 0.0
 
 
-def _frames_come(limits: PhaseLimits, s: Situation) -> bool:
-    return not s.frames_stopped and s.frame_age_s <= 0.5 * limits.lost_s
+def _frames_come(s: Situation) -> bool:
+    return not s.frames_stopped and math.isfinite(s.frame_age_s)  # infinite where nobody says
 
 
 def _is_unseen(limits: PhaseLimits, s: Situation) -> bool:
     """Out of the view of frames that come; where none come, what is believed of a drogue on the probe has run off."""
-    return _frames_come(limits, s) and s.unusable_s > limits.frames_stop_s
+    return _frames_come(s) and s.unusable_s > limits.frames_stop_s
 
 
 def _comes_off_aside(limits: PhaseLimits, s: Situation, *, ends_hold: bool) -> bool:
     if s.frames_stopped:
         return False
-    out_of_view = s.track_lost_s > limits.lost_s and _frames_come(limits, s)
+    out_of_view = s.track_lost_s > limits.lost_s and _frames_come(s)
     if ends_hold:
         return out_of_view or s.beside_m > limits.rim_m
     if not s.light_is_red:

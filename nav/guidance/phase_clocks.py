@@ -82,6 +82,6 @@ class PhaseClocks:
         self.track_lost_s = max(self.unusable_s, state.age_s if self._has_seen else 0.0)
         self.blind_s = max(self.blind_s + (dt if self.unusable_s > 0.0 else -dt), 0.0)
         stop = self._limits.frames_stop_s < state.frame_age_s < math.inf  # infinite where nobody says
-        self.frames_stopped = stop or (self.frames_stopped and state.age_s >= self._age_s)
+        self.frames_stopped = stop or (self.frames_stopped and state.age_s > self._age_s)
         self._age_s = state.age_s
         self.doubtful_s = 0.0 if state.contact_usable else self.doubtful_s + dt

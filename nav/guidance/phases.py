@@ -64,8 +64,8 @@ class PhaseLimits:
     take_in_m: float = 2.5  # inside the refuelling range 0.5-6 m (KDC-10 procedures), 1.5 m from where fuel flows here
     taken_in: float = 0.9  # of that way when holding begins: the receiver comes to rest on the remaining tenth
     hold_s: float = 5.0  # under a green light; assumed: long enough to see that the drogue stays on the probe
-    #: By how much more, as reckoned, it is pushed in under an amber light since it was green last, or from `take_in_m`
-    #: on: the reckoning errs by 1.1 m over a hold; behind a dead reel that nobody noticed no hose is ever taken up.
+    #: By how much more, as reckoned, it is pushed in under an amber light than at the farthest where it was green, or
+    #: than `take_in_m`: the reckoning errs by 1.1 m over a hold; behind a dead reel no hose is ever taken up.
     push_on_m: float = 1.0
     no_fuel_s: float = 10.0  # assumed: without a green light a hold ends; pushing on by `push_on_m` takes 3 s
     clear_m: float = 3.0  # procedures: pre-contact is 3-5 m behind the drogue
@@ -249,7 +249,7 @@ TRANSITIONS: dict[Phase, tuple[Transition, ...]] = {
         Transition(Phase.BREAKAWAY, "hose is slack", lambda limits, s: s.hose_is_slack),
         Transition(Phase.BREAKAWAY, "drogue has left the probe", _left),
         Transition(Phase.DISCONNECT, RED_LIGHT, lambda limits, s: s.light_is_red),
-        Transition(Phase.DISCONNECT, REFUELLED, lambda limits, s: s.green_s >= limits.hold_s),
+        Transition(Phase.DISCONNECT, REFUELLED, lambda limits, s: s.green_s > 0.0 and s.green_s >= limits.hold_s),
         Transition(Phase.DISCONNECT, "no fuel", lambda limits, s: s.no_fuel_s >= limits.no_fuel_s),
     ),
     Phase.DISCONNECT: (Transition(Phase.CLEAR, "drogue well ahead", _far_enough),),

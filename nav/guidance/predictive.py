@@ -36,7 +36,7 @@ from dockair.nav.guidance.own_path import OwnPath
 from dockair.nav.guidance.path_plan import PathPlan
 from dockair.rotations import Array
 
-_AT_FIRST = 1.5  # of what is bearable: a swing that nobody has seen yet is not followed
+_AT_FIRST = 1.5  # times the mean square that is bearable: a swing that nobody has seen yet is not followed
 _ACROSS = (1, 2)
 
 

@@ -26,7 +26,15 @@ from collections import deque
 
 import numpy as np
 
-from dockair.nav.guidance.phases import BEFORE_CONTACT, ON_THE_PROBE, Phase, PhaseLimits, is_off_the_probe, is_reached
+from dockair.nav.guidance.phases import (
+    BEFORE_CONTACT,
+    ON_THE_PROBE,
+    TOUCHING,
+    Phase,
+    PhaseLimits,
+    is_off_the_probe,
+    is_reached,
+)
 from dockair.rotations import Array
 from dockair.vectors import cross
 
@@ -40,12 +48,14 @@ class SlackHose:
     """
 
     def __init__(self, limits: PhaseLimits, step_s: float) -> None:
-        self._limits, self._step_s = limits, step_s
-        self._before: deque[Array] = deque(maxlen=round(limits.slack_before_s / step_s))
+        self._limits = limits
+        times_s = limits.slack_from_s, limits.slack_over_s, limits.slack_to_s, limits.slack_far_s
+        self._from, self._over, self._to, self._far = (max(round(time_s / step_s), 1) for time_s in times_s)  # ticks
+        self._before: deque[Array] = deque(maxlen=max(round(limits.slack_before_s / step_s), 1))
         self._rest: Array | None = None  # their sum, made once they are all there
-        self._contact_s = -np.inf  # since contact; -inf before it
+        self._ticks: int | None = None  # since contact; None before it
         self._since, self._seen = np.zeros(3), 0  # sum since the blow was over, of so many that were seen on the probe
-        self._far_s = 0.0  # for which the drogue has been turned far, later
+        self._far_ticks = 0  # for which the drogue has been turned far, later
         self.is_slack = False  #: nothing takes up the hose
 
     def step(self, phase: Phase, coupling: Array, along: Array, *, seen: bool) -> None:
@@ -57,20 +67,22 @@ class SlackHose:
             along: (3,) the drogue's axis, forward, of any length. Both in axes that do not turn with the receiver.
             seen: whether that is known of frames that have not stopped.
         """
-        self._contact_s += self._step_s
         if phase in BEFORE_CONTACT:
-            self._contact_s, self._far_s, self.is_slack = -np.inf, 0.0, False
+            self._ticks, self._far_ticks, self.is_slack = None, 0, False
             self._since, self._seen = np.zeros(3), 0
-            if seen:
+        limits, ahead_m, beside_m = self._limits, float(coupling[0]), float(np.hypot(coupling[1], coupling[2]))
+        at_the_coupling = is_reached(limits, ahead_m, beside_m) and beside_m <= limits.coupling_reached_m
+        if self._ticks is not None:
+            self._ticks += 1
+        elif at_the_coupling and phase not in BEFORE_CONTACT:
+            self._ticks = 0
+        if self._ticks is None:
+            if seen and phase not in TOUCHING:  # else it is on its way there along the funnel
                 self._before.append(along)
                 self._rest = None
             return
-        limits, ahead_m, beside_m = self._limits, float(coupling[0]), float(np.hypot(coupling[1], coupling[2]))
-        at_the_coupling = is_reached(limits, ahead_m, beside_m) and beside_m <= limits.coupling_reached_m
-        if self._contact_s == -np.inf and at_the_coupling:
-            self._contact_s = 0.0
-        late = self._contact_s > limits.slack_to_s
-        if self.is_slack or self._contact_s < limits.slack_from_s or (late and phase not in ON_THE_PROBE):
+        late = self._ticks >= self._to
+        if self.is_slack or self._ticks < self._from or (late and phase not in ON_THE_PROBE):
             return
         if self._rest is None:
             if not self._before:
@@ -78,19 +90,18 @@ class SlackHose:
             self._rest = np.sum(self._before, axis=0)
         on_the_probe = seen and not is_off_the_probe(limits, ahead_m, beside_m)
         if not late:
-            self._look(along if on_the_probe else None, self._rest)
+            self._look(along if on_the_probe else None, self._rest, self._ticks - self._from + 1)
         elif on_the_probe:
             _, turned_rad = turn_rad(along, self._rest)
-            self._far_s = self._far_s + self._step_s if turned_rad > limits.slack_far_rad else 0.0
-            self.is_slack = self._far_s >= limits.slack_far_s
+            self._far_ticks = self._far_ticks + 1 if turned_rad > limits.slack_far_rad else 0
+            self.is_slack = self._far_ticks >= self._far
 
-    def _look(self, along: Array | None, rest: Array) -> None:
-        """Eq. (1), and whether it says that the hose is slack."""
+    def _look(self, along: Array | None, rest: Array, looked: int) -> None:
+        """Eq. (1), and whether it says that it is slack; `looked`: ticks since the blow was over, with this one."""
         limits = self._limits
         if along is not None:
             self._since, self._seen = self._since + along, self._seen + 1
-        looked = round((self._contact_s - limits.slack_from_s) / self._step_s) + 1
-        if looked >= round(limits.slack_over_s / self._step_s) and self._seen >= 0.5 * looked:
+        if looked >= self._over and self._seen >= 0.5 * looked:
             drop_rad, tilt_rad = turn_rad(self._since, rest)
             self.is_slack = drop_rad > limits.slack_drop_rad or tilt_rad > limits.slack_tilt_rad
 

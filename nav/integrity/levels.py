@@ -19,8 +19,8 @@ are left, since any three LEDs fit). While it is not, the distance to it and its
 is one of the x_i in (2), and no level of attitude is given. Nor is there one that reaches the frontal attitude half way
 to the mirror image: there the linearisation ends.
 
-Not modelled: a fault that the places a frame is tested on have followed, frame by frame (`navigator`): what they
-contribute to the pose is added to the levels there.
+Not modelled: a fault that the places a frame is tested on have followed, frame by frame (`contact_watch`):
+what they contribute to the pose is added to the levels there.
 
 Source: R. G. Brown, A baseline GPS RAIM scheme, 1992 (1); M. Brenner, Integrated GPS/inertial fault detection
 availability, 1996 (2). There a fault has one axis and the problem is linear.

@@ -278,7 +278,7 @@ def test_what_a_tip_feels_once_a_turn_is_announced_is_not_flown_against():
 
 
 def test_a_drogue_out_of_view_turns_with_the_tanker_where_it_is_reckoned_and_no_longer_than_that():
-    """Eq. (1) of `approach`, n x p: the receiver falls back from 4 m to 10 m in the turn; then the tanker rolls out."""
+    """Eq. (1) of `formation`, n x p: the receiver falls back from 4 m to 10 m in the turn; then it is over."""
     guidance = Guidance(GuidanceSettings(), 100)
     guidance.announce(_said(starts_s=0.0, entry_s=0.1))
     guidance.announce(_said(starts_s=20.0, entry_s=0.1, turn=0.0))

@@ -106,6 +106,10 @@ def test_frames_have_stopped_until_one_is_used_again():
     assert after(clocks, camera(1.0, 1.2)).frames_stopped
     assert after(clocks, camera(0.0, 1.7)).frames_stopped  # it came and was not used
     assert not after(clocks, camera(0.0, 0.2)).frames_stopped
+    for age_s in (0.0, 0.2):  # every frame is used as late, or its navigator says nothing of it
+        clocks = after(PhaseClocks(STEP_S, LIMITS), camera(0.0, age_s), camera(1.0, age_s))
+        assert clocks.frames_stopped
+        assert not after(clocks, camera(0.0, age_s)).frames_stopped
 
 
 def test_frames_that_come_and_are_not_used_or_that_nobody_counts_have_not_stopped():

@@ -130,6 +130,13 @@ def test_each_row_of_the_table(phase, changes, following):
     assert (transition.to.value if transition else None) == following
 
 
+def test_a_hold_of_no_time_still_needs_a_green_light():
+    at_once, held = PhaseLimits(hold_s=0.0), dataclasses.replace(CALM, **HELD)
+    assert next_phase(Phase.HOLD, at_once, held) is None
+    refuelled = next_phase(Phase.HOLD, at_once, dataclasses.replace(held, green_s=0.01))
+    assert refuelled is not None and refuelled.reason == REFUELLED
+
+
 @pytest.mark.parametrize(("green_s", "no_fuel_s", "reason"), [(5.0, 0.0, REFUELLED), (4.9, 10.0, "no fuel")])
 def test_a_hold_has_refuelled_by_its_time_under_a_green_light_and_by_no_other(green_s, no_fuel_s, reason):
     held = dataclasses.replace(CALM, **HELD, in_phase_s=20.0, green_s=green_s, no_fuel_s=no_fuel_s)

@@ -170,6 +170,33 @@ def test_a_receiver_that_was_called_back_is_in_contact_from_when_it_comes_to_the
     assert first_s == pytest.approx(TOLD_S - LIMITS.coupling_reached_m, abs=2 * STEP_S)
 
 
+def test_of_a_receiver_that_was_called_back_the_last_second_before_contact_counts_and_not_that_before_the_recall():
+    hose = SlackHose(LIMITS, STEP_S)
+    for _ in range(100):
+        hose.step(Phase.APPROACH, np.array([1.0, 0.0, 0.0]), turned(-10.0), seen=True)
+    for _ in range(100):  # on its way to the coupling, the drogue swings on
+        hose.step(Phase.BACK_OFF, np.array([0.5, 0.0, 0.0]), turned(10.0), seen=True)
+    for _ in range(60):
+        hose.step(Phase.BACK_OFF, np.zeros(3), turned(10.0), seen=True)
+        assert not hose.is_slack
+
+
+@pytest.mark.parametrize("rate_hz", [50, 100, 180, 500])
+def test_the_times_are_whole_ticks_at_any_rate(rate_hz):
+    """The ticks' times are no sums of a period: at 50 Hz the limit of a far turn would be met a tick late."""
+    for late in (False, True):
+        hose, slack = SlackHose(LIMITS, 1.0 / rate_hz), []
+        for _ in range(2 * rate_hz):
+            hose.step(Phase.APPROACH, np.array([1.0, 0.0, 0.0]), REST, seen=True)
+        for k in range(rate_hz):  # contact is the first of them
+            far = not late or k > LIMITS.slack_to_s * rate_hz
+            hose.step(Phase.CONTACT, np.zeros(3), turned(FAR_DEG + 5.0 if far else 0.0), seen=True)
+            slack.append(hose.is_slack)
+        first = np.floor(LIMITS.slack_to_s * rate_hz) + 1 if late else round(LIMITS.slack_from_s * rate_hz)
+        lasts_s = LIMITS.slack_far_s if late else LIMITS.slack_over_s
+        assert int(np.argmax(slack)) == first + round(lasts_s * rate_hz) - 1
+
+
 @pytest.mark.parametrize(("funnel_s", "expected"), [(0.0, True), (0.12, False)])
 def test_while_the_tip_is_on_its_way_along_the_funnel_the_blow_is_not_over(funnel_s, expected):
     """As 29312 of moderate_gusts by camera: 0.12 m off the coupling's line when it is 0.05 m ahead, taut."""
