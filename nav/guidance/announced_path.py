@@ -27,6 +27,7 @@ import math
 from bisect import insort
 from dataclasses import dataclass
 
+from dockair.errors import check_numbers
 from dockair.messages import TankerAnnouncement
 
 _GRAVITY_M_S2 = 9.80665  # standard
@@ -43,6 +44,10 @@ class AnnouncedPathSettings:
     wander_1_sqrt_s: float = 0.0005  # of e: the inertial velocity's bias, turning against the path, looks like it
     swing_m2_s: float = 0.02  # spectral density of what is flown besides v: swings go to and fro and leave little
     lean_1_s: float = 0.18  # k: v goes within 6 s, slow beside the swing
+
+    def __post_init__(self) -> None:
+        sigmas = "velocity_sigma_m_s", "start_sigma_s", "turn_rate_sigma_rad_s"
+        check_numbers("guidance.path", self, zero=(*sigmas, "wander_1_sqrt_s"))
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from dockair.errors import check_numbers
 from dockair.nav.guidance.swing_model import frequency_ratio
 from dockair.rotations import Array
 
@@ -29,6 +30,10 @@ class BowWavePush:
     side_acceleration_m_s2: float = 60.0  # c: (2 pi 0.32 Hz)^2 times 15 m, at 180 m/s and 6000 m
     learning_share: float = 0.4  # of a miss that the next attempt corrects; the rest is taken for chance
     learnt_max_m: float = 0.15  # a miss beyond this was not the bow wave's
+
+    def __post_init__(self) -> None:
+        zero = "radius_m", "side_acceleration_m_s2", "learning_share", "learnt_max_m"
+        check_numbers("guidance.bow_wave", self, zero=zero, signed=("source_from_tip_m",))
 
     def at_pressure(self, dynamic_pressure_pa: float) -> "BowWavePush":
         """Return the same for another dynamic pressure [Pa]: c goes with the square of the swing's frequency."""

@@ -18,6 +18,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from dockair.errors import check_numbers
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClosingSettings:
@@ -35,6 +37,9 @@ class ClosingSettings:
     retreat_m_s: float = 0.8  # to that place: walking pace, a second try within a few swings
     margin_m: float = 0.7  # short of the ring, at rest: half of it goes as drogue and receiver come together by gusts
 
+    def __post_init__(self) -> None:
+        check_numbers("guidance.closing", self, zero=("margin_m",))
+
     def braked_at(self, deceleration_m_s2: float) -> "ClosingSettings":
         """Return the same for an airframe that brakes less: it runs up so that it stops within the same room."""
         a, tau = deceleration_m_s2, self.response_s
@@ -50,7 +55,7 @@ class PredictedMiss:
 
     def __init__(self, settings: ClosingSettings, step_s: float) -> None:
         self._settings = settings
-        self._squares: deque[float] = deque(maxlen=round(settings.swing_s / step_s))
+        self._squares: deque[float] = deque(maxlen=max(round(settings.swing_s / step_s), 1))
         self._sum, self._skipped = 0.0, 0
 
     def forget(self) -> None:

@@ -1,10 +1,11 @@
 """Gains, speeds and limits of guidance, and what it is told."""
 
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
+from dockair.errors import DockairError, check_choice, check_numbers
 from dockair.nav.guidance.announced_path import AnnouncedPathSettings
 from dockair.nav.guidance.bow_wave_push import BowWavePush
 from dockair.nav.guidance.closing import ClosingSettings
@@ -47,6 +48,9 @@ class PredictiveSettings:
     plan: PlanSettings = field(default_factory=PlanSettings)
     swing: SwingSettings = field(default_factory=SwingSettings)
 
+    def __post_init__(self) -> None:
+        check_numbers("guidance.predictive", self, zero=("straying_limit_m_s", "along_gain_1_s"))
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PidSettings:
@@ -58,6 +62,10 @@ class PidSettings:
     error_max_m: float = 1.5  # of k_p e across: a drogue farther off is gone to at no more than the join-up speed
     derivative: float = 0.3  # k_d: more would fly the noise of the rate
     smoothing_1_s: float = 4.0  # how fast u goes to the u of Eq. (1)
+
+    def __post_init__(self) -> None:
+        gains = "proportional_1_s", "integral_1_s2", "derivative"
+        check_numbers("guidance.pid", self, zero=(*gains, "integrated_m"))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -105,6 +113,13 @@ class GuidanceSettings:
     bow_wave: BowWavePush = field(default_factory=BowWavePush)
     path: AnnouncedPathSettings = field(default_factory=AnnouncedPathSettings)
     limits: PhaseLimits = field(default_factory=PhaseLimits)
+
+    def __post_init__(self) -> None:
+        check_choice("guidance.controller", self.controller, get_args(ControllerName))
+        gains = "take_in_gain_1_s", "trail_gain_m_s", "reckoned_gain_1_s"
+        check_numbers("guidance", self, zero=(*gains, "regain_speed_m_s", "response_s", "evade_s"))
+        if not max(self.patient_share) <= 1.0:
+            raise DockairError("guidance.patient_share", expected="shares, 1 at most", got=self.patient_share)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 
-from dockair.errors import check_integer
+from dockair.errors import DockairError, check_numbers
 
 
 class Phase(Enum):
@@ -83,7 +83,15 @@ class PhaseLimits:
     breakaway_s: float = 10.0  # assumed: backing off at 1 m/s clears any attempt in this time
 
     def __post_init__(self) -> None:
-        check_integer("guidance.limits.attempts_max", self.attempts_max, 1)
+        where, told_s = "guidance.limits", self.slack_from_s + self.slack_over_s
+        check_numbers(where, self, zero=("stabilise_s", "hold_s"), infinite=("slot_s",))
+        if not told_s <= self.slack_to_s:
+            expected = f"slack_from_s + slack_over_s = {told_s:g} at least"
+            raise DockairError(f"{where}.slack_to_s", expected=expected, got=self.slack_to_s)
+        if not self.late_radius >= 1.0:
+            raise DockairError(f"{where}.late_radius", expected="a number from 1 on", got=self.late_radius)
+        if not self.taken_in <= 1.0:
+            raise DockairError(f"{where}.taken_in", expected="a number above 0, 1 at most", got=self.taken_in)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

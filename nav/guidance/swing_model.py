@@ -29,6 +29,7 @@ from functools import lru_cache
 import numpy as np
 from scipy.linalg import expm, solve_continuous_lyapunov
 
+from dockair.errors import check_numbers
 from dockair.rotations import Array
 
 #: Of the states: m and d come before it, then place and rate of each mode, then g.
@@ -45,6 +46,9 @@ class HoseMode:
     damping: tuple[float, float, float]
     gust_density: tuple[float, float, float]  # q_i, of a g' of one [m/s^3/sqrt(Hz)]; below zero: against the swing
     felt_share: tuple[float, float, float] = (0.0, 0.0, 0.0)  # c_i
+
+    def __post_init__(self) -> None:
+        check_numbers("guidance.predictive.swing.modes", self, signed=("gust_density", "felt_share"))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -88,6 +92,10 @@ class SwingSettings:
     ratio_sigma: float = 0.2  # of ln r, before a drogue has been seen; 0.15 to 0.3 foretell alike within 1 %
     ratio_memory_s: float = 10.0  # T_m; 10 and 20 s foretell alike within 2 %
     unforeseen_s: float = 0.2  # T_n: of what none of the models foresees; 0.1 to 0.2 s foretell alike within 2 %
+
+    def __post_init__(self) -> None:
+        zero = "rattle_density", "drift_density"
+        check_numbers("guidance.predictive.swing", self, zero=zero, signed=("gust_felt_share",))
 
     def at(self, dynamic_pressure_pa: float) -> "SwingSettings":
         """Return the same for another dynamic pressure [Pa], which stretches the hose more or less across."""

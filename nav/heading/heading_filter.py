@@ -30,12 +30,12 @@ Roumeliotis & Burdick 2002, "Stochastic cloning".
 
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
 from dockair.calibration import GyroSheet, Mounting
-from dockair.errors import DockairError
+from dockair.errors import DockairError, check_numbers
 from dockair.messages import ImuSample
 from dockair.nav.heading.levelling import without_yaw
 from dockair.rotations import Array, exp, skew
@@ -68,9 +68,7 @@ class HeadingFilterSettings:
     remembered_s: float = 1.0  #: how late a frame may come
 
     def __post_init__(self) -> None:
-        for name in (f.name for f in fields(self)):
-            if not getattr(self, name) > 0.0:
-                raise DockairError(f"heading.filter.{name}", expected="a number above 0", got=getattr(self, name))
+        check_numbers("heading.filter", self)
 
 
 class HeadingFilter:

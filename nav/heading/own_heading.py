@@ -10,14 +10,14 @@ Not modelled: what else of the receiver than its probe is in view; correlation w
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from dockair.calibration import NavigationSheets
-from dockair.errors import DockairError
+from dockair.errors import DockairError, check_numbers
 from dockair.messages import CameraFrame, ImuSample
 from dockair.nav.heading.heading_filter import HeadingFilter, HeadingFilterSettings
 from dockair.nav.heading.turn import TurnStatus, VisualSettings
@@ -47,9 +47,7 @@ class OwnHeadingSettings:
     visual: VisualSettings = field(default_factory=VisualSettings.for_aircraft)
 
     def __post_init__(self) -> None:
-        for name in (f.name for f in fields(self) if f.name not in ("filter", "visual")):
-            if not getattr(self, name) > 0.0:
-                raise DockairError(f"heading.{name}", expected="a number above 0", got=getattr(self, name))
+        check_numbers("heading", self)
 
 
 class OwnHeading:

@@ -17,12 +17,12 @@ Not modelled: gusts that begin in the very moment in which the camera goes out, 
 itself an estimate (along, the risk is up to twice the one set).
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.stats import chi2
 
-from dockair.errors import DockairError
+from dockair.errors import DockairError, check_numbers
 from dockair.messages import STAMP_RESOLUTION_S
 from dockair.nav.integrity.levels import ProtectionLevels
 from dockair.rotations import Array
@@ -48,9 +48,7 @@ class CoastingSettings:
     risk: float = 1e-3
 
     def __post_init__(self) -> None:
-        for name in (f.name for f in fields(self)):
-            if not getattr(self, name) > 0.0:
-                raise DockairError(f"coasting.{name}", expected="a number above 0", got=getattr(self, name))
+        check_numbers("coasting", self)
         if not self.risk < _HIGHEST_RISK:
             raise DockairError("coasting.risk", expected="a probability, 0 to 0.5", got=self.risk)
 

@@ -5,10 +5,10 @@ it is `ProtectionLevels.about` that offset. Of a belief that has coasted since t
 all frames (mounting, focal length) are not in the levels: the limits leave room for them.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from enum import Enum
 
-from dockair.errors import DockairError
+from dockair.errors import check_numbers
 from dockair.nav.integrity.levels import ProtectionLevels
 from dockair.nav.integrity.monitor import Integrity, IntegrityStatus
 
@@ -49,9 +49,7 @@ class ContactLimits:
     age_s: float = 0.4  # what the belief foretells was measured for 0.3 s; until then `coasting` widens the levels
 
     def __post_init__(self) -> None:
-        for name in (f.name for f in fields(self)):
-            if not getattr(self, name) > 0.0:
-                raise DockairError(f"contact.{name}", expected="a number above 0", got=getattr(self, name))
+        check_numbers("contact", self, infinite=("lateral_m", "range_m", "refused_m", "age_s"))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,9 +1,11 @@
 """What a person can do wrong, said in one line: where, what was expected, what was got, what exists."""
 
-from collections.abc import Iterable
+import math
+from collections.abc import Collection, Iterable
+from dataclasses import fields
 from difflib import get_close_matches
-from numbers import Integral
-from typing import Any
+from numbers import Integral, Real
+from typing import Any, get_args
 
 
 class DockairError(Exception):
@@ -77,6 +79,47 @@ def check_integer(name: str, value: Any, least: int, most: int | None = None) ->
         return int(value)
     limits = f"from {least} on" if most is None else f"from {least} to {most}"
     raise DockairError(name, expected=f"an integer {limits}", got=value)
+
+
+def check_numbers(
+    where: str,
+    settings: Any,
+    *,
+    zero: Collection[str] = (),
+    signed: Collection[str] = (),
+    infinite: Collection[str] = (),
+) -> None:
+    """Refuse a dataclass with a number in it that is not finite and above 0.
+
+    Args:
+        where: what the dataclass is called in its keys.
+        settings: the dataclass; its fields of `int`, `float` and tuples of `float` are looked at, no others.
+        zero: fields that may be 0, too.
+        signed: fields that may be any finite number.
+        infinite: fields that may be infinite, too.
+    """
+    for field in fields(settings):
+        name, value = f"{where}.{field.name}", getattr(settings, field.name)
+        if field.type is int:
+            check_integer(name, value, 0 if field.name in zero else 1)
+        elif field.type is float or get_args(field.type)[:1] == (float,):
+            least = "finite" if field.name in signed else "from 0 on" if field.name in zero else "above 0"
+            for one in _parts(name, value, get_args(field.type)):
+                is_number = isinstance(one, Real) and not isinstance(one, bool)
+                is_known = is_number and (math.isfinite(one) or (field.name in infinite and not math.isnan(one)))
+                if not is_known or not (least == "finite" or one > 0.0 or (least == "from 0 on" and one == 0.0)):
+                    expected = "finite numbers" if least == "finite" else f"a number {least}"
+                    raise DockairError(name, expected=expected, got=value)
+
+
+def _parts(name: str, value: Any, types: tuple[Any, ...]) -> tuple[Any, ...]:
+    """Return a field's numbers, of a tuple as many as its type says."""
+    if not types:
+        return (value,)
+    parts = tuple(value) if isinstance(value, Iterable) else ()
+    if not parts or (... not in types and len(parts) != len(types)):
+        raise DockairError(name, expected="numbers" if ... in types else f"{len(types)} numbers", got=value)
+    return parts
 
 
 def check_choice(name: str, value: Any, exists: tuple[str | None, ...]) -> None:

@@ -1,0 +1,89 @@
+"""What guidance refuses to be told."""
+
+from dataclasses import fields
+from math import inf, nan
+from typing import get_args
+
+import pytest
+
+from dockair.errors import DockairError
+from dockair.nav.guidance.announced_path import AnnouncedPathSettings
+from dockair.nav.guidance.bow_wave_push import BowWavePush
+from dockair.nav.guidance.closing import ClosingSettings
+from dockair.nav.guidance.guidance_settings import GuidanceSettings, PidSettings, PredictiveSettings
+from dockair.nav.guidance.path_plan import PlanSettings
+from dockair.nav.guidance.phases import PhaseLimits
+from dockair.nav.guidance.swing_model import SwingSettings
+
+ALL = (
+    GuidanceSettings,
+    PhaseLimits,
+    ClosingSettings,
+    PredictiveSettings,
+    PidSettings,
+    PlanSettings,
+    SwingSettings,
+    BowWavePush,
+    AnnouncedPathSettings,
+)
+
+
+def numbers(cls):
+    """Its fields that are numbers, with how many each has; 0: any number of them."""
+    for field in fields(cls):
+        parts = get_args(field.type)
+        if field.type in (int, float) or parts[:1] == (float,):
+            yield field.name, 0 if ... in parts else max(len(parts), 1)
+
+
+@pytest.mark.parametrize("cls", ALL)
+def test_no_number_may_be_unknown(cls):
+    for name, count in numbers(cls):
+        value = nan if count == 1 else (nan,) * max(count, 1)
+        with pytest.raises(DockairError, match=name):
+            cls(**{name: value})
+
+
+@pytest.mark.parametrize("cls", ALL)
+def test_a_vector_has_as_many_numbers_as_its_axes(cls):
+    for name, count in numbers(cls):
+        if count != 1:
+            with pytest.raises(DockairError, match=f"{name}: expected .*numbers"):
+                cls(**{name: (1.0,) * (count - 1) if count else ()})
+
+
+@pytest.mark.parametrize(
+    ("cls", "values", "said"),
+    [
+        (GuidanceSettings, {"controller": "PID"}, "guidance.controller: .*exists: predictive, pid"),
+        (GuidanceSettings, {"closure_speed_m_s": 0.0}, "guidance.closure_speed_m_s: expected a number above 0, got 0"),
+        (GuidanceSettings, {"trail_before_s": 0.0}, "guidance.trail_before_s"),
+        (GuidanceSettings, {"patient_share": (0.5, 1.1)}, "guidance.patient_share"),
+        (GuidanceSettings, {"stand_off_m": "4"}, "guidance.stand_off_m"),
+        (PhaseLimits, {"patience_s": 0.0}, "guidance.limits.patience_s"),
+        (PhaseLimits, {"lost_s": inf}, "guidance.limits.lost_s"),
+        (PhaseLimits, {"attempts_max": 2.5}, "guidance.limits.attempts_max: expected an integer"),
+        (PhaseLimits, {"slack_from_s": 0.45}, "slack_to_s: expected slack_from_s .* = 0.53 at least, got 0.5"),
+        (PhaseLimits, {"late_radius": 0.9}, "late_radius"),
+        (PhaseLimits, {"taken_in": 1.1}, "taken_in"),
+        (ClosingSettings, {"swing_s": 0.0}, "guidance.closing.swing_s"),
+        (PlanSettings, {"nodes": 0}, "guidance.predictive.plan.nodes: expected an integer from 1 on"),
+        (PlanSettings, {"kept_back": 1.0}, "kept_back"),
+        (SwingSettings, {"frequency_ratios": (1.0, -1.0)}, "frequency_ratios"),
+    ],
+)
+def test_what_nothing_can_be_flown_with_is_refused_at_once(cls, values, said):
+    with pytest.raises(DockairError, match=said):
+        cls(**values)
+
+
+@pytest.mark.parametrize(
+    ("cls", "values"),
+    [
+        (PhaseLimits, {"slot_s": inf, "hold_s": 0.0}),
+        (BowWavePush, {"radius_m": 0.0}),
+        (PidSettings, {"derivative": 0.0}),
+    ],
+)
+def test_what_can_be_flown_with_is_not(cls, values):
+    assert all(getattr(cls(**values), name) == value for name, value in values.items())
