@@ -32,6 +32,7 @@ _COLUMNS = 118  # of the page
 _MORE = {
     "gusts": "An array of tables, `[[gusts]]`, one a gust.",
     "faults": "An array of tables, `[[faults]]`, one a fault. Which kind has which keys: [faults](faults.md).",
+    "start": "A start far aside is no [departure](results.md#unsafe); going much farther off from there is one.",
     "navigation": "[A navigator of one's own](tutorials/own_navigator.md), [heading](heading.md).",
     "guidance": "What the phases do with these: [guidance](guidance.md).",
     "parameters": "Sheets, keys and ranges: [parameters](parameters.md).",

@@ -55,6 +55,20 @@ def test_a_tip_20_m_off_the_drogues_line_for_two_seconds_has_departed_one_that_c
     assert departed_s(across=lambda t: (19.0, 0.0)) is None
 
 
+@pytest.mark.parametrize("began", [(20.0, 20.0), (-15.0, 0.0), (0.0, 11.0)])
+def test_a_flight_that_begins_far_aside_has_not_departed_but_one_that_goes_10_m_farther_has(departed_s, began):
+    start_m, ahead = np.hypot(*began), np.array(began) / np.hypot(*began)
+    assert departed_s(across=lambda t: began) is None
+    assert departed_s(across=lambda t: np.array(began) * (1.0 - 0.1 * t)) is None  # it closes in
+    assert departed_s(across=lambda t: ahead * (start_m + 9.9 * (t > 3.0))) is None
+    assert departed_s(across=lambda t: ahead * (start_m + 10.1 * (t > 3.0))) == pytest.approx(3.0, abs=2 * STEP_S)
+
+
+def test_a_start_some_metres_aside_changes_nothing(departed_s):
+    assert departed_s(across=lambda t: (9.9 + 10.2 * (t > 3.0), 0.0)) == pytest.approx(3.0, abs=2 * STEP_S)
+    assert departed_s(across=lambda t: (9.9 + 10.0 * (t > 3.0), 0.0)) is None
+
+
 def test_far_behind_is_not_off_the_line_whichever_way_the_tanker_flies(departed_s):
     """Behind by 400 m, after a turn by 60 degrees: the line is the tanker's, not the world's."""
     R_WT = exp(np.array([0.0, 0.0, np.pi / 3]))
