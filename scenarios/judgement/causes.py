@@ -15,7 +15,8 @@ not flown. The largest share names the cause. Rules, the first that holds:
 | diverged         | the simulation broke down during the attempt                                                     |
 | departed         | the receiver departed from controlled flight before the attempt ended                            |
 | out_of_time      | the flight's time ran out during the attempt                                                     |
-| collision        | the coupling held the probe in the attempt, and then the receiver struck something               |
+| collision        | the coupling held the probe in the attempt, and then the receiver struck something; of a flight  |
+|                  | without any attempt, see below                                                                   |
 | detection        | the solution was not valid for half of the last second                                           |
 | integrity        | it was valid, and marked as not to be flown into contact for half of the last second             |
 | outside_limits   | the attempt's offset (drogue axes, in the ring's plane) was a good contact's and the tip held,   |
@@ -36,9 +37,9 @@ not flown. The largest share names the cause. Rules, the first that holds:
 How far off a good contact may be is asked of the flight whatever drogue it meets: a wider ring leads no farther tip to
 the coupling, for its ribs stand flatter (docs/models/coupling.md).
 
-A flight without any attempt has the cause diverged if the simulation broke down, detection if the solution was valid
-for less than half of its last half, else never_steady. A flight in which an attempt failed or none began, and whose
-receiver departed at any time, has the cause departed.
+A flight without any attempt has the cause diverged if the simulation broke down, collision if the receiver struck
+something, detection if the solution was valid for less than half of its last half, else never_steady. A flight in which
+an attempt failed or none began, and whose receiver departed at any time, has the cause departed.
 
 Not modelled: causes that act together; the one named is the largest, not the only one.
 """
@@ -171,17 +172,23 @@ def cause_of_flight(attempts: Sequence[Attempt], flown: Flown, outcome: str, rul
         return "departed"
     if attempts:
         return last
+    end_s = flown.truths[-1].time_s
+    if outcome == Outcome.COLLISION.value:  # blind, or by a hose that whips: any fault can have brought it about
+        return "fault" if any(_acted(fault, 0.0, end_s) for fault in flown.faults) else "collision"
     half = flown.solutions[len(flown.solutions) // 2 :]
     seen = np.mean([solution.valid for solution in half]) >= (rules or CauseRules()).for_half
-    return _or_fault("never_steady" if seen else "detection", 0.0, flown.truths[-1].time_s, flown)
+    return _or_fault("never_steady" if seen else "detection", 0.0, end_s, flown)
 
 
 def _or_fault(cause: str, since_s: float, until_s: float, flown: Flown) -> str:
     for fault in flown.faults:
-        acted = fault.start_s <= until_s and fault.stop_s > since_s
-        if acted and cause in (_OF_REEL if isinstance(fault, DeadReel) else _OF_SENSORS):
+        if _acted(fault, since_s, until_s) and cause in (_OF_REEL if isinstance(fault, DeadReel) else _OF_SENSORS):
             return "fault"
     return cause
+
+
+def _acted(fault: Fault, since_s: float, until_s: float) -> bool:
+    return fault.start_s <= until_s and fault.stop_s > since_s
 
 
 def _cause(attempt: Attempt, flown: Flown, rules: CauseRules) -> str:

@@ -6,7 +6,7 @@ MEANINGS: Mapping[str, str] = {
     "diverged": "the simulation broke down",
     "departed": "the receiver departed from controlled flight",
     "out_of_time": "the flight's time ran out during the attempt",
-    "collision": "the receiver struck something after the coupling had held the probe",
+    "collision": "the receiver struck something after the coupling had held the probe, or before any attempt",
     "detection": "the navigation had no valid solution for half of the last second; without an attempt, of the flight",
     "integrity": "the solution was marked as not to be flown into contact",
     "outside_limits": "no farther off than a good contact and held, but too fast or at too wide an angle",

@@ -336,6 +336,19 @@ def test_a_flight_without_an_attempt_was_never_steady_or_saw_nothing(flight):
     assert cause_of_flight([], flight(faults=[LedOff()]), "abort") == "fault"
 
 
+def test_a_flight_that_struck_something_before_any_attempt_has_collided_whether_it_saw_or_not(flight):
+    assert cause_of_flight([], flight(), "collision") == "collision"
+    assert cause_of_flight([], flight(valid=lambda t: t < 3.0), "collision") == "collision"
+    fallen = flight(tip=lambda t: (0.0, -25.0 * (t > 1.0)))
+    assert cause_of_flight([], fallen, "collision") == "departed"  # it struck something as it fell
+
+
+@pytest.mark.parametrize("fault", [DeadReel(start_s=2.0), CameraDropOut(start_s=2.0)])
+def test_a_fault_that_acted_before_a_collision_without_an_attempt_can_have_brought_it_about(flight, fault):
+    assert cause_of_flight([], flight(faults=[fault]), "collision") == "fault"
+    assert cause_of_flight([], flight(faults=[replace(fault, start_s=9.0)]), "collision") == "collision"  # later
+
+
 def test_a_flight_without_an_attempt_whose_simulation_broke_down_has_diverged_whatever_else_went_wrong(flight):
     assert cause_of_flight([], flight(), "diverged") == "diverged"
     blind = flight(tip=lambda t: (0.0, -25.0 * (t > 1.0)), valid=lambda t: False, faults=[LedOff()])
