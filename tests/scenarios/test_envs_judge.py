@@ -4,7 +4,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from dockair.scenarios.envs.judge import AttemptJudge
+from dockair.scenarios.envs.judge import AttemptJudge, AttemptLimits
+from dockair.scenarios.judgement.attempts import RefereeLimits
 from dockair.scenarios.judgement.referee import Outcome
 
 
@@ -34,6 +35,19 @@ def test_a_tip_that_goes_aside_has_missed_a_metre_off_the_axis():
     judge = AttemptJudge(1)
     assert _watch(judge, -0.1, 0.2, aside=0.99) == (False, None)
     assert _watch(judge, 0.2, aside=1.01) == (True, Outcome.MISS)
+
+
+def test_a_tip_that_crosses_the_plane_more_than_a_metre_off_the_axis_passes_by_and_may_come_back_to_try():
+    judge = AttemptJudge(1)
+    assert _watch(judge, -0.1, 0.2, 3.0, aside=3.0) == (False, None)
+    assert judge.unfinished is None
+    assert _watch(judge, 3.0, -0.6, -0.1, 0.2, aside=1.01) == (False, None)
+    assert _watch(judge, -0.6, -0.1, 0.2, aside=0.99) == (False, None)
+    assert judge.unfinished is Outcome.MISS
+
+
+def test_who_tries_and_who_passes_by_is_told_as_by_the_flights_referee():
+    assert AttemptLimits().aside_m == RefereeLimits().aside_m
 
 
 @pytest.mark.parametrize(("touches", "outcome"), [(True, Outcome.RIM_STRIKE), (False, Outcome.MISS)])
