@@ -7,11 +7,13 @@ from typing import Any, Literal, Union, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
+from pydantic_core import PydanticCustomError
 
 from dockair.errors import DockairError
 
 _WORDS = {float: "a number", int: "an integer", bool: "true or false", str: "a string", dict: "a table"}
 _UNKNOWN = "extra_forbidden"  # pydantic's word for a key that does not exist
+_SAID = "said"  # of a refusal that says itself what is expected
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,6 +21,11 @@ class Expected:
     """Says in a field's annotation what is expected where type and range alone do not."""
 
     text: str
+
+
+def refused(expected: str, got: str) -> PydanticCustomError:
+    """Return what a validator raises that knows better than the field's type what is wrong, but not where it stands."""
+    return PydanticCustomError(_SAID, "{expected}", {"expected": expected, "got": got})
 
 
 def refusal(error: ValidationError, model: type[BaseModel], place: Callable[[str], str]) -> DockairError:
@@ -42,6 +49,8 @@ def refusal(error: ValidationError, model: type[BaseModel], place: Callable[[str
         name = str(first["loc"][-1])
         exists = [*sorted(_model_at(model, first["loc"][:-1]).model_fields), *_elsewhere(model, name)]
         return DockairError(where, expected="a known key", got=name, exists=exists, also=also)
+    if first["type"] == _SAID:
+        return DockairError(where, **first["ctx"], also=also)
     field = _field_at(model, first["loc"])
     if first["type"] == "missing":
         return DockairError(where, expected=_expected(field), also=also)

@@ -5,13 +5,13 @@ TOML file from the plan's folder.
 """
 
 import operator
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field
 
 from dockair.scenarios.campaign.draws import Draw, SamplerName
-from dockair.scenarios.refusal import Expected
+from dockair.scenarios.refusal import Expected, refused
 from dockair.scenarios.tables.table import Table, tuple_from_list
 from dockair.streams import LARGEST_SEED
 
@@ -30,16 +30,26 @@ def flat(value: Any, is_value: Callable[[dict[str, Any]], bool] = operator.not_)
     Args:
         value: as it was read.
         is_value: whether a table is one of the values; an empty one by default, as `--set` takes it.
+
+    Raises:
+        PydanticCustomError: a key is there twice, dotted and in its table: one of its values would go unsaid.
     """
     if not isinstance(value, dict):
         return value
     level: dict[str, Any] = {}
-    for key, entry in value.items():
-        if isinstance(entry, dict) and not is_value(entry):
-            level |= {f"{key}.{name}": inner for name, inner in flat(entry, is_value).items()}
-        else:
-            level[key] = entry
+    for key, entry in _dotted(value, is_value):
+        if key in level:
+            raise refused("every key once", f"{key}, twice")
+        level[key] = entry
     return level
+
+
+def _dotted(table: dict[str, Any], is_value: Callable[[dict[str, Any]], bool]) -> Iterator[tuple[str, Any]]:
+    for key, entry in table.items():
+        if isinstance(entry, dict) and not is_value(entry):
+            yield from ((f"{key}.{name}", inner) for name, inner in _dotted(entry, is_value))
+        else:
+            yield key, entry
 
 
 def _flat_draws(value: Any) -> Any:

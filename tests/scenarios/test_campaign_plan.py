@@ -336,6 +336,22 @@ def test_every_packaged_plan_can_be_flown_and_says_what_for(name):
             'scenarios = ["default"]\n[draw."start.aft_m"]\nlow = 3.0\nhigh = 5.0\npoints = 7',
             'p.toml: draw."start.aft_m".points: expected none, or sampler = "grid": only a grid has points, got 7',
         ),
+        (
+            'scenarios = ["default"]\n[set]\n"start.aft_m" = 3.0\n[set.start]\naft_m = 4.0',
+            "p.toml: set: expected every key once, got 'start.aft_m, twice'",
+        ),
+        (
+            'scenarios = ["default"]\n[set.parameters.hose]\nlength_m = 14.0\n[set.parameters]\n"hose.length_m" = 15.0',
+            "p.toml: set: expected every key once, got 'parameters.hose.length_m, twice'",
+        ),
+        (
+            'scenarios = ["night", { scenario = "default", set = { start = { aft_m = 3.0 }, "start.aft_m" = 3.0 } }]',
+            "p.toml: scenarios[1].set: expected every key once, got 'start.aft_m, twice'",
+        ),
+        (
+            'scenarios = ["default"]\n[draw."start.aft_m"]\nlow = 3.0\nhigh = 4.0\n[draw.start.aft_m]\nvalues = [4.0]',
+            "p.toml: draw: expected every key once, got 'start.aft_m, twice'",
+        ),
         ('scenarios = ["default"]\nseeds = [9223372036854775808]', "p.toml: seeds"),
         ("scenarios = [", "p.toml: expected TOML"),
     ],
