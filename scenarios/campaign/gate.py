@@ -9,7 +9,7 @@ with a probability below false_alarm in all (the union bound), whatever the flig
 another scenario's. Within a test flights must be independent, so that no seed may occur twice there: its flights share
 gusts and hardware. A flight that ends in an error is no success.
 
-Unsafe contacts and errors are counted, not tested: the bound says nothing of these limits.
+Unsafe flights and errors are counted, not tested: the bound says nothing of these limits.
 """
 
 import math
@@ -71,7 +71,7 @@ def judge(gate: Gate, rows: Sequence[Mapping[str, Any]]) -> Verdict:
         if not test.passed
     ]
     if unsafe > gate.unsafe_max:
-        reasons.append(f"{counted(unsafe, 'flight')} with an unsafe contact, allowed {gate.unsafe_max}")
+        reasons.append(f"{counted(unsafe, 'unsafe flight')}, allowed {gate.unsafe_max}")
     if errors > gate.errors_max:
         reasons.append(f"{counted(errors, 'flight')} ended in an error, allowed {gate.errors_max}")
     return Verdict(

@@ -86,7 +86,7 @@ class Gate(RatesAsked):
     """When the campaign has failed; the rates are asked of every scenario by itself."""
 
     false_alarm: float = Field(default=0.001, gt=0.0, lt=0.5)  #: of all tests of rates together
-    unsafe_max: int = Field(default=0, ge=0)  #: flights with an unsafe contact, in all
+    unsafe_max: int = Field(default=0, ge=0)  #: flights in which anything was unsafe, in all
     errors_max: int = Field(default=0, ge=0)  #: flights that ended in an error, in all
     scenarios: dict[str, Any] = {}  #: scenario -> rates instead of those for all
 

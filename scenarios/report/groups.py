@@ -213,7 +213,7 @@ class Group:
 
     @property
     def unsafe(self) -> list[Row]:
-        """Flights with an unsafe contact."""
+        """Flights in which anything was unsafe."""
         return [row for row in self.flown if row["unsafe"]]
 
     @cached_property

@@ -74,11 +74,13 @@ def test_a_scenario_may_be_asked_for_a_rate_of_its_own():
     ]
 
 
-def test_one_unsafe_contact_fails_the_gate_and_so_does_one_error():
+def test_one_unsafe_flight_fails_the_gate_and_so_does_one_error():
     gate = Gate()
     assert judge(gate, rows(5, 5)).passed
     unsafe = judge(gate, rows(5, 5) + rows(1, 1, unsafe="3.1 m/s"))
-    assert unsafe.reasons == ("1 flight with an unsafe contact, allowed 0",)
+    assert unsafe.reasons == ("1 unsafe flight, allowed 0",)
+    struck = judge(gate, rows(2, 2, unsafe="collision with hose_3"))  # no contact, and unsafe all the same
+    assert struck.reasons == ("2 unsafe flights, allowed 0",)
     broken = judge(gate, rows(5, 5) + rows(0, 1, error="ValueError: no", outcome="error"))
     assert broken.reasons == ("1 flight ended in an error, allowed 0",)
     assert judge(Gate(errors_max=1), rows(0, 1, error="x", outcome="error")).passed

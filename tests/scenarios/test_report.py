@@ -329,6 +329,22 @@ def test_an_unsafe_flight_says_so_in_its_story():
     assert "<td>1: contact 0.05 m off; unsafe: touch at 3.10 m/s</td>" in line
 
 
+def test_the_page_says_of_every_kind_of_unsafe_flight_that_it_is_counted():
+    text = " ".join(page("made", [_campaign([_row(4)])]).split())
+    said = text[text.index("<i>Unsafe</i>") : text.index("<i>Accepted</i>")]
+    for kind in ("too fast or outside the basket", "marked unusable", "collision", "departure from controlled flight"):
+        assert kind in said
+
+
+def test_the_time_beyond_three_sigmas_is_told_as_the_mean_of_the_flights_however_long_they_lasted():
+    headings = ("turned_deg", "error_deg", "sigma_deg", "error_rms_deg", "error_max_deg")
+    figures = {f"heading_{name}": 1.0 for name in headings}
+    parts = [{"heading_beyond_3_sigma": part, "duration_s": long} for part, long in ((0.1, 90.0), (0.02, 10.0))]
+    rows = [_row(seed, **figures, **part) for seed, part in enumerate(parts)]
+    text = " ".join(page("made", [_campaign(rows)]).split())
+    assert "beyond three of its standard deviations for 6.0 % of a flight on average." in text
+
+
 def test_a_flight_that_lost_the_drogue_after_a_good_contact_had_docked_by_then():
     """Good at the first of three attempts, the drogue lost before refuelling, and tried again."""
     went_on = _row(0, attempts=[_attempt(1), _attempt(2, "miss", 0.4, "gust"), _attempt(3, "given_up", 0.3, "gust")])
