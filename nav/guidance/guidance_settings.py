@@ -78,8 +78,8 @@ class GuidanceSettings:
     join_up_speed_m_s: float = 1.5  # assumed: walking pace, as in practice from some tens of metres
     back_off_speed_m_s: float = 1.0  # breakaway practice 1-2 m/s
     response_s: tuple[float, float, float] = (0.28, 0.10, 0.10)  # tau: delay of the tip, computing included
-    acceleration_limit_m_s2: tuple[float, float, float] = (0.75, 1.9, 2.53)  # less than the flight control's
-    jerk_limit_m_s3: tuple[float, float, float] = (3.8, 6.6, 10.1)  # likewise
+    acceleration_limit_m_s2: tuple[float, float, float] = (0.76, 2.85, 5.7)  # 0.95 of the fighter's flight control
+    jerk_limit_m_s3: tuple[float, float, float] = (3.8, 12.825, 28.5)  # likewise
     #: Left and up, of both limits, until committed. With all of them a receiver that runs up by camera met gusts with
     #: its surfaces at their rates, and was thrown a metre aside; what needs more than this share is no calm moment.
     patient_share: tuple[float, float] = (0.6, 0.45)

@@ -56,18 +56,18 @@ SETTLE_S = 12.0  # hose and gusts run this long before the flight: several perio
 #: Of an attempt, its hold apart: 5 s of approach, 3.5 until the hose is pushed in, 7.5 until the probe is clear again.
 #: One begun so long before a flight's time is over still ends, unless its hold is long in coming to a green light.
 ATTEMPT_S = 16.0
+_NOMINAL = GuidanceSettings()
 RESPONSE_S = {  # delay of the probe's tip forward, left, up, behind a command at 0.1-0.4 Hz, a control tick included
-    "fighter": (0.28, 0.10, 0.10),
+    "fighter": _NOMINAL.response_s,
     "unmanned": (0.40, 0.25, 0.10),
 }
 #: What of the tip's motion besides its commands is taken for straying. The unmanned airframe's answer sideways falls
 #: off with frequency, and what it lacks does not die away: left 0.4 s ahead is foretold within 59 mm without, 61 with;
 #: up 0.3 s ahead within 98 without, 52 with (moderate gusts, seeds 21500-21503, measured LEDs). Forward nothing is
 #: gained, and on the probe it went in by 3.07 m, not 2.39, where 2.5 is the most (perfect navigation, seed 3).
-STRAYING_LIMIT_M_S = {"fighter": (0.5, 0.5, 0.5), "unmanned": (0.0, 0.0, 0.5)}
+STRAYING_LIMIT_M_S = {"fighter": _NOMINAL.predictive.straying_limit_m_s, "unmanned": (0.0, 0.0, 0.5)}
 COMMANDED = 0.95  # of the accelerations that the flight control flies: what it cut off would be missing in guidance
 FRAMES_STOP = 2.5  # periods of a slow camera without a frame: one that is late is no failure
-STAND_OFF_M = 4.0  # pre-contact: procedures say 3-5 m behind the drogue
 
 T = TypeVar("T")
 
@@ -181,7 +181,7 @@ def guidance_settings(scenario: Scenario) -> GuidanceSettings:
 
     Where the probe is mounted is measured on the ground, and goes in as the scenario sets it (`nominal_sheets`).
     """
-    g, duration_s, nominal = scenario.guidance, scenario.flight.duration_s, GuidanceSettings()
+    g, duration_s = scenario.guidance, scenario.flight.duration_s
     density = standard_atmosphere(scenario.flight.altitude_m).density_kg_m3
     pressure_pa = 0.5 * density * scenario.flight.airspeed_m_s**2
     mounting = _sheet(scenario, scenario.hardware.receiver_sheet("mounting"), MountingParameters)
@@ -192,7 +192,7 @@ def guidance_settings(scenario: Scenario) -> GuidanceSettings:
     attempt_s = ATTEMPT_S + g.hold_s
     limits = PhaseLimits(
         rim_m=0.5 * nominal_ring(scenario).diameter_m,
-        frames_stop_s=max(nominal.limits.frames_stop_s, FRAMES_STOP / scenario.rates.camera_hz),
+        frames_stop_s=max(_NOMINAL.limits.frames_stop_s, FRAMES_STOP / scenario.rates.camera_hz),
         attempts_max=g.attempts_max,
         slot_s=duration_s - attempt_s if duration_s >= 2.0 * attempt_s else float("inf"),
         stabilise_s=g.stabilise_s,
@@ -204,10 +204,9 @@ def guidance_settings(scenario: Scenario) -> GuidanceSettings:
     push = BowWavePush(source_from_tip_m=(x, y, z), radius_m=bow_wave.radius_m).at_pressure(pressure_pa)
     return GuidanceSettings(
         controller=g.controller,
-        stand_off_m=STAND_OFF_M,
         closure_speed_m_s=g.closure_speed_m_s,
-        closure_acceleration_m_s2=min(nominal.closure_acceleration_m_s2, acceleration_limit[0]),
-        closing=nominal.closing.braked_at(acceleration_limit[0]),
+        closure_acceleration_m_s2=min(_NOMINAL.closure_acceleration_m_s2, acceleration_limit[0]),
+        closing=_NOMINAL.closing.braked_at(acceleration_limit[0]),
         response_s=RESPONSE_S[scenario.hardware.airframe],
         acceleration_limit_m_s2=acceleration_limit,
         jerk_limit_m_s3=_commanded(control.jerk_limit_m_s3),

@@ -6,7 +6,7 @@ import pytest
 from dockair.nav.guidance.command_limits import CommandLimits
 from dockair.nav.guidance.guidance_settings import GuidanceSettings
 
-SETTINGS = GuidanceSettings()
+SETTINGS = GuidanceSettings(acceleration_limit_m_s2=(0.75, 1.9, 2.53), jerk_limit_m_s3=(3.8, 6.6, 10.1))
 FASTEST_M_S = SETTINGS.velocity_limit_m_s
 ACCELERATION, JERK = np.array(SETTINGS.acceleration_limit_m_s2), np.array(SETTINGS.jerk_limit_m_s3)
 

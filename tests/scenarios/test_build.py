@@ -90,6 +90,15 @@ def test_no_approach_is_begun_that_would_not_end_with_its_hold_within_the_flight
     assert settings.limits.slot_s == slot_s
 
 
+def test_who_tells_guidance_nothing_flies_with_the_limits_of_the_default_flight():
+    """As a navigator of one's own does (examples/own_navigator.py)."""
+    flown, untold = guidance_settings(load_scenario("default")), GuidanceSettings()
+    for name in ("acceleration_limit_m_s2", "jerk_limit_m_s3"):
+        np.testing.assert_allclose(getattr(untold, name), getattr(flown, name), rtol=1e-12)
+    for name in ("response_s", "stand_off_m", "closure_speed_m_s", "closure_acceleration_m_s2", "closing"):
+        assert getattr(untold, name) == getattr(flown, name)
+
+
 def test_guidance_knows_the_rim_of_the_ring_that_is_flown(tmp_path):
     """As the referee and the claim of contact do: between two rims a tip is in the basket of one of them."""
     ring = tmp_path / "ring.toml"
