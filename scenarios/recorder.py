@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Self
 
 from dockair.errors import DockairError
 from dockair.messages import LedObservation
+from dockair.scenarios.campaign.jobs import scenario_hash
 from dockair.scenarios.flight_log import FlightLog
 from dockair.scenarios.judgement.causes import flown_of
 from dockair.scenarios.judgement.referee import Outcome
@@ -115,7 +116,7 @@ class Recorder:
                 place,
                 self._log,
                 flight.sheets,
-                name=f"{result.scenario}-{result.seed}",
+                name=f"{result.scenario}-{result.seed}-{scenario_hash(flight.scenario)}",
                 shapes=shapes_of(flight.world.model),
                 messages=read_messages(folder, pixels=False) if self._messages is not None else (),
                 summary=summary_of(result),

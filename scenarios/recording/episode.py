@@ -48,7 +48,7 @@ def write_episode(
         out_dir: where to.
         log: the flight.
         sheets: the navigation's; the believed ring is projected with them.
-        name: of the recording, as the viewer shows it.
+        name: of the recording, as the viewer shows it; it puts recordings of one name together as one flight.
         shapes: the world's primitives.
         messages: of the same control ticks, for the frames; empty for a recording without frames.
         summary: Markdown shown beside the plots.

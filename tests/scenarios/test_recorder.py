@@ -18,8 +18,14 @@ REPLAY = {MESSAGES, ESTIMATES, NAVIGATOR}
 TIMES_OF_DAY = ("wall_time_s", "real_time_factor", "out_dir")
 
 
-def _short(name: str, seconds: float):
-    return load_scenario(name, {"flight.duration_s": seconds})
+def _short(name: str, seconds: float, **settings):
+    return load_scenario(name, {"flight.duration_s": seconds} | settings)
+
+
+def _recording_id(folder) -> str:
+    from rerun.chunk import RrdReader
+
+    return RrdReader(folder / "episode.rrd").recordings()[0].recording_id
 
 
 @pytest.fixture(scope="module")
@@ -37,6 +43,18 @@ def test_a_flight_on_the_truth_leaves_no_messages_and_says_so(tmp_path):
     assert written["truth_navigation"] is True
     assert written["shortfalls"] == ["outcome timeout, wanted contact"]
     assert "perfect" in summary_of(result)
+
+
+def test_recordings_are_one_to_the_viewer_where_scenario_settings_and_seed_are(tmp_path):
+    """It puts recordings of one id together, as if all were one flight."""
+    farther = {"start.aft_m": 9.0}
+    flights = {"first": (0, {}), "again": (0, {}), "seed": (1, {}), "set": (0, farther), "set again": (0, farther)}
+    for name, (seed, settings) in flights.items():
+        fly(_short("truth_navigation", 0.1, **settings), seed, tmp_path / name)
+    found = {name: _recording_id(tmp_path / name) for name in flights}
+    assert found["first"] == found["again"] and found["set"] == found["set again"]
+    assert len(set(found.values())) == 3
+    assert found["first"].startswith("truth_navigation-0-")
 
 
 def test_without_a_folder_nothing_is_written(tmp_path, monkeypatch):
