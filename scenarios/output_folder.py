@@ -1,7 +1,8 @@
 """Where results are written: a flight's into an empty folder or over an earlier flight, never over others' files.
 
 An earlier flight is replaced by a whole one only: while a flight goes on its files are in a folder within, and a lock
-keeps other flights out.
+keeps other flights out. Files are put in place one by one; `result.json`, which says that a flight is whole, is the
+first to go and the last to come.
 """
 
 import os
@@ -14,9 +15,10 @@ from pathlib import Path
 from dockair.errors import DockairError
 from dockair.scenarios.file_lock import LockFile
 
-#: What a flight writes; only these are ever replaced.
+_SAYS_WHOLE = "result.json"  # of a flight's files: where it is, all the others are, and of the same flight
+
+#: What a flight writes, in the order in which it is put in place; only these are ever replaced.
 FLIGHT_FILES = (
-    "result.json",
     "episode.rrd",
     "flight.parquet",
     "flight.png",
@@ -24,6 +26,7 @@ FLIGHT_FILES = (
     "estimates.parquet",
     "navigator.json",
     "as_built.json",
+    _SAYS_WHOLE,
 )
 
 _UNDER_WAY, _LOCK = ".flight", ".flight.lock"  # what a flight that was killed has left is the next one's to remove
@@ -90,6 +93,7 @@ class FlightFolder:
     def keep(self) -> None:
         """Put the files of the flight that is over in the place of an earlier one's; other files stay."""
         written = {path.name for path in self.under_way.iterdir()}
+        (self._folder / _SAYS_WHOLE).unlink(missing_ok=True)  # the earlier flight's: soon it is not whole
         for name in FLIGHT_FILES:
             if name in written:
                 (self.under_way / name).replace(self._folder / name)

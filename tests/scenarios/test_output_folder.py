@@ -2,6 +2,9 @@
 
 import os
 import signal
+from functools import partial
+from itertools import count
+from pathlib import Path
 from types import SimpleNamespace
 
 import mujoco
@@ -48,7 +51,7 @@ def test_an_earlier_flights_files_go_when_the_next_one_is_whole_and_others_stay(
 
 
 def killed(flight) -> int:
-    """Do what a flight does in a process that is then killed; return the number that it gave."""
+    """Do what a flight does in a process that is then killed; return the number that it gave, 0 of none."""
     reader, writer = os.pipe()
     process = os.fork()
     if process == 0:
@@ -57,9 +60,9 @@ def killed(flight) -> int:
         finally:
             os.kill(os.getpid(), signal.SIGKILL)
     os.waitpid(process, 0)
+    os.close(writer)  # of one that gave none the reader is at the end
     given = int.from_bytes(os.read(reader, 4), "little")
     os.close(reader)
-    os.close(writer)
     return given
 
 
@@ -74,6 +77,40 @@ def test_what_a_killed_flight_has_left_is_no_obstacle_and_no_part_of_the_next(tm
     assert list(flight.under_way.iterdir()) == []
     flight.keep()
     assert list((tmp_path / "out").iterdir()) == []
+
+
+def test_a_flight_that_is_killed_while_it_is_kept_never_looks_whole(tmp_path, monkeypatch):
+    """Killed before its first file is moved, before its second, and so on, over an earlier flight of all files."""
+    written = [name for name in FLIGHT_FILES if name != "messages.parquet"]
+    replace, unlink = Path.replace, Path.unlink
+    left: list[bool] = []
+
+    def kept_until(step: int) -> int:
+        steps = iter(range(step))
+
+        def counted(act, *arguments, **options):
+            if next(steps, None) is None:
+                os.kill(os.getpid(), signal.SIGKILL)
+            return act(*arguments, **options)
+
+        flight = FlightFolder(tmp_path / str(step))
+        for name in written:
+            (flight.under_way / name).write_text("new")
+        monkeypatch.setattr(Path, "replace", lambda *arguments: counted(replace, *arguments))
+        monkeypatch.setattr(Path, "unlink", lambda *arguments, **which: counted(unlink, *arguments, **which))
+        flight.keep()
+        return 1
+
+    for step in count():
+        folder = filled(tmp_path / str(step), *FLIGHT_FILES)
+        over = killed(partial(kept_until, step))
+        found = {name: (folder / name).read_text() for name in FLIGHT_FILES if (folder / name).exists()}
+        is_whole = found in (dict.fromkeys(written, "new"), {name: name for name in FLIGHT_FILES})
+        assert is_whole or "result.json" not in found
+        left.append(is_whole)
+        if over:
+            break
+    assert left[0] and left[-1] and not all(left) and len(left) > len(FLIGHT_FILES)
 
 
 def test_a_fork_of_a_killed_flight_does_not_keep_the_folder(tmp_path):
