@@ -1,4 +1,4 @@
-"""Writes a file whole or not at all, whenever the process is killed."""
+"""Writes a file whole or not at all, whenever the process is killed or the power goes."""
 
 import errno
 import os
@@ -8,13 +8,15 @@ from dockair.errors import DockairError, MachineError
 
 PART = ".part"  #: ends the name of a file that is being written
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)  #: of an OSError, where the disk is to blame
+_NO_SYNC = (errno.EINVAL, errno.ENOTSUP, errno.ENOSYS)  # of a file system that waits for files alone
 
 
 def write_whole(path: Path, data: bytes) -> None:
-    """Write a file beside its place, wait for the disk, and put it there.
+    """Write a file beside its place, wait for the disk, and put it there; when this returns, it outlives a power cut.
 
     Raises:
         MachineError: there is no room; what was there is as it was.
+        OSError: the disk fails.
     """
     part = path.with_name(path.name + PART)
     try:
@@ -29,6 +31,41 @@ def write_whole(path: Path, data: bytes) -> None:
             raise
         remedy = "make some and give the same command again: what was there before is kept"
         raise MachineError(str(path), expected="room to write", remedy=remedy) from None
+    sync_folder(path.parent)
+
+
+def sync_folder(folder: Path) -> None:
+    """Wait until the disk has what a folder's files are called.
+
+    A file that was made or renamed may else be gone, or have its old name, after a power cut, though the disk has all
+    that it holds. Rows that are added to a file change no name.
+
+    Raises:
+        OSError: the disk fails.
+    """
+    try:
+        file = os.open(folder, os.O_RDONLY)
+    except OSError:  # Windows opens no folder, and nobody one that may be written and not read: the files in it
+        return  # are whole all the same, and there is no other way to wait for their names
+    try:
+        os.fsync(file)
+    except OSError as error:
+        if error.errno not in _NO_SYNC:
+            raise
+    finally:
+        os.close(file)
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder, and those that it is in, where there is none; they outlive a power cut.
+
+    Raises:
+        OSError: it cannot be made.
+    """
+    missing = [place for place in (folder, *folder.parents) if not place.exists()]
+    folder.mkdir(parents=True, exist_ok=True)
+    for made in missing:
+        sync_folder(made.parent)
 
 
 def write_text(text: str, path: Path) -> Path:
@@ -44,7 +81,7 @@ def write_text(text: str, path: Path) -> Path:
     try:
         if path.is_dir():
             raise DockairError(where, expected=expected, got="a folder")
-        path.parent.mkdir(parents=True, exist_ok=True)
+        make_folder(path.parent)
         if path.exists() and not path.is_file():
             path.write_text(text, encoding="utf-8")
         else:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from dockair.errors import DockairError
 from dockair.scenarios.campaign import journal, manifest, table
-from dockair.scenarios.whole_file import PART
+from dockair.scenarios.whole_file import PART, make_folder
 
 SUMMARY, TIMING = "summary.json", "timing.json"
 RESULTS = (table.FILE_NAME, SUMMARY, TIMING)  #: written at the end
@@ -34,7 +34,7 @@ def make(folder: Path, *, fresh: bool = False) -> None:
     """
     check(folder, fresh=fresh)
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        make_folder(folder)
     except OSError as error:
         raise DockairError(f"--out {folder}", expected="a folder that can be written", got=error.strerror) from None
 

@@ -13,7 +13,7 @@ from typing import Any, Self
 from dockair.errors import DockairError, MachineError
 from dockair.scenarios.campaign.row import is_row
 from dockair.scenarios.file_lock import has_locked
-from dockair.scenarios.whole_file import NO_ROOM
+from dockair.scenarios.whole_file import NO_ROOM, sync_folder
 
 FILE_NAME = "journal.jsonl"
 _BEGINS = b'{"key": "'  # every entry, as `append` is given it
@@ -45,6 +45,7 @@ class Journal:
             if not unread:
                 self.entries, self._size = read(self.path)
                 os.ftruncate(self._file, self._size)
+            sync_folder(folder)  # once: it may have been made just now, and rows are on the disk only if it is
         except BaseException:
             os.close(self._file)
             raise
