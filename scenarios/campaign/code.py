@@ -1,4 +1,4 @@
-"""The code that flies a campaign: every file that decides a flight, and whether one has changed since it began.
+"""The code that flies a campaign: every file that decides a flight or its row, and whether one has changed meanwhile.
 
 Processes begin all through a campaign, and each imports the sources and reads the sheets as they are at that moment.
 The files are therefore looked at again before a process begins and before a row is written down: whatever the journal
@@ -19,11 +19,17 @@ from dockair.errors import DockairError
 from dockair.scenarios.assembly.measured import FITTED_IN
 from dockair.scenarios.campaign.jobs import Job
 
-#: Beginnings of names in `scenarios` whose files show, compare or plan flights and do not fly them; library and plans
-#: are in the jobs' keys, but for what of the library decides flights of other scenarios.
-_NOT_FLOWN = tuple(
-    "allan bench campaign cli design_ring doctor library output parameters_page picture plans recording replay report "
-    "reproduce statistics".split()
+#: What of `scenarios` decides neither a flight nor its row; whatever is not named here counts. Plans, the library and
+#: what reads plans are in the jobs' keys, but for what of the library decides flights of other scenarios.
+_NOT_FLOWN = frozenset(
+    # commands, pages, pictures; files that a flight of a campaign does not write, and how a file is written
+    "allan_tool.py bench cli.py commands design_ring display.py doctor.py envs file_lock.py judgement/no_attempt.py "
+    "library message_log.py output_folder.py parameters_page.py picture plans recording replay.py report reproduce "
+    "reproductions_page.py statistics.py std_streams.py whole_file.py "
+    # of the campaign what plans before its flights, or keeps, counts and shows their rows as they are
+    "campaign/code.py campaign/draws.py campaign/dry_run.py campaign/folder.py campaign/gate.py campaign/journal.py "
+    "campaign/manifest.py campaign/plan.py campaign/plan_file.py campaign/points.py campaign/progress.py "
+    "campaign/summary.py campaign/table.py".split()
 )
 _OF_ALL = f"library/{FITTED_IN}.toml"  # its light, against which `assembly.measured` holds a scenario's own
 _NO_SOURCES = (".pyc", ".nbi", ".nbc", ".md", "~", "#")  # ends of names: caches, documents, what editors leave
@@ -110,15 +116,20 @@ def code_of(jobs: Sequence[Job]) -> Code:
 
 
 def dockair_files() -> dict[str, Path]:
-    """Return Dockair's files that decide a flight: world, sensors, navigation, loop, parameters."""
+    """Return Dockair's files that decide a flight or its row: world, sensors, navigation, loop, parameters, worker."""
     package = Path(dockair.__file__).parent
     found = {f"{package.name}/{path.name}": path for path in package.glob("*.py")}
     for folder in (package / name for name in ("sim", "nav", "scenarios", "assets")):
         for path in _files_below(folder):
             name = path.relative_to(folder).as_posix()
-            if not (folder.name == "scenarios" and name.startswith(_NOT_FLOWN) and name != _OF_ALL):
+            if folder.name != "scenarios" or _is_flown(name):
                 found[f"{folder.name}/{name}"] = path
     return found
+
+
+def _is_flown(name: str) -> bool:
+    """Whether a file of `scenarios` decides a flight or its row."""
+    return name == _OF_ALL or not {name, name.partition("/")[0]} & _NOT_FLOWN
 
 
 def plug_in_files(module: str) -> dict[str, Path]:

@@ -19,12 +19,13 @@ from types import SimpleNamespace
 import pytest
 from rich.console import Console
 
+import dockair
 from dockair.errors import DockairError, MachineError
 from dockair.scenarios import cli
 from dockair.scenarios.campaign import manifest
 from dockair.scenarios.campaign import pool as pool_module
 from dockair.scenarios.campaign import run as run_module
-from dockair.scenarios.campaign.code import Code, plug_in_files
+from dockair.scenarios.campaign.code import _NOT_FLOWN, Code, dockair_files, plug_in_files
 from dockair.scenarios.campaign.dry_run import dry_run
 from dockair.scenarios.campaign.folder import rows_of
 from dockair.scenarios.campaign.jobs import jobs_of
@@ -343,7 +344,29 @@ def test_a_background_left_to_the_machine_is_the_same_in_every_process(here, tmp
         ("assets/parameters/hose.toml", True),
         ("scenarios/loop.py", True),
         ("messages.py", True),
+        ("scenarios/judgement/result.py", True),
+        ("scenarios/campaign/row.py", True),  # what a row says of a flight
+        ("scenarios/campaign/worker.py", True),
+        ("scenarios/campaign/pool.py", True),  # when a flight is given up, and how many threads it has
+        ("scenarios/campaign/jobs.py", True),
+        ("scenarios/campaign/run.py", True),
+        ("scenarios/campaign/new.py", True),  # whatever comes counts until somebody has said that it does not
+        ("scenarios/new.py", True),
+        ("scenarios/new/part.py", True),
+        ("scenarios/reporter.py", True),  # that it begins as `report` says nothing
+        ("scenarios/campaign/draws.py", False),  # the jobs' keys have what is drawn
+        ("scenarios/campaign/progress.py", False),
+        ("scenarios/campaign/summary.py", False),
+        ("scenarios/cli.py", False),
+        ("scenarios/commands/campaign.py", False),
+        ("scenarios/display.py", False),
+        ("scenarios/envs/dock.py", False),
+        ("scenarios/reproductions_page.py", False),
+        ("scenarios/std_streams.py", False),
+        ("scenarios/recording/episode.py", False),  # no campaign records
+        ("scenarios/message_log.py", False),
         ("scenarios/report/page.py", False),
+        ("scenarios/reproduce/world/static.py", False),
         ("scenarios/library/still_air.toml", False),  # the job's key has it
         ("scenarios/library/default.toml", True),  # in its light the measurement model was fitted: others fly it, too
         ("nav/README.md", False),
@@ -362,6 +385,37 @@ def test_the_digest_of_the_code_is_of_what_decides_flights(tmp_path, monkeypatch
         path.write_text(text)
         digests.append(Code().digest)
     assert (digests[0] != digests[1]) is counts
+
+
+def test_whatever_the_digest_leaves_out_by_name_is_there():
+    assert [name for name in _NOT_FLOWN if not (Path(dockair.__file__).parent / "scenarios" / name).exists()] == []
+
+
+#: Flies a job as a worker does, says what of Dockair that imported.
+IMPORTS = """
+import pickle, sys
+from pathlib import Path
+from dockair.scenarios.campaign.jobs import jobs_of
+from dockair.scenarios.campaign.plan_file import PlanFile
+from dockair.scenarios.campaign.worker import Order, fly_order
+
+for job in jobs_of(PlanFile(Path(sys.argv[1]))):
+    fly_order(Order(seed=job.seed, key=job.key, pickled=pickle.dumps(job)))
+print(*(module.__file__ for name, module in sys.modules.items() if name.partition(".")[0] == "dockair"), sep="\\n")
+"""
+
+
+def test_what_a_flight_imports_counts_but_for_what_names_and_keeps_flights(tmp_path):
+    flights = '"truth_navigation", { scenario = "still_air", set = { "camera.sensing" = "measurements" } }'
+    plan(tmp_path, 1, "[set]\nflight.duration_s = 0.1", flights)
+    command = [sys.executable, "-c", IMPORTS, str(tmp_path / "p.toml")]
+    said = subprocess.run(command, capture_output=True, text=True, check=True).stdout.split("\n")
+    counted, package = {path.resolve() for path in dockair_files().values()}, Path(dockair.__file__).parent
+    imported = {Path(file).resolve() for file in said if file}
+    not_counted = {path.relative_to((package / "scenarios").resolve()).as_posix() for path in imported - counted}
+    assert len(imported & counted) > 100
+    names = {f"campaign/{name}.py" for name in ("draws", "plan", "plan_file", "points")}  # the jobs' keys have that
+    assert not_counted == names | {"file_lock.py", "message_log.py", "output_folder.py"}  # a row's flight has no folder
 
 
 #: Never flown: all flights here are made up.
