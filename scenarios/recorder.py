@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Self
 
 from dockair.errors import DockairError
 from dockair.messages import LedObservation
-from dockair.scenarios.campaign.jobs import scenario_hash
 from dockair.scenarios.flight_log import FlightLog
 from dockair.scenarios.judgement.causes import flown_of
 from dockair.scenarios.judgement.referee import Outcome
 from dockair.scenarios.judgement.result import Result, held_to, summarise
 from dockair.scenarios.message_log import MessageLog, read_messages
 from dockair.scenarios.output_folder import FlightFolder, utf8_path_of
+from dockair.scenarios.scenario_hash import scenario_hash
 
 if TYPE_CHECKING:  # the loop imports this module
     from dockair.scenarios.loop import Flight, Tick

@@ -10,7 +10,6 @@ import re
 import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from hashlib import blake2b
 from pathlib import Path
 from typing import Any
 
@@ -20,11 +19,9 @@ from dockair.scenarios.campaign.draws import Point
 from dockair.scenarios.campaign.plan import Entry
 from dockair.scenarios.campaign.plan_file import PlanFile
 from dockair.scenarios.campaign.points import points_of, refuse_too_many, seeds_of
-from dockair.scenarios.scenario_file import ScenarioFile
+from dockair.scenarios.scenario_hash import SAYS_NOTHING_OF_THE_FLIGHT, SHEETS, file_hash, scenario_hash
 from dockair.scenarios.schema import Scenario, load_scenario
 
-_SAYS_NOTHING_OF_THE_FLIGHT = {"seed", "claim", "accept"}  # of a scenario's keys; the seed is the job's
-_SHEETS = ("camera", "ring")  # of the keys of [hardware]: paths
 _STRENGTHS = ("turbulence.sigma_m_s", "turbulence.intensity")
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 
@@ -134,34 +131,6 @@ def with_background(job: Job, background: str) -> Job:
     return replace(job, scenario=job.scenario.model_copy(update={"camera": drawn}))
 
 
-def scenario_hash(scenario: Scenario) -> str:
-    """Return a digest of all that decides a flight but its seed, the sheets that the scenario names included."""
-    table = scenario.model_dump(mode="json", exclude=_SAYS_NOTHING_OF_THE_FLIGHT)
-    table["hardware"] = _sheets_by_content(table["hardware"])
-    return blake2b(json.dumps(table, sort_keys=True).encode(), digest_size=8).hexdigest()
-
-
-def file_hash(file: str) -> str:
-    """Return a digest of what a scenario's file says of the flight, the sheets that it names by what they hold."""
-    table = {
-        key: value for key, value in ScenarioFile(file, {}).table.items() if key not in _SAYS_NOTHING_OF_THE_FLIGHT
-    }
-    hardware = table.get("hardware")
-    if isinstance(hardware, dict):
-        table["hardware"] = _sheets_by_content(hardware)
-    return blake2b(json.dumps(table, sort_keys=True, default=str).encode(), digest_size=8).hexdigest()
-
-
-def _sheets_by_content(hardware: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the table with digests for the paths of sheets, which are written otherwise from another folder."""
-    return {
-        key: blake2b(Path(value).read_bytes(), digest_size=8).hexdigest()
-        if key in _SHEETS and isinstance(value, str) and Path(value).is_file()
-        else value
-        for key, value in hardware.items()
-    }
-
-
 def _layers(source: PlanFile, index: int, entry: Entry, point: Point) -> Layers:
     return (
         (source.place("set.{key}"), _from_folder(source.plan.set, source.folder)),
@@ -173,7 +142,7 @@ def _layers(source: PlanFile, index: int, entry: Entry, point: Point) -> Layers:
 
 def _from_folder(settings: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     """Return settings with the paths of sheets taken from the plan's folder, as those of scenarios are."""
-    sheets = {f"hardware.{key}" for key in _SHEETS}
+    sheets = {f"hardware.{key}" for key in SHEETS}
     return {
         key: str(folder / value) if key in sheets and isinstance(value, str) else value
         for key, value in settings.items()
@@ -206,7 +175,7 @@ def _require_decisive(layers: Layers) -> None:
     """Refuse a key that decides nothing: a plan has seeds of its own, and claims hold of scenarios as they are."""
     for place, layer in layers:
         for key in layer:
-            if key.partition(".")[0] in _SAYS_NOTHING_OF_THE_FLIGHT:
+            if key.partition(".")[0] in SAYS_NOTHING_OF_THE_FLIGHT:
                 raise DockairError(place.replace("{key}", key), expected="a key that decides the flight", got=key)
 
 

@@ -8,9 +8,9 @@ summary says what it claims.
 
 from collections.abc import Sequence
 
-from dockair.scenarios.campaign.jobs import scenario_hash
 from dockair.scenarios.report.groups import Group, Row, file_and_settings
 from dockair.scenarios.scenario_file import scenario_names
+from dockair.scenarios.scenario_hash import scenario_hash
 from dockair.scenarios.schema import Scenario, load_scenario
 
 

@@ -8,9 +8,10 @@ from pathlib import Path
 import pytest
 
 from dockair.errors import DockairError
-from dockair.scenarios.campaign.jobs import as_toml, jobs_of, scenario_hash
+from dockair.scenarios.campaign.jobs import as_toml, jobs_of
 from dockair.scenarios.campaign.plan_file import PlanFile, plan_names
 from dockair.scenarios.scenario_file import scenario_names
+from dockair.scenarios.scenario_hash import scenario_hash
 from dockair.scenarios.schema import load_scenario
 from dockair.scenarios.toml_files import toml_value
 

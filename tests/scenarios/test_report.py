@@ -12,7 +12,6 @@ from matplotlib.figure import Figure
 from dockair.errors import DockairError
 from dockair.scenarios.campaign import manifest as manifests
 from dockair.scenarios.campaign import table
-from dockair.scenarios.campaign.jobs import scenario_hash
 from dockair.scenarios.campaign.row import COLUMNS
 from dockair.scenarios.judgement.causes import CAUSES
 from dockair.scenarios.report import figures
@@ -25,6 +24,7 @@ from dockair.scenarios.report.groups import NOT_SAID, Share, groups_of
 from dockair.scenarios.report.page import page
 from dockair.scenarios.report.pairs import beside_perfect_navigation, side_by_side
 from dockair.scenarios.report.timelines import timelines
+from dockair.scenarios.scenario_hash import scenario_hash
 from dockair.scenarios.schema import load_scenario
 from dockair.scenarios.statistics import wilson_interval
 

@@ -27,12 +27,12 @@ from dockair.nav.navigator import Navigator
 from dockair.nav.pose.planar import mirrored
 from dockair.rotations import Array, log
 from dockair.scenarios.campaign.code import Code
-from dockair.scenarios.campaign.jobs import scenario_hash
 from dockair.scenarios.judgement.metrics import normalised_error_squared, state_error
 from dockair.scenarios.loop import Flight
 from dockair.scenarios.output_folder import made_folder
 from dockair.scenarios.reproduce.fusion.wanted import WANTED
 from dockair.scenarios.reproduce.reference import picture_name
+from dockair.scenarios.scenario_hash import scenario_hash
 from dockair.scenarios.schema import Scenario, load_scenario
 from dockair.sim.truth import Truth
 

@@ -1,0 +1,39 @@
+"""Digests of what decides a flight: two that are equal name one flight, however it was written and from wherever."""
+
+import json
+from collections.abc import Mapping
+from hashlib import blake2b
+from pathlib import Path
+from typing import Any
+
+from dockair.scenarios.scenario_file import ScenarioFile
+from dockair.scenarios.schema import Scenario
+
+SHEETS = ("camera", "ring")  #: of the keys of [hardware]: paths
+SAYS_NOTHING_OF_THE_FLIGHT = {"seed", "claim", "accept"}  #: of a scenario's keys; the seed is told beside it
+
+
+def scenario_hash(scenario: Scenario) -> str:
+    """Return a digest of all that decides a flight but its seed, the sheets that the scenario names included."""
+    table = scenario.model_dump(mode="json", exclude=SAYS_NOTHING_OF_THE_FLIGHT)
+    table["hardware"] = _sheets_by_content(table["hardware"])
+    return blake2b(json.dumps(table, sort_keys=True).encode(), digest_size=8).hexdigest()
+
+
+def file_hash(file: str) -> str:
+    """Return a digest of what a scenario's file says of the flight, the sheets that it names by what they hold."""
+    table = {key: value for key, value in ScenarioFile(file, {}).table.items() if key not in SAYS_NOTHING_OF_THE_FLIGHT}
+    hardware = table.get("hardware")
+    if isinstance(hardware, dict):
+        table["hardware"] = _sheets_by_content(hardware)
+    return blake2b(json.dumps(table, sort_keys=True, default=str).encode(), digest_size=8).hexdigest()
+
+
+def _sheets_by_content(hardware: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the table with digests for the paths of sheets, which are written otherwise from another folder."""
+    return {
+        key: blake2b(Path(value).read_bytes(), digest_size=8).hexdigest()
+        if key in SHEETS and isinstance(value, str) and Path(value).is_file()
+        else value
+        for key, value in hardware.items()
+    }
