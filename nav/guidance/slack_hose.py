@@ -29,7 +29,6 @@ import numpy as np
 from dockair.nav.guidance.phases import (
     BEFORE_CONTACT,
     ON_THE_PROBE,
-    TOUCHING,
     Phase,
     PhaseLimits,
     is_off_the_probe,
@@ -51,6 +50,7 @@ class SlackHose:
         self._limits = limits
         times_s = limits.slack_from_s, limits.slack_over_s, limits.slack_to_s, limits.slack_far_s
         self._from, self._over, self._to, self._far = (max(round(time_s / step_s), 1) for time_s in times_s)  # ticks
+        self._to = max(self._to, self._from + self._over)
         self._before: deque[Array] = deque(maxlen=max(round(limits.slack_before_s / step_s), 1))
         self._rest: Array | None = None  # their sum, made once they are all there
         self._ticks: int | None = None  # since contact; None before it
@@ -64,7 +64,8 @@ class SlackHose:
         Args:
             phase: that is flown; a receiver that is called back may still come to the coupling.
             coupling: (3,) from the probe's tip [m].
-            along: (3,) the drogue's axis, forward, of any length. Both in axes that do not turn with the receiver.
+            along: (3,) from its ring's centre to the coupling, the drogue's axis. Both in axes that do not turn with
+                the receiver.
             seen: whether that is known of frames that have not stopped.
         """
         if phase in BEFORE_CONTACT:
@@ -77,7 +78,7 @@ class SlackHose:
         elif at_the_coupling and phase not in BEFORE_CONTACT:
             self._ticks = 0
         if self._ticks is None:
-            if seen and phase not in TOUCHING:  # else it is on its way there along the funnel
+            if seen and (phase in BEFORE_CONTACT or coupling[0] > along[0]):  # else it may be in the funnel, and turned
                 self._before.append(along)
                 self._rest = None
             return

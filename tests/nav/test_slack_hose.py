@@ -1,5 +1,7 @@
 """Whether the hose is taken up at contact."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -179,6 +181,32 @@ def test_of_a_receiver_that_was_called_back_the_last_second_before_contact_count
     for _ in range(60):
         hose.step(Phase.BACK_OFF, np.zeros(3), turned(10.0), seen=True)
         assert not hose.is_slack
+
+
+@pytest.mark.parametrize("funnel_ticks", [0, 12, 40])
+@pytest.mark.parametrize(("to", "degrees", "expected"), [(DOWN, LIMIT_DEG + 1.0, True), (UP, -1.0, False)])
+def test_what_the_funnel_turns_of_a_receiver_that_was_called_back_is_no_reference(funnel_ticks, to, degrees, expected):
+    """Past the ring's plane, not yet at the coupling, and turned by 12 degrees, as 29312 was."""
+    hose, slack = SlackHose(LIMITS, STEP_S), []
+    for k in range(200):
+        hose.step(Phase.APPROACH if k < 150 else Phase.BACK_OFF, np.array([0.5, 0.0, 0.0]), REST, seen=True)
+    for _ in range(funnel_ticks):
+        hose.step(Phase.BACK_OFF, np.array([0.15, 0.0, 0.1]), turned(12.0, to), seen=True)
+    for _ in range(50):
+        hose.step(Phase.BACK_OFF, np.zeros(3), turned(degrees, to), seen=True)
+        slack.append(hose.is_slack)
+    assert any(slack) is expected
+
+
+@pytest.mark.parametrize("rate_hz", [50, 100, 180])
+@pytest.mark.parametrize("times_s", [(0.07, 0.07), (0.19, 0.31), (0.2, 0.005), (0.2, 0.08)])
+def test_limits_that_leave_no_more_than_the_look_itself_leave_it_whole_at_any_rate(rate_hz, times_s):
+    limits = replace(LIMITS, slack_from_s=times_s[0], slack_over_s=times_s[1], slack_to_s=sum(times_s))
+    hose = SlackHose(replace(limits, slack_far_rad=np.inf), 1.0 / rate_hz)
+    for phase, coupling_m, degrees in ((Phase.APPROACH, 1.0, 0.0), (Phase.CONTACT, 0.0, 10.0)):
+        for _ in range(2 * rate_hz):
+            hose.step(phase, np.array([coupling_m, 0.0, 0.0]), turned(degrees), seen=True)
+    assert hose.is_slack
 
 
 @pytest.mark.parametrize("rate_hz", [50, 100, 180, 500])
