@@ -116,8 +116,9 @@ class GuidanceSettings:
 
     def __post_init__(self) -> None:
         check_choice("guidance.controller", self.controller, get_args(ControllerName))
+        none = "regain_speed_m_s", "evade_speed_m_s", "evade_s", "unseen_swing_m"
         gains = "take_in_gain_1_s", "trail_gain_m_s", "reckoned_gain_1_s"
-        check_numbers("guidance", self, zero=(*gains, "regain_speed_m_s", "response_s", "evade_s"))
+        check_numbers("guidance", self, zero=(*gains, *none, "response_s"))
         if not max(self.patient_share) <= 1.0:
             raise DockairError("guidance.patient_share", expected="shares, 1 at most", got=self.patient_share)
 

@@ -5,7 +5,7 @@ Phases and limits as in service practice: pre-contact 3-5 m behind the drogue, c
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from enum import Enum
 
 from dockair.errors import DockairError, check_numbers
@@ -84,7 +84,9 @@ class PhaseLimits:
 
     def __post_init__(self) -> None:
         where, told_s = "guidance.limits", self.slack_from_s + self.slack_over_s
-        check_numbers(where, self, zero=("stabilise_s", "hold_s"), infinite=("slot_s",))
+        counted = "slack_from_s", "slack_over_s", "slack_to_s", "slack_before_s", "slack_far_s"  # in ticks
+        never = [limit.name for limit in fields(self) if limit.name not in counted]  # any other limit may be infinite
+        check_numbers(where, self, zero=("stabilise_s", "hold_s", "push_on_m"), infinite=never)
         if not told_s <= self.slack_to_s:
             expected = f"slack_from_s + slack_over_s = {told_s:g} at least"
             raise DockairError(f"{where}.slack_to_s", expected=expected, got=self.slack_to_s)

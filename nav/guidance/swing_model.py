@@ -29,7 +29,7 @@ from functools import lru_cache
 import numpy as np
 from scipy.linalg import expm, solve_continuous_lyapunov
 
-from dockair.errors import check_numbers
+from dockair.errors import DockairError, check_numbers
 from dockair.rotations import Array
 
 #: Of the states: m and d come before it, then place and rate of each mode, then g.
@@ -96,6 +96,8 @@ class SwingSettings:
     def __post_init__(self) -> None:
         zero = "rattle_density", "drift_density"
         check_numbers("guidance.predictive.swing", self, zero=zero, signed=("gust_felt_share",))
+        if not self.modes or not all(isinstance(mode, HoseMode) for mode in self.modes):
+            raise DockairError("guidance.predictive.swing.modes", expected="one HoseMode or more", got=self.modes)
 
     def at(self, dynamic_pressure_pa: float) -> "SwingSettings":
         """Return the same for another dynamic pressure [Pa], which stretches the hose more or less across."""

@@ -1,11 +1,11 @@
 """What a person can do wrong, said in one line: where, what was expected, what was got, what exists."""
 
 import math
-from collections.abc import Collection, Iterable
-from dataclasses import fields
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import fields, is_dataclass
 from difflib import get_close_matches
 from numbers import Integral, Real
-from typing import Any, get_args
+from typing import Any, cast, get_args, get_origin
 
 
 class DockairError(Exception):
@@ -93,32 +93,41 @@ def check_numbers(
 
     Args:
         where: what the dataclass is called in its keys.
-        settings: the dataclass; its fields of `int`, `float` and tuples of `float` are looked at, no others.
+        settings: the dataclass; of its fields those of `int`, `float` and tuples of `float` are looked at, and whether
+            those of another dataclass are one.
         zero: fields that may be 0, too.
         signed: fields that may be any finite number.
         infinite: fields that may be infinite, too.
     """
     for field in fields(settings):
-        name, value = f"{where}.{field.name}", getattr(settings, field.name)
+        name, value, types = f"{where}.{field.name}", getattr(settings, field.name), get_args(field.type)
+        is_vector = get_origin(field.type) is tuple and types[0] is float
+        if is_dataclass(field.type) and not isinstance(value, cast(type, field.type)):
+            raise DockairError(name, expected=cast(type, field.type).__name__, got=value)
         if field.type is int:
             check_integer(name, value, 0 if field.name in zero else 1)
-        elif field.type is float or get_args(field.type)[:1] == (float,):
-            least = "finite" if field.name in signed else "from 0 on" if field.name in zero else "above 0"
-            for one in _parts(name, value, get_args(field.type)):
-                is_number = isinstance(one, Real) and not isinstance(one, bool)
-                is_known = is_number and (math.isfinite(one) or (field.name in infinite and not math.isnan(one)))
-                if not is_known or not (least == "finite" or one > 0.0 or (least == "from 0 on" and one == 0.0)):
-                    expected = "finite numbers" if least == "finite" else f"a number {least}"
-                    raise DockairError(name, expected=expected, got=value)
+        elif field.type is float or is_vector:
+            numbers = _parts(name, value, types) if is_vector else (value,)
+            least = "" if field.name in signed else " from 0 on" if field.name in zero else " above 0"
+            kind = f"{'' if field.name in infinite else 'finite '}number"
+            if not all(_is_number(one, least, finite="finite" in kind) for one in numbers):
+                raise DockairError(name, expected=f"{kind}s{least}" if is_vector else f"a {kind}{least}", got=value)
+
+
+def _is_number(value: Any, least: str, *, finite: bool) -> bool:
+    if isinstance(value, bool) or not isinstance(value, Real):
+        return False
+    number = float(value)
+    is_enough = not least or number > 0.0 or (number == 0.0 and "from 0" in least)
+    return is_enough and (math.isfinite(number) or (not finite and not math.isnan(number)))
 
 
 def _parts(name: str, value: Any, types: tuple[Any, ...]) -> tuple[Any, ...]:
-    """Return a field's numbers, of a tuple as many as its type says."""
-    if not types:
-        return (value,)
-    parts = tuple(value) if isinstance(value, Iterable) else ()
+    """Return a vector's numbers, as many as its type says."""
+    listed = value.tolist() if hasattr(value, "tolist") else value  # of numpy
+    parts = tuple(listed) if isinstance(listed, Sequence) else ()
     if not parts or (... not in types and len(parts) != len(types)):
-        raise DockairError(name, expected="numbers" if ... in types else f"{len(types)} numbers", got=value)
+        raise DockairError(name, expected="numbers" if ... in types else f"{len(types)} numbers", got=listed)
     return parts
 
 

@@ -1,8 +1,11 @@
+import math
 import pickle
+from dataclasses import dataclass, field
 
+import numpy as np
 import pytest
 
-from dockair.errors import DockairError, MachineError
+from dockair.errors import DockairError, MachineError, check_numbers
 
 
 def test_one_line_says_where_expected_got_and_what_exists():
@@ -60,3 +63,71 @@ def test_another_process_raises_the_same_line(error):
     assert type(again) is type(error)
     assert str(again) == str(received) == str(error)
     assert again.exit_code == error.exit_code
+
+
+@dataclass(frozen=True)
+class _Inner:
+    """One of those that a field may be."""
+
+
+@dataclass(frozen=True)
+class _Settings:
+    """One field of each kind that is looked at, and two that are not."""
+
+    above: float = 1.0
+    from_zero: float = 0.0
+    signed: float = -1.0
+    endless: float = math.inf
+    count: int = 1
+    vector: tuple[float, float] = (1.0, 2.0)
+    many: tuple[float, ...] = (1.0,)
+    inner: _Inner = field(default_factory=_Inner)
+    name: str = ""
+    maybe: float | None = None
+
+    def __post_init__(self) -> None:
+        check_numbers("here", self, zero=("from_zero",), signed=("signed",), infinite=("endless",))
+
+
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        ({"above": 0.0}, "here.above: expected a finite number above 0, got 0.0"),
+        ({"above": math.inf}, "here.above: expected a finite number above 0, got inf"),
+        ({"above": math.nan}, "here.above: expected a finite number above 0, got nan"),
+        ({"above": True}, "here.above: expected a finite number above 0, got True"),
+        ({"above": "1"}, "here.above: expected a finite number above 0, got '1'"),
+        ({"above": None}, "here.above: expected a finite number above 0"),
+        ({"from_zero": -1e-9}, "here.from_zero: expected a finite number from 0 on, got -1e-09"),
+        ({"signed": -math.inf}, "here.signed: expected a finite number, got -inf"),
+        ({"endless": math.nan}, "here.endless: expected a number above 0, got nan"),
+        ({"endless": -math.inf}, "here.endless: expected a number above 0, got -inf"),
+        ({"count": 0}, "here.count: expected an integer from 1 on, got 0"),
+        ({"vector": (1.0, 0.0)}, "here.vector: expected finite numbers above 0, got (1.0, 0.0)"),
+        ({"vector": (1.0, 2.0, 3.0)}, "here.vector: expected 2 numbers, got (1.0, 2.0, 3.0)"),
+        ({"vector": 1.0}, "here.vector: expected 2 numbers, got 1.0"),
+        ({"vector": {1.0, 2.0}}, "here.vector: expected 2 numbers"),
+        ({"vector": np.array(1.0)}, "here.vector: expected 2 numbers, got 1.0"),
+        ({"vector": np.ones((2, 2))}, "here.vector: expected finite numbers above 0"),
+        ({"many": ()}, "here.many: expected numbers, got ()"),
+        ({"inner": None}, "here.inner: expected _Inner"),
+    ],
+)
+def test_a_number_of_settings_that_is_none_or_too_small_is_refused_in_one_line(values, said):
+    with pytest.raises(DockairError) as refused:
+        _Settings(**values)
+    assert str(refused.value).startswith(said)
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {},
+        {"above": 3, "count": np.int64(2)},
+        {"above": np.float32(0.5), "vector": np.array([1.0, 2.0])},
+        {"vector": [1, 2], "many": (1.0, 2.0, 3.0)},
+        {"maybe": -1.0, "name": "any"},
+    ],
+)
+def test_numbers_of_any_kind_are_taken(values):
+    assert _Settings(**values) is not None

@@ -13,7 +13,7 @@ from dockair.nav.guidance.closing import ClosingSettings
 from dockair.nav.guidance.guidance_settings import GuidanceSettings, PidSettings, PredictiveSettings
 from dockair.nav.guidance.path_plan import PlanSettings
 from dockair.nav.guidance.phases import PhaseLimits
-from dockair.nav.guidance.swing_model import SwingSettings
+from dockair.nav.guidance.swing_model import HoseMode, SwingSettings
 
 ALL = (
     GuidanceSettings,
@@ -26,6 +26,9 @@ ALL = (
     BowWavePush,
     AnnouncedPathSettings,
 )
+
+
+MODE = {"frequency_hz": (0.3,) * 3, "damping": (0.1,) * 3, "gust_density": (-1.0,) * 3}
 
 
 def numbers(cls):
@@ -56,12 +59,12 @@ def test_a_vector_has_as_many_numbers_as_its_axes(cls):
     ("cls", "values", "said"),
     [
         (GuidanceSettings, {"controller": "PID"}, "guidance.controller: .*exists: predictive, pid"),
-        (GuidanceSettings, {"closure_speed_m_s": 0.0}, "guidance.closure_speed_m_s: expected a number above 0, got 0"),
+        (GuidanceSettings, {"closure_speed_m_s": 0.0}, "guidance.closure_speed_m_s: expected a finite number above 0"),
         (GuidanceSettings, {"trail_before_s": 0.0}, "guidance.trail_before_s"),
         (GuidanceSettings, {"patient_share": (0.5, 1.1)}, "guidance.patient_share"),
         (GuidanceSettings, {"stand_off_m": "4"}, "guidance.stand_off_m"),
         (PhaseLimits, {"patience_s": 0.0}, "guidance.limits.patience_s"),
-        (PhaseLimits, {"lost_s": inf}, "guidance.limits.lost_s"),
+        (PhaseLimits, {"slack_far_s": inf}, "guidance.limits.slack_far_s"),
         (PhaseLimits, {"attempts_max": 2.5}, "guidance.limits.attempts_max: expected an integer"),
         (PhaseLimits, {"slack_from_s": 0.45}, "slack_to_s: expected slack_from_s .* = 0.53 at least, got 0.5"),
         (PhaseLimits, {"late_radius": 0.9}, "late_radius"),
@@ -70,6 +73,11 @@ def test_a_vector_has_as_many_numbers_as_its_axes(cls):
         (PlanSettings, {"nodes": 0}, "guidance.predictive.plan.nodes: expected an integer from 1 on"),
         (PlanSettings, {"kept_back": 1.0}, "kept_back"),
         (SwingSettings, {"frequency_ratios": (1.0, -1.0)}, "frequency_ratios"),
+        (SwingSettings, {"modes": ()}, "swing.modes: expected one HoseMode or more"),
+        (SwingSettings, {"modes": (1.0,)}, "swing.modes: expected one HoseMode or more"),
+        (HoseMode, MODE | {"frequency_hz": (0.3, 0.0, 0.3)}, "swing.modes.frequency_hz"),
+        (HoseMode, MODE | {"damping": (nan, 0.1, 0.1)}, "swing.modes.damping"),
+        (GuidanceSettings, {"limits": None}, "guidance.limits: expected PhaseLimits"),
     ],
 )
 def test_what_nothing_can_be_flown_with_is_refused_at_once(cls, values, said):
@@ -80,9 +88,11 @@ def test_what_nothing_can_be_flown_with_is_refused_at_once(cls, values, said):
 @pytest.mark.parametrize(
     ("cls", "values"),
     [
-        (PhaseLimits, {"slot_s": inf, "hold_s": 0.0}),
+        (PhaseLimits, {"slot_s": inf, "hold_s": 0.0, "waiting_s": inf, "slack_far_rad": inf, "push_on_m": 0.0}),
         (BowWavePush, {"radius_m": 0.0}),
         (PidSettings, {"derivative": 0.0}),
+        (HoseMode, MODE),
+        (GuidanceSettings, {"evade_speed_m_s": 0.0, "unseen_swing_m": 0.0}),
     ],
 )
 def test_what_can_be_flown_with_is_not(cls, values):
