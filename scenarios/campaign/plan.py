@@ -41,7 +41,17 @@ def flat(value: Any, is_value: Callable[[dict[str, Any]], bool] = operator.not_)
         if key in level:
             raise refused("every key once", f"{key}, twice")
         level[key] = entry
+    for key in level:
+        for table in _tables_of(key):
+            if table in level:  # an empty one: it would take the key's place, or not, as they are written
+                raise refused("every key once", f"{table} and {key}")
     return level
+
+
+def _tables_of(key: str) -> Iterator[str]:
+    """Return what a dotted key stands in: of a.b.c a and a.b."""
+    parts = key.split(".")
+    return (".".join(parts[:i]) for i in range(1, len(parts)))
 
 
 def _dotted(table: dict[str, Any], is_value: Callable[[dict[str, Any]], bool]) -> Iterator[tuple[str, Any]]:

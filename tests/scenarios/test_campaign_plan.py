@@ -11,7 +11,6 @@ from dockair.errors import DockairError
 from dockair.scenarios.campaign.jobs import as_toml, jobs_of
 from dockair.scenarios.campaign.plan_file import PlanFile, plan_names
 from dockair.scenarios.scenario_file import scenario_names
-from dockair.scenarios.scenario_hash import scenario_hash
 from dockair.scenarios.schema import load_scenario
 from dockair.scenarios.toml_files import toml_value
 
@@ -165,32 +164,6 @@ def test_the_command_line_replaces_seeds_everywhere_and_the_sampler(plan):
     text = 'scenarios = [{ scenario = "default", seeds = 9 }]\nseeds = 7\n[draw."start.aft_m"]\nvalues = [3.0, 4.0]'
     assert len(jobs_of(plan(text, {"seeds": 2}))) == 2
     assert len(jobs_of(plan(text, {"seeds": 2, "sampler": "grid"}))) == 4
-
-
-def test_the_digest_changes_with_what_decides_the_flight_and_with_nothing_else():
-    digest = scenario_hash(load_scenario("default"))
-    for same in ({"seed": 5}, {"claim": "another"}, {"accept.outcome": "miss"}):
-        assert scenario_hash(load_scenario("default", same)) == digest
-    others = {"turbulence.sigma_m_s": 0.51, "navigation.navigator": "truth", "parameters.reel.tension_gain": 0.6}
-    for key, value in others.items():
-        assert scenario_hash(load_scenario("default", {key: value})) != digest
-
-
-def test_the_digest_sees_into_the_sheets_that_the_scenario_names(tmp_path):
-    sheet = tmp_path / "ring.toml"
-    sheet.write_text("a = 1")
-    scenario = load_scenario("default", {"hardware.ring": str(sheet)})
-    before = scenario_hash(scenario)
-    sheet.write_text("a = 2")
-    assert scenario_hash(scenario) != before
-
-
-def test_the_digest_does_not_see_how_the_path_of_a_sheet_is_written(tmp_path, monkeypatch):
-    """The same flight by a plan in another folder, or asked for from another one, is the same."""
-    (tmp_path / "ring.toml").write_text("a = 1")
-    monkeypatch.chdir(tmp_path)
-    paths = ["ring.toml", str(tmp_path / "ring.toml"), "../" + tmp_path.name + "/ring.toml"]
-    assert len({scenario_hash(load_scenario("default", {"hardware.ring": path})) for path in paths}) == 1
 
 
 def test_an_empty_table_in_set_is_a_value_as_on_the_command_line(plan):
@@ -352,6 +325,14 @@ def test_every_packaged_plan_can_be_flown_and_says_what_for(name):
         (
             'scenarios = ["default"]\n[draw."start.aft_m"]\nlow = 3.0\nhigh = 4.0\n[draw.start.aft_m]\nvalues = [4.0]',
             "p.toml: draw: expected every key once, got 'start.aft_m, twice'",
+        ),
+        (
+            'scenarios = ["default"]\n[set]\n"start.aft_m" = 3.0\n[set.start]',
+            "p.toml: set: expected every key once, got 'start and start.aft_m'",
+        ),
+        (
+            'scenarios = ["default"]\n[set]\nparameters = {}\n"parameters.hose.length_m" = 14.0',
+            "p.toml: set: expected every key once, got 'parameters and parameters.hose.length_m'",
         ),
         ('scenarios = ["default"]\nseeds = [9223372036854775808]', "p.toml: seeds"),
         ("scenarios = [", "p.toml: expected TOML"),
