@@ -12,7 +12,7 @@ _NO_SYNC = (errno.EINVAL, errno.ENOTSUP, errno.ENOSYS)  # of a file system that 
 
 
 def write_whole(path: Path, data: bytes) -> None:
-    """Write a file beside its place, wait for the disk, and put it there; when this returns, it outlives a power cut.
+    """Write a file beside its place, wait for the disk, and put it there; a power cut takes it no more.
 
     Raises:
         MachineError: there is no room; what was there is as it was.
@@ -45,7 +45,7 @@ def sync_folder(folder: Path) -> None:
     """
     try:
         file = os.open(folder, os.O_RDONLY)
-    except OSError:  # Windows opens no folder, and nobody one that may be written and not read: the files in it
+    except PermissionError:  # Windows opens no folder, and nobody one that may be written and not read: the files in it
         return  # are whole all the same, and there is no other way to wait for their names
     try:
         os.fsync(file)

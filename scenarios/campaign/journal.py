@@ -82,6 +82,7 @@ class Journal:
     def clear(self) -> None:
         """Forget everything."""
         os.ftruncate(self._file, 0)
+        os.fsync(self._file)  # before a new manifest says that other rows are to come: those of before are none of them
         self.entries, self._size = {}, 0
 
     def _require_in_place(self) -> None:

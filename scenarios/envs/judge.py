@@ -58,7 +58,7 @@ class AttemptJudge:
             return False, Outcome.CONTACT
         self._trying |= crossed or touched
         self._touched |= touched
-        is_near = -limits.retreat_m < x < limits.overshoot_m and aside_m < limits.aside_m
+        is_near = -limits.retreat_m < x < limits.overshoot_m and aside_m <= limits.aside_m
         if not self._trying or is_near or touched:
             return False, None
         outcome = self.unfinished

@@ -38,8 +38,9 @@ How far off a good contact may be is asked of the flight whatever drogue it meet
 the coupling, for its ribs stand flatter (docs/models/coupling.md).
 
 A flight without any attempt has the cause diverged if the simulation broke down, collision if the receiver struck
-something, detection if the solution was valid for less than half of its last half, else never_steady. A flight in which
-an attempt failed or none began, and whose receiver departed at any time, has the cause departed.
+something (fault, if any had acted by then: any can bring it about), detection if the solution was valid for less than
+half of its last half, else never_steady. A flight in which an attempt failed or none began, and whose receiver departed
+at any time, has the cause departed.
 
 Not modelled: causes that act together; the one named is the largest, not the only one.
 """

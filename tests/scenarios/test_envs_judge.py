@@ -46,6 +46,12 @@ def test_a_tip_that_crosses_the_plane_more_than_a_metre_off_the_axis_passes_by_a
     assert judge.unfinished is Outcome.MISS
 
 
+def test_who_crosses_at_the_limit_itself_tries_and_has_not_failed_yet():
+    judge = AttemptJudge(1)
+    assert _watch(judge, -0.1, 0.2, aside=1.0) == (False, None)
+    assert judge.unfinished is Outcome.MISS
+
+
 def test_who_tries_and_who_passes_by_is_told_as_by_the_flights_referee():
     assert AttemptLimits().aside_m == RefereeLimits().aside_m
 

@@ -59,6 +59,28 @@ def test_a_journal_and_its_folder_are_on_the_disk_before_its_first_row_and_rows_
         assert waited_for == ["a/out/journal.jsonl"] * 2
 
 
+def test_rows_that_are_forgotten_are_off_the_disk_before_a_manifest_says_so(waited_for):
+    campaign_folder.make(Path("out"))
+    with Journal(Path("out")) as journal:
+        journal.append({"key": "one"})
+        waited_for.clear()
+        journal.clear()
+        assert waited_for == ["out/journal.jsonl"]
+
+
+def test_a_folder_that_cannot_be_opened_for_another_reason_is_said(monkeypatch):
+    really = os.open
+
+    def opened(path, *arguments, **options):
+        if os.path.isdir(path):
+            raise OSError(errno.EMFILE, os.strerror(errno.EMFILE), str(path))
+        return really(path, *arguments, **options)
+
+    monkeypatch.setattr(os, "open", opened)
+    with pytest.raises(OSError, match="open files"):
+        write_whole(Path("file"), b"one")
+
+
 def test_a_folder_that_no_one_can_open_or_wait_for_is_no_obstacle(monkeypatch):
     really, sync = os.open, os.fsync
 
