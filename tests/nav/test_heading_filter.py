@@ -231,5 +231,5 @@ def test_it_begins_with_the_first_sample_that_has_accelerations():
 
 
 def test_a_number_that_is_not_positive_is_refused():
-    with pytest.raises(DockairError, match="heading.filter.up_every_s: expected a number above 0"):
+    with pytest.raises(DockairError, match="heading.filter.up_every_s: expected a finite number above 0"):
         HeadingFilterSettings(up_every_s=0.0)

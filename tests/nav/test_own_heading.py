@@ -182,7 +182,7 @@ def test_gyros_of_which_nothing_is_known_are_refused():
 
 
 def test_a_number_that_is_not_positive_is_refused():
-    with pytest.raises(DockairError, match="heading.airspeed_m_s: expected a number above 0"):
+    with pytest.raises(DockairError, match="heading.airspeed_m_s: expected a finite number above 0"):
         OwnHeadingSettings(airspeed_m_s=0.0)
 
 
