@@ -1,6 +1,7 @@
 """What a person can do wrong, said in one line: where, what was expected, what was got, what exists."""
 
 import math
+import sys
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import fields, is_dataclass
 from difflib import get_close_matches
@@ -108,18 +109,16 @@ def check_numbers(
             check_integer(name, value, 0 if field.name in zero else 1)
         elif field.type is float or is_vector:
             numbers = _parts(name, value, types) if is_vector else (value,)
-            least = "" if field.name in signed else " from 0 on" if field.name in zero else " above 0"
-            kind = f"{'' if field.name in infinite else 'finite '}number"
-            if not all(_is_number(one, least, finite="finite" in kind) for one in numbers):
-                raise DockairError(name, expected=f"{kind}s{least}" if is_vector else f"a {kind}{least}", got=value)
+            least, text = (-math.inf, "") if field.name in signed else (0.0, " above 0")
+            if field.name in zero:
+                least, text = math.nextafter(0.0, -1.0), " from 0 on"
+            most, kind = (math.inf, "number") if field.name in infinite else (sys.float_info.max, "finite number")
+            if not all(_is_number(one) and least < float(one) <= most for one in numbers):
+                raise DockairError(name, expected=f"{kind}s{text}" if is_vector else f"a {kind}{text}", got=value)
 
 
-def _is_number(value: Any, least: str, *, finite: bool) -> bool:
-    if isinstance(value, bool) or not isinstance(value, Real):
-        return False
-    number = float(value)
-    is_enough = not least or number > 0.0 or (number == 0.0 and "from 0" in least)
-    return is_enough and (math.isfinite(number) or (not finite and not math.isnan(number)))
+def _is_number(value: Any) -> bool:
+    return isinstance(value, Real) and not isinstance(value, bool)
 
 
 def _parts(name: str, value: Any, types: tuple[Any, ...]) -> tuple[Any, ...]:
