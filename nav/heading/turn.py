@@ -41,7 +41,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dockair.calibration import Camera
-from dockair.errors import DockairError
+from dockair.errors import DockairError, check_numbers
 from dockair.nav.heading.features import Features, features_of, matched
 from dockair.rotations import Array
 
@@ -104,17 +104,7 @@ class VisualSettings:
         for name in ("scale", "ratio", "least_share"):
             if not 0.0 < getattr(self, name) <= 1.0:
                 raise DockairError(name, expected="a number above 0, up to 1", got=getattr(self, name))
-        for name in (
-            "most_features",
-            "contrast",
-            "fewest_matches",
-            "least_sigma_px",
-            "sideways",
-            "largest_sigma_rad",
-            "key_turn_rad",
-        ):
-            if not getattr(self, name) > 0:
-                raise DockairError(name, expected="a number > 0", got=getattr(self, name))
+        check_numbers("heading.visual", self, zero=("key_matches",), infinite=("largest_sigma_rad", "key_turn_rad"))
 
 
 class TurnStatus(Enum):

@@ -27,7 +27,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from dockair.errors import DockairError
+from dockair.errors import DockairError, check_numbers
 from dockair.nav.heading.hdr import HeuristicDriftReduction, HeuristicDriftSettings
 
 __all__ = ["VisionDriftReduction", "VisionDriftSettings"]
@@ -58,9 +58,8 @@ class VisionDriftSettings:
         )
 
     def __post_init__(self) -> None:
-        for name in ("turn_after_s", "correction_rate_rad_s", "oldest_visual_s"):
-            if not getattr(self, name) > 0.0:
-                raise DockairError(name, expected="a number > 0", got=getattr(self, name))
+        endless = "turn_after_s", "correction_rate_rad_s", "oldest_visual_s"
+        check_numbers("heading.drift", self, infinite=endless)
         if not 0.0 < self.visual_share <= 1.0:
             raise DockairError("visual_share", expected="a share above 0, up to 1", got=self.visual_share)
 
