@@ -21,13 +21,8 @@ turns with E = exp(-[w x] dt). Errors
 so that a turn that the gyro did not measure enters phi with +1 and each vector u with -[u x]. One step is Eq. (2) to
 second order in dt (Eq. (3) to first), then E; the steps are at most `longest_step_s`.
 
-Between two samples the rate is linear, after the last it is held. The truth departs from that by an angular
-acceleration: a steady one of sigma_A since the last sample, or one of sigma_A / 2 that changes its sign half-way
-between two. A time t after the last, or between two that are T apart, the gyro's squared noise density grows by
-
-    sigma_A^2 t^3,   or   sigma_A^2 T^3 / 64,   but at most by that of a rate that is not known at all             (5)
-
-The receiver's acceleration is taken for white where no two samples of it stand near.
+Between the IMU's samples, and after the last, rate and specific force are as `imu_samples` says; where no two samples
+of the force stand near, the receiver's acceleration is taken for white.
 
 Not modelled: overtones of the hose, which take back half a second later what a gust gave, the size of the IMU, the
 swing's axes turning with the tanker, a formation that speeds up (walk of c).
@@ -38,6 +33,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dockair.kernels import njit
+from dockair.nav.imu_samples import sampled
 from dockair.rotations import Array
 
 PHI, PLACE, VELOCITY = slice(0, 3), slice(3, 6), slice(6, 9)
@@ -67,7 +63,7 @@ class Motion(NamedTuple):
     bias2: float  #: walk of the gyro's bias [rad^2/s^3]
     formation2: float  #: walk of c [m^2/s^5]
     scale2: float  #: the gyro's noise by its scale factor, per squared rate [s]
-    held_turn2: float  #: sigma_A^2 of Eq. (5) [rad^2/s^4]
+    held_turn2: float  #: sigma_A^2 of [imu_samples, eq 1] [rad^2/s^4]
     held_most2: float  #: noise density of a rate that is not known [rad^2/s]
     longest_gap_s: float  #: between two samples of acceleration that are used
     longest_step_s: float
@@ -230,41 +226,6 @@ def _gust_noise_added(P: Array, dt: float, gust2: Array) -> None:
 
 
 @njit(cache=True, error_model="numpy")
-def _held_noise(after: float, before: float, turn2: float, most2: float) -> float:
-    """Mean of sigma_A^2 t^3 over a piece of time, t from `before` to `after`, at most `most2` (Eq. (5))."""
-    corner = (most2 / turn2) ** (1.0 / 3.0) if turn2 > 0.0 else np.inf
-    if after <= before or corner <= before:
-        return most2 if turn2 > 0.0 else 0.0
-    inside = min(after, corner)
-    return (turn2 * (inside**4 - before**4) / 4.0 + most2 * max(after - corner, 0.0)) / (after - before)
-
-
-@njit(cache=True, error_model="numpy")
-def _sampled(
-    w: Array, f: Array, k: int, ta: float, tb: float, times: Array, rates: Array, forces: Array, motion: Motion
-) -> tuple[float, bool]:
-    """Write w, f (3,) of the piece of time from ta to tb after sample k; return Eq. (5), and whether f was felt."""
-    n, middle = len(times), 0.5 * (ta + tb)
-    if n == 0:
-        w[:], f[:] = 0.0, 0.0
-        return motion.held_most2, False
-    if 0 <= k < n - 1:
-        gap = times[k + 1] - times[k]
-        share = (middle - times[k]) / gap
-        for i in range(3):
-            w[i] = (1.0 - share) * rates[k, i] + share * rates[k + 1, i]
-            f[i] = (1.0 - share) * forces[k, i] + share * forces[k + 1, i]
-        held2, far = min(motion.held_turn2 * gap**3 / 64.0, motion.held_most2), gap
-    else:
-        near = 0 if k < 0 else n - 1
-        w[:], f[:] = rates[near], forces[near]
-        a, b = abs(ta - times[near]), abs(tb - times[near])
-        far = max(a, b)
-        held2 = _held_noise(far, min(a, b), motion.held_turn2, motion.held_most2)
-    return held2, far <= motion.longest_gap_s and np.isfinite(f[0]) and np.isfinite(f[1]) and np.isfinite(f[2])
-
-
-@njit(cache=True, error_model="numpy")
 def _covariance_moved(
     P: Array,
     moving: Array,
@@ -325,6 +286,7 @@ def propagated(
     E, E_rest, R_rest, w, f = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty(3), np.empty(3)
     moving, turned, G = P[:_MOVING].copy(), np.empty((_MOVING, ERRORS)), np.zeros((3, _MOVING))
     G[0, 0] = G[1, 1] = G[2, 2] = 1.0
+    held = motion.held_turn2, motion.held_most2, motion.longest_gap_s
     n, t = len(times), t0
     k = int(np.searchsorted(times, t0, side="right")) - 1
     while t < t1:
@@ -333,7 +295,7 @@ def propagated(
         dt, begin = (knot - t) / pieces, t
         for piece in range(pieces):
             ta, tb = begin + piece * dt, begin + (piece + 1) * dt
-            held2, felt = _sampled(w, f, k, ta, tb, times, rates, forces, motion)
+            held2, felt = sampled(w, f, k, ta, tb, times, rates, forces, *held)
             gyro2 = motion.gyro2 + held2 + motion.scale2 * (w[0] ** 2 + w[1] ** 2 + w[2] ** 2)
             for i in range(3):
                 w[i] -= x[4, i]

@@ -214,7 +214,7 @@ def test_many_samples_at_once_are_the_same_one_by_one_to_the_last_bit():
 
 
 def test_of_a_gap_no_rate_is_less_certain_than_one_that_is_not_known():
-    """Samples 2 s apart: by Eq. (5) 0.005 rad^2/s, four times the ceiling."""
+    """Samples 2 s apart: by [imu_samples, eq 1] 0.005 rad^2/s, four times the ceiling."""
     held = SILENT._replace(held_turn2=0.04, held_most2=1.25e-3)
     given = np.array([0.0, 2.0]), np.zeros((2, 3)), np.zeros((2, 3))
     P = propagated(R0, np.zeros((8, 3)), ZERO, 0.0, 2.0, *given, held.flat())[2]
