@@ -85,7 +85,9 @@ def slope_levels(
 def separation_levels(
     passed: Sequence[Exclusion], sight: LinesOfSight, test: FaultTest
 ) -> tuple[ProtectionLevels, bool]:
-    """Return the levels of the first exclusion, Eq. (2), and whether none of the others is its mirror image.
+    """Return the levels of the first exclusion, Eq. (2), and whether no other is tilted to the other side of frontal.
+
+    The mirror image may well pass without another LED than the one that the first leaves out.
 
     Args:
         passed: exclusions that pass the test; the first is believed.
@@ -94,7 +96,8 @@ def separation_levels(
     """
     k, first = np.array(test.error_sigmas), passed[0]
     bounds = [_distance(other.pose, first.pose) + k * worst_sigmas(other.pose.covariance) for other in passed]
-    alone = not any(other.led == first.led for other in passed[1:])
+    tilts = [_tilt(other.pose) for other in passed]
+    alone = all(tilts[0] @ tilt > 0.0 for tilt in tilts)
     return _levels(np.max(bounds, axis=0), first.pose, sight, alone), alone
 
 
@@ -106,6 +109,12 @@ def _distance(pose: PoseEstimate, other: PoseEstimate) -> Array:
     """(3,) along x [m], across it [m], of attitude [rad]."""
     step = pose_difference(pose.R_CD, pose.p_CD, other.R_CD, other.p_CD)
     return np.array([abs(step[3]), np.hypot(step[4], step[5]), np.sqrt(step[:3] @ step[:3])])
+
+
+def _tilt(pose: PoseEstimate) -> Array:
+    """(3,) the drogue's axis across the line of sight to it, camera axes; its mirror image's is opposite."""
+    axis, sight = pose.R_CD[:, 0], pose.p_CD / np.linalg.norm(pose.p_CD)
+    return np.asarray(axis - sight * (axis @ sight))
 
 
 def _levels(bounds: Array, pose: PoseEstimate, sight: LinesOfSight, alone: bool) -> ProtectionLevels:

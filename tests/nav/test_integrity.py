@@ -294,6 +294,20 @@ def test_while_the_mirror_image_may_be_it_the_level_reaches_it_and_no_attitude_i
     assert result.levels.lateral_m >= np.hypot(*apart[1:]) + there[LATERAL] - 1e-12
 
 
+@pytest.mark.parametrize("seed", [963, 1158, 1483, 1922, 2285])  # believed 7 to 19 degrees off, on the wrong side
+def test_without_another_led_the_mirror_image_may_pass_so_that_an_exclusion_does_not_rule_it_out(seed):
+    rng = np.random.default_rng(seed)
+    tilt_rad, about, bent = np.deg2rad(rng.uniform(3.0, 12.0)), rng.uniform(0.0, 2 * np.pi), rng.uniform(0.0, 2 * np.pi)
+    R = exp(tilt_rad * np.array([0.0, np.cos(about), np.sin(about)]))
+    pixels = pixels_at(R, rng.uniform(8.0, 16.0) * np.array([1.0, 0.03, -0.02]), points=RING[:6])
+    pixels = pixels + SIGMA_PX * rng.standard_normal((6, 2))
+    pixels = faulted(pixels, rng.integers(6), rng.uniform(0.8, 2.5) * np.array([np.cos(bent), np.sin(bent)]))
+    result = check_integrity(solve_pose(pixels, RING[:6], CAMERA, sigma_px=SIGMA_PX))
+    assert result.status is IntegrityStatus.EXCLUDED
+    assert np.linalg.norm(log(result.pose.R_CD @ R.T)) > 1.3 * tilt_rad
+    assert not result.mirror_ruled_out and np.isinf(result.levels.attitude_rad)
+
+
 @pytest.mark.parametrize("seed", [2163, 2749, 4691])  # rounding makes J - max t_i positive, where it is 0
 def test_of_four_leds_any_three_fit_the_mirror_image_so_that_it_is_never_ruled_out(seed):
     rng = np.random.default_rng(seed)
