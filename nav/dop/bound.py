@@ -106,14 +106,15 @@ def pose_bound(
     prior = np.zeros((6, 6)) if prior_information is None else _finite(prior_information, "prior_information", (6, 6))
     information, covariance = np.full((len(points), 6, 6), np.nan), np.full((6, 6), np.nan)
     with np.errstate(over="ignore", invalid="ignore"):  # what overflows has no inverse and is told by the status
-        seen = _seen(points @ R.T + p, camera, sensor_edges)
+        in_front = _in_front(points @ R.T + p)
+        seen = _on_sensor(points @ R.T + p, in_front, camera) if sensor_edges else in_front
         information[seen] = _information(points[seen], R, p, camera, sigma[seen])
-        if not seen.any():
-            status = DopStatus.BEHIND_CAMERA
-        elif seen.sum() < 3 and prior_information is None:
-            status = DopStatus.TOO_FEW_LANDMARKS
-        else:
+        if prior_information is not None or seen.sum() >= 3:
             status, covariance = _inverse(information[seen].sum(axis=0) + prior)
+        elif not in_front.any():
+            status = DopStatus.BEHIND_CAMERA
+        else:
+            status = DopStatus.TOO_FEW_LANDMARKS if seen.any() else DopStatus.OFF_SENSOR
     to_drogue = np.zeros((6, 6))
     to_drogue[:3, :3], to_drogue[3:, :3], to_drogue[3:, 3:] = np.eye(3), -R.T @ skew(p), -R.T
     return PoseBound(
@@ -126,14 +127,17 @@ def pose_bound(
     )
 
 
-def _seen(points_C: Array, camera: Camera, sensor_edges: bool) -> NDArray[np.bool_]:
+def _in_front(points_C: Array) -> NDArray[np.bool_]:
     distance = np.abs(points_C).max(axis=1, initial=0.0)
-    seen = (points_C[:, 0] > _GRAZING * distance) & (distance > _NEAREST_M) & (distance < _FARTHEST_M)
-    if sensor_edges:
-        pixels = camera.pixels_from_points(points_C[seen])
-        high = np.array([camera.width_px - 0.5, camera.height_px - 0.5])
-        seen[seen] = ((pixels >= -0.5) & (pixels <= high)).all(axis=1)
-    return np.asarray(seen)
+    return np.asarray((points_C[:, 0] > _GRAZING * distance) & (distance > _NEAREST_M) & (distance < _FARTHEST_M))
+
+
+def _on_sensor(points_C: Array, in_front: NDArray[np.bool_], camera: Camera) -> NDArray[np.bool_]:
+    """(n,) of those in front the ones whose image lies on the sensor."""
+    pixels, seen = camera.pixels_from_points(points_C[in_front]), in_front.copy()
+    high = np.array([camera.width_px - 0.5, camera.height_px - 0.5])
+    seen[in_front] = ((pixels >= -0.5) & (pixels <= high)).all(axis=1)
+    return seen
 
 
 def _information(points: Array, R: Array, p: Array, camera: Camera, sigma: Array) -> Array:

@@ -48,6 +48,7 @@ class DopStatus(Enum):
     SOLVED = "solved"
     TOO_FEW_LANDMARKS = "too few landmarks"
     BEHIND_CAMERA = "behind the camera"
+    OFF_SENSOR = "off the sensor"
     SINGULAR = "singular"
 
 

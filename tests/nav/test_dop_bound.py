@@ -116,6 +116,16 @@ def test_leds_off_the_sensor_or_behind_the_camera_do_not_count():
     assert behind.status is DopStatus.BEHIND_CAMERA and np.isnan(behind.covariance).all() and not behind.seen.any()
 
 
+def test_leds_in_front_and_off_the_sensor_are_not_behind_the_camera_and_leave_what_is_known_beside_them():
+    aside, prior = np.array([2.0, 1.5, 0.0]), np.diag([4.0, 4.0, 4.0, 1.0, 1.0, 1.0])
+    off = pose_bound(RING, np.eye(3), aside, CAMERA)
+    assert off.status is DopStatus.OFF_SENSOR and np.isnan(off.covariance).all() and not off.seen.any()
+    assert pose_bound(RING, np.eye(3), aside, CAMERA, sensor_edges=False).status is DopStatus.SOLVED
+    known = pose_bound(RING, np.eye(3), aside, CAMERA, prior_information=prior)
+    assert known.status is DopStatus.SOLVED
+    np.testing.assert_allclose(known.covariance, np.linalg.inv(prior), rtol=1e-12, atol=1e-15)
+
+
 def test_a_prior_adds_its_information_and_lets_one_led_do():
     prior = np.diag([1.0 / np.deg2rad(3.0) ** 2] * 3 + [1.0 / 0.5**2] * 3)
     free, held = (
