@@ -33,16 +33,24 @@ class PosePrior:
         """What `descent_kernels.descend` takes.
 
         Raises:
-            DockairError: wrong shapes, a singular covariance.
+            DockairError: wrong shapes, numbers that are not finite, a covariance that is none or is singular.
         """
         R, p = np.ascontiguousarray(self.R_CD, dtype=float), np.ascontiguousarray(self.p_CD, dtype=float)
         shapes = R.shape, p.shape, np.shape(self.covariance)
         if shapes != ((3, 3), (3,), (6, 6)):
             raise DockairError("prior", expected="R_CD (3, 3), p_CD (3,), covariance (6, 6)", got=shapes)
+        for name, numbers in {"R_CD": R, "p_CD": p, "covariance": self.covariance}.items():
+            if not np.isfinite(numbers).all():
+                raise DockairError(f"prior.{name}", expected="finite numbers", got=numbers)
+        covariance = np.asarray(self.covariance, dtype=float)
+        expected = "a covariance of full rank, symmetric and positive definite"
+        if not np.allclose(covariance, covariance.T, rtol=1e-9, atol=0.0):
+            raise DockairError("prior.covariance", expected=expected, got="one that is not symmetric")
         try:
-            return R, p, np.linalg.inv(self.covariance), _ZERO, _ZERO, 0.0
+            np.linalg.cholesky(covariance)
+            return R, p, np.linalg.inv(covariance), _ZERO, _ZERO, 0.0
         except np.linalg.LinAlgError:
-            raise DockairError("prior.covariance", expected="a covariance of full rank", got="a singular one") from None
+            raise DockairError("prior.covariance", expected=expected, got="one that is not") from None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

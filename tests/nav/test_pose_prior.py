@@ -100,6 +100,13 @@ def test_direction_adds_its_information_across_and_none_about_it():
         (lambda: DirectionPrior(axis_C=X, axis_D=np.eye(3), sigma_rad=0.1), "prior.axis_D"),
         (lambda: DirectionPrior(axis_C=X, axis_D=X, sigma_rad=0.0), "prior.sigma_rad"),
         (lambda: PosePrior(R_CD=np.eye(3), p_CD=8.0 * X, covariance=np.zeros((6, 6))).terms, "prior.covariance"),
+        (lambda: PosePrior(R_CD=np.eye(3), p_CD=8.0 * X, covariance=-np.eye(6)).terms, "prior.covariance"),
+        (
+            lambda: PosePrior(R_CD=np.eye(3), p_CD=X, covariance=np.eye(6) + 0.1 * np.eye(6, k=1)).terms,
+            "prior.covariance",
+        ),
+        (lambda: PosePrior(R_CD=np.eye(3), p_CD=X, covariance=np.full((6, 6), np.nan)).terms, "prior.covariance"),
+        (lambda: PosePrior(R_CD=np.eye(3), p_CD=np.full(3, np.inf), covariance=np.eye(6)).terms, "prior.p_CD"),
         (lambda: PosePrior(R_CD=np.eye(3), p_CD=8.0 * X, covariance=np.eye(5)).terms, "prior"),
     ],
 )
