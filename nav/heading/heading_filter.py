@@ -232,8 +232,7 @@ class HeadingFilter:
         """Eq. (1) over a sample."""
         before = self._R_NB
         self._R_NB = before @ exp(w_B * dt)
-        turn = np.arctan2(self._R_NB[1, 0], self._R_NB[0, 0]) - np.arctan2(before[1, 0], before[0, 0])
-        turn = float((turn + np.pi) % (2.0 * np.pi) - np.pi)
+        turn = _heading_turn_rad(before, self._R_NB)
         self.heading_rad, self._turned_rad = self.heading_rad + turn, self._turned_rad + turn
         self._w_B = w_B
 
@@ -269,19 +268,27 @@ class HeadingFilter:
         left = np.eye(7) - gain @ H
         P = left @ P @ left.T + gain @ noise @ gain.T
         self._P = 0.5 * (P + P.T)
-        before = np.arctan2(self._R_NB[1, 0], self._R_NB[0, 0])
-        self._R_NB = exp(x[_THETA]) @ self._R_NB
+        before = self._R_NB
+        self._R_NB = exp(x[_THETA]) @ before
         self._theta_N = self._theta_N + x[_THETA]
-        turn = float(np.arctan2(self._R_NB[1, 0], self._R_NB[0, 0]) - before)
-        self.heading_rad += (turn + np.pi) % (2.0 * np.pi) - np.pi
+        self.heading_rad += _heading_turn_rad(before, self._R_NB)
         self.bias_B = self.bias_B + x[_B]
         if self._frame is not None:
             self._frame = self._frame[0], self._frame[1] + float(x[_PSI])
 
     def _heading_at(self, stamp_s: float) -> float:
-        """Of the last second."""
+        """Of the last second; ahead of the newest sample the rate is that sample's, as in `R_LB_at`."""
         stamps, turned = np.array(self._past).T
-        return self.heading_rad - self._turned_rad + float(np.interp(stamp_s, stamps, turned))
+        heading_rad = self.heading_rad - self._turned_rad + float(np.interp(stamp_s, stamps, turned))
+        if stamp_s > self._stamp_s:
+            ahead = exp(self._w_B * (stamp_s - self._stamp_s))
+            heading_rad += _heading_turn_rad(self._R_NB, self._R_NB @ ahead)
+        return heading_rad
+
+
+def _heading_turn_rad(before: Array, after: Array) -> float:
+    turn = np.arctan2(after[1, 0], after[0, 0]) - np.arctan2(before[1, 0], before[0, 0])
+    return float((turn + np.pi) % (2.0 * np.pi) - np.pi)
 
 
 def _upright(up_B: Array) -> Array:

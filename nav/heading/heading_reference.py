@@ -219,7 +219,8 @@ class HeadingReference:
         if not self._past or stamp < self._past[0][0] or (self._frame is not None and stamp <= self._frame[0]):
             return None
         stamps, turned = np.array(self._past).T
-        turned_then = float(np.interp(stamp, stamps, turned))
+        ahead_s = max(stamp - self._stamp_s, 0.0)  # the rate goes on past the newest sample
+        turned_then = float(np.interp(stamp, stamps, turned)) + self._rate_rad_s * ahead_s
         predicted = 0.0
         if self._frame is not None:
             since = stamp - self._frame[0]

@@ -179,6 +179,16 @@ def test_a_turn_counts_at_its_frame_s_own_time(late_s):
     assert np.abs(late - now)[10 * RATE_HZ :].max() < 0.15 * DEGREE
 
 
+def test_a_frame_that_is_stamped_ahead_of_the_newest_sample_counts_at_its_own_time_too():
+    """The clocks of camera and IMU may differ by a little."""
+    turn, ahead_s = Turn(20.0), 0.03
+    filter_ = HeadingFilter(gyro(), turn.mounting, V)
+    filter_.propagate(turn.samples())
+    assert filter_.predicted_turn_rad(19.5) is not None and not filter_.see(19.5, None)
+    predicted = filter_.predicted_turn_rad(20.0 + ahead_s)
+    assert predicted == pytest.approx((0.5 + ahead_s) * TURN_RAD_S, rel=1e-3)
+
+
 def test_frames_too_late_or_out_of_order_are_passed_over():
     turn = Turn(5.0)
     filter_ = HeadingFilter(gyro(), PLAIN, V)
