@@ -114,7 +114,8 @@ class BeliefUpdate:
             self._unlearnt_px(seen, R_CD, p_CD)[kept],
         )
         if not self._filter.update(replace(checked.pose, measurement=sight), time_s):
-            self._contact.refused(checked, self._points_D[named[kept]], time_s)
+            if self._filter.was_contradicted:  # a second frame of one stamp has asked no gate
+                self._contact.refused(checked, self._points_D[named[kept]], time_s)
             return "pose refused by the gate"
         self._contact.used(checked, self._points_D[named[kept]], time_s)
         self.used_time_s = max(time_s, self.used_time_s)  # NaN before the first: the first of the two then

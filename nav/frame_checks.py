@@ -1,8 +1,9 @@
 """Which frames say nothing, found before anyone looks at them.
 
 A camera that hangs sends its last picture with new stamps: one that equals the picture before it to the last bit is
-none, since noise makes any two differ. A stamp ahead of the navigation's own clock, or older than a frame may
-be, is one to which nothing can be carried. An LED whose numbers are not finite is not seen.
+none, since noise makes any two differ. Where each picture is written over the one before, some of its rows tell. A
+stamp ahead of the navigation's own clock, or older than a frame may be, is one to which nothing can be carried. An LED
+whose numbers are not finite is not seen, nor is one that has a name which no LED has or another has, too.
 
 Not modelled: a camera that hangs for some rows only, or whose clock is off by less than a period.
 """
@@ -30,6 +31,7 @@ class FrameChecks:
     def __init__(self, ahead_s: float, buffer_s: float) -> None:
         self._ahead_s, self._buffer_s = ahead_s + STAMP_RESOLUTION_S, buffer_s + STAMP_RESOLUTION_S
         self._picture: NDArray[Any] = np.empty((0, 2))
+        self._rows: NDArray[Any] = self._picture  # of it, kept: a camera may write each picture over the one before
 
     def refused(self, frame: CameraFrame | LedObservation, now_s: float) -> str | None:
         """Return the status of a frame that says nothing; None of one to look at.
@@ -46,20 +48,29 @@ class FrameChecks:
             return "frame ahead of the clock"
         if now_s - time_s > self._buffer_s:
             return "frame too old"
-        before, self._picture = self._picture, frame.pixels if isinstance(frame, CameraFrame) else frame.centroids_px
-        return "frame stuck" if _are_equal(self._picture, before) else None
+        picture = frame.pixels if isinstance(frame, CameraFrame) else frame.centroids_px
+        return "frame stuck" if self._is_as_before(picture) else None
+
+    def _is_as_before(self, picture: NDArray[Any]) -> bool:
+        """Whether a picture equals the one before and shows something; two with noise are told apart by a few rows."""
+        rows = picture[:: _ROWS if len(picture) > _ROWS else 1].copy()
+        before, self._picture = self._picture, picture
+        rows_before, self._rows = self._rows, rows
+        alike = picture.size > 0 and picture.shape == before.shape and np.array_equal(rows, rows_before)
+        return alike and np.array_equal(picture, before)
 
 
-def _are_equal(one: NDArray[Any], other: NDArray[Any]) -> bool:
-    """Whether two pictures are equal and show something; two with noise are told apart by a few rows."""
-    if one.size == 0 or one.shape != other.shape:
-        return False
-    return np.array_equal(one[::_ROWS], other[::_ROWS]) and np.array_equal(one, other)
+def with_numbers(seen: LedObservation, count: int) -> LedObservation:
+    """Return an observation without LEDs that say nothing.
 
-
-def with_numbers(seen: LedObservation) -> LedObservation:
-    """Return an observation without the LEDs whose centroid or sigma is not finite, or whose sigma is not positive."""
+    Left out are those whose centroid or sigma is not finite, whose sigma is not positive, and whose number is not of
+    0 ... count - 1 or is another's, too: nobody can say which of the two it is.
+    """
     kept = np.isfinite(seen.centroids_px).all(axis=1) & np.isfinite(seen.sigma_px) & (seen.sigma_px > 0.0)
+    numbers, given = seen.led_numbers, np.zeros(count, dtype=int)
+    kept &= (numbers >= 0) & (numbers < count)
+    np.add.at(given, numbers[kept], 1)
+    kept[kept] = given[numbers[kept]] == 1
     if kept.all():
         return seen
     return only(seen, kept)

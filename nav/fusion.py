@@ -7,9 +7,9 @@ drogue from the accelerometers, r = p_IP, and the rate w = w_WB_B of the moment:
     p_PD = s - r,   v_PD = v - w x r,   d/dt p_PD (in body axes) = v - w x s                          (1)
 
 A frame is taken at its capture time: the belief is rolled back to the stamp, corrected, and everything newer is run
-again, in whatever order frames arrive. The gate is what frame and belief cost together, chi-square with two degrees of
-freedom an LED (six for a pose alone). Several refusals in a row are taken for a drogue that was struck or let go: the
-belief is widened before the next frame.
+again, in whatever order frames arrive; which of them are refused goes by that order. The gate is what frame and belief
+cost together, chi-square with two degrees of freedom an LED (six for a pose alone). Several refusals in a row are taken
+for a drogue that was struck or let go: the belief is widened before the next frame.
 
 Not modelled: contact (the drogue moves with the probe then, and what stands for gusts has to follow), a formation that
 turns or speeds up but by the walk of c.
@@ -195,7 +195,7 @@ class RelativeFilter:
         v, rate, covariance = _of_tip(w_B, belief.p_ID, belief.v_ID, belief.P, r, self._to_tip, self._lever2, rate2)
         return FilterState(
             time_s=time_s,
-            R_BD=belief.R_BD,
+            R_BD=belief.R_BD.copy(),  # the belief's own is no consumer's to write into
             p_PD_B=belief.p_ID - r,
             v_PD_B=v,
             rate_PD_B=rate,

@@ -91,8 +91,8 @@ class Navigator:
             self._time_s = self._filter.imu_time_s
         else:  # the IMU has dropped out, or says nothing that can be used: the last rate is held
             self._time_s += 1.0 / self._sheets.control_rate_hz
-        if np.isnan(self._begun_s):
-            self._begun_s = self._time_s
+        if np.isnan(self._begun_s) and taken:  # the IMU's clock begins where it likes
+            self._begun_s = self._looked_time_s = self._felt_time_s = self._time_s
         if frame is not None:
             frame = self._checked(frame)
         if self._heading is not None:
@@ -141,7 +141,7 @@ class Navigator:
             seen = self._finder.find(frame, followed=self._update.followed(time_s), lost=lost)
             self._candidates_px, nothing = self._finder.candidates_px, self._finder.status
         else:
-            seen = with_numbers(frame)
+            seen = with_numbers(frame, self._sheets.ring.count)
             self._candidates_px = seen.centroids_px
         self._not_shown = self._shows_no_ring(frame)
         if lost and len(seen.led_numbers) >= self._update.pose_leds:
@@ -200,7 +200,7 @@ class Navigator:
             window=None if np.isfinite(exposure_s) else self._finder.window(self._time_s),
             frame_time_stamp_s=self._update.used_time_s,
             candidates_px=self._candidates_px,
-            led_pixels_px=self._update.led_pixels_px,
+            led_pixels_px=self._update.led_pixels_px.copy(),
             contact_usable=contact_usable,
             phase_reason=self._guidance.phase_reason,
             exposure_s=exposure_s,

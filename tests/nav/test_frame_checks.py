@@ -78,9 +78,28 @@ def test_leds_without_numbers_are_left_out():
     centroids[1, 0], centroids[2, 1] = np.nan, np.inf
     sigma = np.full(8, 0.1)
     sigma[[3, 4, 5, 6]] = np.nan, np.inf, 0.0, -0.1
-    kept = with_numbers(leds(centroids, sigma))
+    kept = with_numbers(leds(centroids, sigma), 8)
     assert kept.led_numbers.tolist() == [0, 7]
     np.testing.assert_array_equal(kept.centroids_px, centroids[[0, 7]])
     np.testing.assert_array_equal(kept.sigma_px, [0.1, 0.1])
     whole = leds(np.ones((3, 2)))
-    assert with_numbers(whole) is whole and len(with_numbers(leds([])).led_numbers) == 0
+    assert with_numbers(whole, 8) is whole and len(with_numbers(leds([]), 8).led_numbers) == 0
+
+
+def test_pictures_that_are_written_into_one_buffer_are_told_apart():
+    kept, rng, buffer, statuses = checks(), np.random.default_rng(0), np.zeros((300, 200), np.uint8), []
+    for k in range(4):
+        if k != 3:
+            buffer[:] = rng.integers(0, 4, buffer.shape)
+        statuses.append(kept.refused(frame(buffer, NOW_S + 0.02 * k), NOW_S + 0.02 * k))
+    assert statuses == [None, None, None, "frame stuck"]
+
+
+@pytest.mark.parametrize(
+    ("numbers", "left"), [([0, 0, 3], [3]), ([-1, 2, 3], [2, 3]), ([7, 8, 9], [7]), ([5, 5, 5], []), ([8, 8, 1], [1])]
+)
+def test_leds_with_a_name_that_is_no_led_s_or_another_s_too_are_left_out(numbers, left):
+    seen = LedObservation(
+        time_stamp_s=NOW_S, led_numbers=np.array(numbers), centroids_px=np.ones((3, 2)), sigma_px=np.full(3, 0.1)
+    )
+    assert with_numbers(seen, 8).led_numbers.tolist() == left

@@ -1138,6 +1138,49 @@ def test_a_second_frame_of_one_or_two_leds_with_one_stamp_contradicts_nothing():
     assert again.status == "LEDs refused by the gate" and again.contact_usable
 
 
+def test_a_second_frame_of_a_whole_ring_with_one_stamp_changes_no_claim_of_contact():
+    claims = []
+    for comes_again in (False, True):
+        sky = Sky(None, still)
+        for _ in range(20):
+            step_on_leds(sky, range(8))
+        imu = sky.imu()
+        seen = named(sky, range(8), imu[-1].time_stamp_s)
+        assert sky.navigator.step(imu, seen).status == "pose used"
+        again = replace(seen, centroids_px=seen.centroids_px + 3.0) if comes_again else None
+        assert sky.navigator.step((), again).status == ("pose refused by the gate" if comes_again else "pose used")
+        claims.append(sky.navigator.contact_claim())
+    assert claims[0] == claims[1]
+
+
+def test_who_writes_into_a_solution_changes_nothing_that_comes_after_it():
+    skies = [Sky(None, still) for _ in range(2)]
+    for k in range(30):
+        leds = range(8) if k < 20 else ()
+        plain, written = (step_on_leds(sky, leds) for sky in skies)
+        for name in ("p_PD_B", "v_PD_B", "R_BD", "covariance", "led_pixels_px"):
+            np.testing.assert_array_equal(getattr(plain, name), getattr(written, name))
+            getattr(written, name)[...] = 0.3
+    assert plain.valid
+
+
+def test_the_clock_may_begin_anywhere_and_with_a_tick_that_brings_no_sample():
+    statuses = []
+    for begins_s in (0.0, 1000.0):
+        sky, told, of_run = Sky(None, still), [], []
+        guided, begun = sky.navigator._guidance.step, sky.navigator._update.begin_again
+        sky.navigator._guidance.step = lambda state, g=guided, told=told: told.append(state.frame_age_s) or g(state)
+        sky.navigator._update.begin_again = lambda seen, b=begun, of=of_run: of.append("begun again") or b(seen)
+        sky.navigator.step((), None)
+        for _ in range(6):
+            imu = [replace(each, time_stamp_s=each.time_stamp_s + begins_s) for each in sky.imu()]
+            seen = replace(named(sky, range(8), 0.0), time_stamp_s=imu[-1].time_stamp_s)
+            of_run.append(sky.navigator.step(imu, seen if sky.tick > 2 else None).status)
+        statuses.append(of_run)
+        assert max(told) < 0.05
+    assert statuses[0] == statuses[1] and "begun again" not in statuses[1]
+
+
 @pytest.mark.parametrize(("count", "begins"), [(5, False), (6, True)])
 def test_a_loose_filter_that_is_lost_begins_again_on_what_it_can_use_alone(count, begins):
     """Begun anew by each frame and corrected by none, it would have started from rest at each."""
