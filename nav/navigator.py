@@ -92,7 +92,8 @@ class Navigator:
         else:  # the IMU has dropped out, or says nothing that can be used: the last rate is held
             self._time_s += 1.0 / self._sheets.control_rate_hz
         if np.isnan(self._begun_s) and taken:  # the IMU's clock begins where it likes
-            self._begun_s = self._looked_time_s = self._felt_time_s = self._time_s
+            self._begun_s = self._time_s
+            self._looked_time_s = self._felt_time_s = self._time_s - 1.0 / self._sheets.control_rate_hz
         if frame is not None:
             frame = self._checked(frame)
         if self._heading is not None:
