@@ -9,6 +9,7 @@ import json
 import sys
 from dataclasses import asdict
 from enum import Enum
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -278,6 +279,17 @@ def _working_folder() -> str:
         raise DockairError("working folder", expected="one that is there", got=error.strerror) from None
 
 
+def _got(error: typer.TyperException, said: str, words: list[str]) -> str:
+    """Return what was given to the option that an error is about, as the end of its line, unless it says so itself."""
+    names = getattr(getattr(error, "param", None), "opts", ())
+    for word, after in pairwise([*words, ""]):
+        name, equals, value = word.partition("=")
+        if name in names and name.startswith("-"):
+            got = value if equals else after
+            return "" if repr(got) in said else f", got {got!r}"
+    return ""
+
+
 def main() -> None:
     """Run a command; what a person did wrong ends in one line on stderr, not in a traceback."""
     outlive_readers()
@@ -291,7 +303,8 @@ def main() -> None:
         print(f"dockair: {error}", file=sys.stderr)
         sys.exit(error.exit_code)
     except typer.TyperException as error:
-        print(f"dockair: {error.format_message()}", file=sys.stderr)
+        said = error.format_message()
+        print(f"dockair: {said}{_got(error, said, sys.argv)}", file=sys.stderr)
         sys.exit(2)
     except SystemExit as ended:
         if isinstance(ended.__context__, BrokenPipeError):  # of a pipe within: typer would pass it over with status 1

@@ -53,8 +53,13 @@ def refusal(error: ValidationError, model: type[BaseModel], place: Callable[[str
         return DockairError(where, **first["ctx"], also=also)
     field = _field_at(model, first["loc"])
     if first["type"] == "missing":
-        return DockairError(where, expected=_expected(field), also=also)
-    return DockairError(where, expected=_expected(field), got=first["input"], exists=_choices(field), also=also)
+        if isinstance(first["loc"][-1], int):  # too few of them: what is said of is all of them
+            return DockairError(
+                place(_dotted(first["loc"][:-1])), expected=_expected(field), got=first["input"], also=also
+            )
+        return DockairError(where, expected=_expected(field), got="nothing", also=also)
+    choices = () if _is_list_asked(field, first["loc"]) else _choices(field)
+    return DockairError(where, expected=_expected(field), got=first["input"], exists=choices, also=also)
 
 
 def _holds(outer: Sequence[int | str], inner: Sequence[int | str]) -> bool:
@@ -103,6 +108,11 @@ def _alternatives(annotation: Any) -> list[Any]:
     if get_origin(annotation) in (Union, types.UnionType):
         return [kind for kind in get_args(annotation) if kind is not type(None)]
     return [annotation]
+
+
+def _is_list_asked(field: FieldInfo, location: Sequence[int | str]) -> bool:
+    """Whether a list of tables is at fault as a whole, none of its entries."""
+    return inner_model(field) is not None and get_origin(field.annotation) is tuple and isinstance(location[-1], str)
 
 
 def _choices(field: FieldInfo) -> tuple[str, ...]:

@@ -105,7 +105,7 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     """Return a folder's manifest.
 
     Raises:
-        DockairError: there is none, or it cannot be read.
+        DockairError: there is none, it cannot be read, or its format is another version's.
     """
     path = folder / FILE_NAME
     try:
@@ -118,6 +118,9 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     plan = table.get("plan") if isinstance(table, dict) else None
     if not isinstance(plan, dict) or "name" not in plan:
         raise DockairError(str(path), expected="the manifest of a campaign", got="no plan with a name in it")
+    if table.get("schema_version") != SCHEMA_VERSION:
+        got = "nothing" if table.get("schema_version") is None else table["schema_version"]
+        raise DockairError(f"{path}: schema_version", expected=str(SCHEMA_VERSION), got=got)
     for key in _TABLES:
         if not isinstance(table.get(key, {}), dict):
             raise DockairError(str(path), expected=f"a table {key} in the manifest of a campaign", got=table[key])

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from dockair.errors import DockairError, check_choice, check_integer
 from dockair.messages import ImuSample, ReceiverCommand
+from dockair.scenarios.assembly.buildable import require_buildable
 from dockair.scenarios.envs.judge import AttemptJudge
 from dockair.scenarios.envs.options import command_from, scenario_from
 from dockair.scenarios.envs.tables import ACTION, OUTCOME_REWARD, RETRY_REWARD, action_cost, box, truth_info
@@ -267,7 +268,9 @@ class Episodes(gymnasium.Env[Obs, NDArray[np.float32]], Generic[Obs]):
             # a scenario's own gives way to the environment's; what is asked for here would be ignored without a word
             expected = f'"{self.sensing}", which this environment is made for'
             raise DockairError("options.set: camera.sensing", expected=expected, got=sensing)
-        return self.with_sensing(scenario)
+        scenario = self.with_sensing(scenario)
+        require_buildable(scenario)
+        return scenario
 
     def with_sensing(self, scenario: Scenario) -> Scenario:
         """Return a scenario with the environment's own sensing.

@@ -166,11 +166,11 @@ def test_a_mistake_is_told_in_one_line_and_ends_with_status_two(command, tmp_pat
     [
         (
             ("--bias-correlation-s", "-1"),
-            "Invalid value for '--bias-correlation-s': Input should be greater than or equal to 0.001",
+            "Invalid value for '--bias-correlation-s': Input should be greater than or equal to 0.001, got '-1'",
         ),
         (
             ("--bias-correlation-s", "1e300"),
-            "Invalid value for '--bias-correlation-s': Input should be less than or equal to 10000000",
+            "Invalid value for '--bias-correlation-s': Input should be less than or equal to 10000000, got '1e300'",
         ),
         (("--terms", "X"), "--terms: expected letters of the terms, each once, got 'X'; exists: Q, N, B, K"),
     ],

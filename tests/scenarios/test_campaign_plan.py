@@ -184,11 +184,11 @@ def test_every_packaged_plan_can_be_flown_and_says_what_for(name):
     ("text", "said"),
     [
         ('scenarios = ["default"]\nseed = 3', "p.toml: seed: expected a known key, got 'seed'; exists: claim, draw"),
-        ("seeds = 3", "p.toml: scenarios: expected a list of scenarios"),
+        ("seeds = 3", "a name or a table with scenario, seeds, set, got 'nothing'"),
         ("scenarios = []", "p.toml: scenarios: expected a list of scenarios"),
         ('scenarios = "default"', "p.toml: scenarios: expected a list of scenarios"),
         ('scenarios = [{ scenario = "default", sed = 1 }]', "p.toml: scenarios[0].sed: expected a known key"),
-        ("scenarios = [{ seeds = 1 }]", "p.toml: scenarios[0].scenario: expected a string"),
+        ("scenarios = [{ seeds = 1 }]", "p.toml: scenarios[0].scenario: expected a string, got 'nothing'"),
         ('scenarios = ["defualt"]', "scenarios[0]: scenario: expected a scenario of the library"),
         ('scenarios = ["mine.toml"]', "mine.toml: expected a scenario file, got 'no such file'"),
         ('scenarios = ["default", "default"]', "scenarios: expected every flight once, got 'default, seed 0, twice'"),

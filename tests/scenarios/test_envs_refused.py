@@ -329,3 +329,9 @@ def test_an_open_viewer_is_found_by_its_port(monkeypatch):
         assert not envs_viewer._is_open()
         listener.listen()
         assert envs_viewer._is_open()
+
+
+def test_a_navigator_that_does_not_exist_is_refused_before_the_first_reset():
+    scenario = load_scenario("default", {"navigation.navigator": "no_such_module:Navigator"} | MEASURED)
+    with pytest.raises(DockairError, match=r'^navigation.navigator: expected an importable "module:Class", got '):
+        DockFastEnv(scenario)

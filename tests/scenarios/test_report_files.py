@@ -24,7 +24,8 @@ def campaign(tmp_path):
     def make(name: str, scenario: str = "as it is", **manifested):
         folder = tmp_path / name
         folder.mkdir()
-        manifest.write_json({"plan": {"name": "made"}} | manifested, folder / manifest.FILE_NAME)
+        begun = {"schema_version": manifest.SCHEMA_VERSION, "plan": {"name": "made"}}
+        manifest.write_json(begun | manifested, folder / manifest.FILE_NAME)
         values = {"scenario": "still_air", "seed": ord(name), "sensing": "camera", "attempts": 0}
         texts = {
             "attempt_log": "[]",
@@ -111,6 +112,12 @@ def test_a_campaigns_folder_in_which_somebody_flew_is_still_a_campaigns(campaign
     folder = campaign("a")
     (folder / "result.json").write_text("{}")
     assert len(read_campaigns([folder])) == 1
+
+
+@pytest.mark.parametrize("version", [0, 2, "x", None])
+def test_a_manifest_of_another_format_is_refused(campaign, version):
+    with pytest.raises(DockairError, match=r"manifest.json: schema_version: expected 1, got "):
+        read_campaigns([campaign("a", schema_version=version)])
 
 
 @pytest.mark.parametrize("option", ["--out", "--evidence"])
