@@ -28,7 +28,7 @@ from dockair.rotations import Array
 from dockair.sim.air.bow_wave import write_bow_wave_velocity
 from dockair.sim.air.wake import write_wake_velocity
 
-_FLAT = 1e-6  # of the largest singular value: below it the sample points are taken to lie in one plane
+_FLAT = 1e-6  # of the design's largest singular value: below it the sample points are taken to lie in one plane
 
 
 class FrozenGusts(Protocol):
@@ -68,8 +68,8 @@ class AirMotion:
         wake: table of `wake_coefficients`, or None.
         bow_wave: vector of `bow_wave_coefficients`, or None.
         exit_T: (3,) the hose's exit in the tanker's axes [m].
-        receiver_points_B: (m, 3) sample points over the receiver, body axes [m]. Where they do not span an axis its
-            gradients are 0: the origin alone gives none.
+        receiver_points_B: (m, 3) sample points over the receiver, body axes [m]. Along an axis on which all of them
+            stand at one place gradients are 0: a single point gives none.
 
     Raises:
         DockairError: no sample point.
@@ -90,8 +90,7 @@ class AirMotion:
             raise DockairError("gust_points_m", expected="one or more points (x, y, z)", got=receiver_points_B)
         self._gusts, self._discrete, self._wake, self._bow_wave = gusts, discrete, wake, bow_wave
         self._exit_T, self._points_B = np.array(exit_T, dtype=float), points
-        design = np.column_stack([np.ones(len(points)), points])
-        self._fit = np.ascontiguousarray(np.linalg.pinv(design, rcond=_FLAT))  # Eq. (1)
+        self._fit = _least_squares(points)
         self._room: tuple[Array, ...] = (np.zeros((0, 3)),)  # for the places; written anew whenever they are asked for
         self._still = gusts is None and discrete is None and wake is None and bow_wave is None
         self._tables = (np.empty((0, 7)) if wake is None else wake), (np.empty(0) if bow_wave is None else bow_wave)
@@ -134,6 +133,17 @@ class AirMotion:
         """Room for the tow's places in B and the bow wave there; all places in T, wake and gusts there, x along F."""
         m = n + len(self._points_B)
         self._room = (*np.zeros((2, n, 3)), *np.zeros((3, m, 3)), np.zeros(m))
+
+
+def _least_squares(points_B: Array) -> Array:
+    """(4, m) what v_0 and the rows of G in Eq. (1) are of the points' velocities."""
+    ones, mean = np.ones((len(points_B), 1)), points_B.mean(axis=0)
+    _, spreads, axes = np.linalg.svd(points_B - mean)
+    flattest = _FLAT * np.linalg.norm(np.hstack([ones, points_B]), 2)
+    across = axes[np.count_nonzero(spreads > flattest) :]
+    # along these all points stand at one place, from which the least squares of least norm would make a gradient
+    within = points_B - (across @ mean) @ across
+    return np.ascontiguousarray(np.linalg.pinv(np.hstack([ones, within]), rcond=_FLAT))
 
 
 @njit(cache=True)

@@ -174,10 +174,23 @@ def test_the_rolling_gust_is_taken_at_the_centre_of_gravity_and_turns_about_x_al
     np.testing.assert_allclose(rolled, [0.02 * P_WB[0], 0.0, 0.0], atol=1e-15)
 
 
-def test_a_flat_set_of_points_has_no_gradient_across_itself_and_finds_those_within():
-    flat = POINTS * [1.0, 1.0, 0.0]
-    state = motion(discrete=Ramp([0.0, 0.3, -0.2]), points_B=flat).at(TOW, LEVEL, P_WB, LEVEL, P_WT)
+@pytest.mark.parametrize("z_m", [0.0, 1.0, -40.0])
+def test_a_flat_set_of_points_has_no_gradient_across_itself_and_finds_those_within_wherever_it_stands(z_m):
+    flat, per_metre = POINTS * [1.0, 1.0, 0.0] + [0.0, 0.0, z_m], np.array([0.0, 0.3, -0.2])
+    state = motion(discrete=Ramp(per_metre), points_B=flat).at(TOW, LEVEL, P_WB, LEVEL, P_WT)
+    np.testing.assert_allclose(state.receiver_W, P_WB[0] * per_metre, atol=1e-13)
     np.testing.assert_allclose(state.receiver_rotation_B, [0.0, 0.2, 0.3], atol=1e-13)
+
+
+ABREAST = [[1.0, 2.0, 0.0], [1.0, -2.0, 0.0], [1.0, 0.0, 0.5]]
+
+
+@pytest.mark.parametrize(("points_B", "x_m"), [(ABREAST, 1.0), ([[3.0, 0.0, 0.0]], 3.0), (2 * [[0.1, 0.7, 0.3]], 0.1)])
+def test_points_that_do_not_spread_forward_feel_the_gust_of_where_they_are_and_no_turning(points_B, x_m):
+    per_metre = np.array([0.5, 0.3, -0.2])
+    state = motion(discrete=Ramp(per_metre), points_B=points_B).at(TOW, LEVEL, P_WB, LEVEL, P_WT)
+    np.testing.assert_allclose(state.receiver_W, (P_WB[0] + x_m) * per_metre, atol=1e-13)
+    np.testing.assert_allclose(state.receiver_rotation_B, np.zeros(3), atol=1e-13)
 
 
 def test_turning_and_shifting_the_whole_scene_turns_what_is_felt():
