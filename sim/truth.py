@@ -35,7 +35,10 @@ OBSERVED = 57
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Truth:
-    """Copies, not views: a Truth stays true after the world has moved on. Frames as in docs/notation.md."""
+    """Copies, not views: a Truth stays true after the world has moved on, and who writes into one changes no flight.
+
+    Frames as in docs/notation.md.
+    """
 
     tick: int
     time_s: float
@@ -88,7 +91,7 @@ class Truth:
 
 
 class Seen(NamedTuple):
-    """What a Truth is cut out of; arrays are nobody else's."""
+    """What a Truth is cut out of. The world reads these arrays too, and nobody writes into them any more."""
 
     tick: int
     time_s: float
@@ -104,7 +107,7 @@ class Seen(NamedTuple):
 
 
 class _TruthWhenRead(Truth):
-    """A Truth whose fields are cut out whenever they are read: at most ticks few are."""
+    """A Truth whose fields are cut out whenever they are read, as copies: at most ticks few are."""
 
     __slots__ = ("_seen",)
     _seen: Seen
@@ -126,11 +129,11 @@ def truth_of(seen: Seen) -> Truth:
 
 
 def _matrix(where: slice) -> Callable[[Any], Array]:
-    return lambda truth: truth._seen.x[where].reshape(3, 3)
+    return lambda truth: truth._seen.x[where].copy().reshape(3, 3)
 
 
 def _vector(where: slice) -> Callable[[Any], Array]:
-    return lambda truth: truth._seen.x[where]
+    return lambda truth: truth._seen.x[where].copy()
 
 
 _CUT: dict[str, Callable[[Any], Any]] = {
@@ -141,18 +144,18 @@ _CUT: dict[str, Callable[[Any], Any]] = {
     "p_WP": _vector(P_WP), "v_WP": _vector(V_WP),
     "R_WD": _matrix(R_WD), "p_WD": _vector(P_WD), "v_WD": _vector(V_WD), "w_WD_D": _vector(W_WD_D),
     "p_DP": _vector(P_DP),
-    "p_WH": lambda truth: truth._seen.hose[0],
-    "R_WT": lambda truth: truth._seen.tanker[tanker_motion.R].reshape(3, 3),
-    "p_WT": lambda truth: truth._seen.tanker[tanker_motion.P],
-    "v_WT": lambda truth: truth._seen.tanker[tanker_motion.V],
-    "w_WT_T": lambda truth: truth._seen.tanker[tanker_motion.OMEGA],
+    "p_WH": lambda truth: truth._seen.hose[0].copy(),
+    "R_WT": lambda truth: truth._seen.tanker[tanker_motion.R].copy().reshape(3, 3),
+    "p_WT": lambda truth: truth._seen.tanker[tanker_motion.P].copy(),
+    "v_WT": lambda truth: truth._seen.tanker[tanker_motion.V].copy(),
+    "w_WT_T": lambda truth: truth._seen.tanker[tanker_motion.OMEGA].copy(),
     "reel_position_m": lambda truth: float(truth._seen.x[REEL_POSITION]),
     "reel_rate_m_s": lambda truth: float(truth._seen.x[REEL_RATE]),
     "root_tension_n": lambda truth: truth._seen.tensions_n[0],
     "drogue_tension_n": lambda truth: truth._seen.tensions_n[1],
     "coupling_force_n": lambda truth: truth._seen.tensions_n[2],
-    "gust_B_m_s": attrgetter("_seen.air.receiver_W"),
-    "gust_D_m_s": lambda truth: truth._seen.air.tow_W[-1],
+    "gust_B_m_s": lambda truth: truth._seen.air.receiver_W.copy(),
+    "gust_D_m_s": lambda truth: truth._seen.air.tow_W[-1].copy(),
     "airspeed_m_s": lambda truth: truth._seen.flow[0],
     "angle_of_attack_rad": lambda truth: truth._seen.flow[1],
     "sideslip_rad": lambda truth: truth._seen.flow[2],

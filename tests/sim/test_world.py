@@ -12,6 +12,7 @@ from dockair.messages import ReceiverCommand
 from dockair.parameters import load_parameters
 from dockair.rotations import exp
 from dockair.sim.air.turbulence import DrydenField, TurbulenceParameters
+from dockair.sim.aircraft.tanker import TankerPathParameters
 from dockair.sim.truth import Truth
 from dockair.streams import random_stream
 
@@ -245,6 +246,28 @@ def test_restored_world_goes_on_to_the_bit(make_world, when):
         ends.append((_digest(world), truths[-1].root_tension_n, truths[-1].coupling_force_n, truths[-1].tick))
         world.restore(state)
     assert ends[0] == ends[1]
+
+
+def test_whatever_is_written_into_a_truth_changes_neither_it_nor_the_flight_nor_what_was_saved(make_world, wind_in):
+    """A tanker that turns, a hose that is partly wound in, gusts: all that the next tick is made of."""
+    racetrack = TankerPathParameters(manoeuvre="racetrack", bank_rad=0.4)
+
+    def flown(spoilt):
+        world = make_world(p_PD_B=FAR, gusts=_gusts(8), tanker_path=racetrack)
+        wind_in(world, 2.0)
+        ends, state = [], world.save()
+        for _ in range(2):
+            for _ in range(20):
+                truth = world.step(FORWARD)
+                arrays = [getattr(truth, f.name) for f in fields(Truth)]
+                for array in [a for a in [*arrays, truth.p_DP] if spoilt and isinstance(a, np.ndarray)]:
+                    array += 1.0
+            ends.append((_digest(world), *np.concatenate([truth.gust_D_m_s, truth.p_WT, truth.specific_force_B])))
+            world.restore(state)
+        return ends
+
+    (first, again), untouched = flown(spoilt=True), flown(spoilt=False)
+    assert [first, again] == untouched and first == again
 
 
 def test_halving_the_step_moves_the_settled_drogue_by_less_than_a_millimetre(make_world):
