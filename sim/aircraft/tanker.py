@@ -108,7 +108,7 @@ class TankerPath:
         self._wanted = self._steady_flights()
         self._segments = np.zeros((1, _SEGMENT))
         self._segments[0, _PLACE] = np.zeros(3) if start_m is None else start_m
-        self._segments[0, _DURATION] = parameters.starts_s if parameters.manoeuvre != "straight" else _LONGEST_S
+        self._segments[0, _DURATION] = parameters.starts_s  # no end where nothing follows
         self._changes: list[Change] = []
         self._extend()
 
@@ -162,13 +162,12 @@ class TankerPath:
             yield _PEAK_RATE * p.descent_rad / p.pull_over_rate_rad_s, _LONGEST_S, 0.0, -p.descent_rad
 
     def _extend(self) -> bool:
-        """Append the entry into the next steady flight and that; return whether there is one."""
+        """Append the entry into the next steady flight and that; return whether there is one. The last has no end."""
         following = next(self._wanted, None)
         last = self._segments[-1]
         end_s = last[_START] + last[_DURATION]
         if following is None:
-            if self._parameters.manoeuvre != "straight" or end_s > 0.0:
-                self._segments[-1, _DURATION] = math.inf
+            self._segments[-1, _DURATION] = math.inf
             return False
         entry_s, steady_s, r, gamma = following
         self._changes.append(Change(starts_s=float(end_s), entry_s=entry_s, turn_rate_rad_s=r, climb_rad=gamma))
