@@ -26,9 +26,17 @@ and J_v the Jacobians of its turning and of its canopy's motion across by the hi
 
     max eig(M^-1 C) dt < 2,      C = 1/2 rho V (S d^2 C_q J_w'J_w + S_c C_S J_v'J_v)                     (5)
 
-Not modelled: the damping of hinges, which is implicit, and that of the air on the hose, which is explicit but slower.
+The lock of a dead reel, a spring k_l with a damper d_l (`hose.reel`), acts on what of the hose it moves, the drum's
+inertia taking no part: of a straight one all, of one that has been pushed in and folds much less. With links of mass m
+that lie across the pod's axis, an endless chain of them counts as m/sqrt(12) against being drawn in; the first of them
+lying along the axis, as m (1 + 1/sqrt(12)). Of that the link itself is relied on: Eq. (1) with
+
+    c = d_l/m,     w^2 = k_l/m                                                                            (6)
+
+Not modelled: the damping of hinges, which is implicit, and that of the air on the hose, which is explicit but slower;
+a hose that folds in the exit itself while its reel is dead, which moves less than a link.
 Source: Hairer, Lubich & Wanner, Geometric Numerical Integration, ch. I; MuJoCo's documentation on solver parameters;
-Eqs. (2) and (3) derived from the chain's kinetic and potential energy in that motion.
+Eqs. (2), (3) and (6) derived from the chain's kinetic and potential energy in those motions.
 """
 
 import mujoco
@@ -60,6 +68,7 @@ def check_step(model: mujoco.MjModel, parameters: WorldParameters, root_tension_
     slack_n = (1.0 + p.reel.tension_gain) * p.reel.set_point_fraction * root_tension_n
     for name, force_n in (("brake_force_n", p.reel.brake_force_n), ("tension_gain", slack_n)):
         needed_hz[f"parameters.reel.{name} over speed_band_m_s"] = lowest_rate_of_reel_hz(p, force_n)
+    needed_hz["parameters.reel.lock_damping_n_s_m and lock_stiffness_n_m"] = lowest_rate_of_lock_hz(p)
     needed_hz["parameters.drogue.rate_damping_coefficient and inertia_kg_m2"] = lowest_rate_in_air_hz(model, parameters)
     cause = max(needed_hz, key=lambda name: needed_hz[name])
     if step_s * needed_hz[cause] > 1.0 + 1e-9:  # rounding of a step that just fits
@@ -78,7 +87,13 @@ def lowest_rate_hz(model: mujoco.MjModel, parameters: WorldParameters, root_tens
     tube = reel.guide_stiffness_n_m2 / hose.line_density_kg_m
     squared = bending + string + 15.0 * tube  # Eq. (2)
     damping = (6.0 + 24.0 / np.sqrt(3.0)) * reel.guide_damping_ratio * np.sqrt(tube)  # Eq. (3)
-    return float(0.25 * (damping + np.sqrt(damping**2 + 4.0 * squared)))
+    return _just_met_hz(damping, squared)
+
+
+def lowest_rate_of_lock_hz(parameters: WorldParameters) -> float:
+    """Physics rate at which Eq. (1) is just met with a dead reel's lock on a folded hose, Eq. (6)."""
+    reel, moved_kg = parameters.reel, parameters.hose.link_mass_kg
+    return _just_met_hz(reel.lock_damping_n_s_m / moved_kg, reel.lock_stiffness_n_m / moved_kg)
 
 
 def lowest_rate_of_reel_hz(parameters: WorldParameters, force_n: float) -> float:
@@ -100,6 +115,11 @@ def lowest_rate_in_air_hz(model: mujoco.MjModel, parameters: WorldParameters) ->
     sideways = drogue.canopy_area_m2 * drogue.canopy_side_coefficient
     C = 0.5 * p.air.density_kg_m3 * p.airspeed_m_s * (against_turning * J_w.T @ J_w + sideways * J_v.T @ J_v)
     return float(0.5 * eigh(C, M, eigvals_only=True)[-1])
+
+
+def _just_met_hz(damping: float, squared: float) -> float:
+    """Rate at which Eq. (1) is just met, of c [1/s] and w^2 [1/s^2]."""
+    return float(0.25 * (damping + np.sqrt(damping**2 + 4.0 * squared)))
 
 
 def _chain(model: mujoco.MjModel) -> tuple[slice, Array, mujoco.MjData]:

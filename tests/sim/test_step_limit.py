@@ -8,7 +8,12 @@ from dockair.errors import DockairError
 from dockair.messages import ReceiverCommand
 from dockair.parameters import load_parameters
 from dockair.sim.hose.reel import Reel, ReelParameters
-from dockair.sim.step_limit import lowest_rate_hz, lowest_rate_in_air_hz, lowest_rate_of_reel_hz
+from dockair.sim.step_limit import (
+    lowest_rate_hz,
+    lowest_rate_in_air_hz,
+    lowest_rate_of_lock_hz,
+    lowest_rate_of_reel_hz,
+)
 
 
 def test_step_longer_than_half_a_contact_is_refused_with_its_key(make_world):
@@ -73,6 +78,51 @@ def test_below_the_motors_rate_a_slack_hose_comes_in_chattering_and_above_it_doe
     for _ in range(4000):
         rates_m_s.append(rates_m_s[-1] + step_s * (reel.step(0.0, 6.0, rates_m_s[-1]) - 1726.0) / moved_kg)
     assert (np.ptp(rates_m_s[-200:]) < 1e-6) == settles
+
+
+SOFT_TUBE = {"guide_stiffness_n_m2": 12000.0, "guide_damping_ratio": 0.1}
+HARD_LOCK = {"lock_stiffness_n_m": 300000.0, "lock_damping_n_s_m": 10000.0}
+LONG_LINKS = {"reel": SOFT_TUBE | HARD_LOCK, "hose": {"links": 8}}
+
+
+def test_step_too_long_for_a_dead_reels_lock_is_refused_with_its_keys(make_world):
+    keys = r"parameters\.reel\.lock_damping_n_s_m and lock_stiffness_n_m"
+    with pytest.raises(DockairError, match=rf"rates\.physics_hz: expected at least 666 Hz, because of {keys}"):
+        make_world(rate_hz=665, **LONG_LINKS)
+    make_world(rate_hz=666, **LONG_LINKS)
+
+
+@pytest.mark.parametrize(("share", "settles"), [(1.02, True), (0.98, False)])
+@pytest.mark.parametrize("lock", [HARD_LOCK, HARD_LOCK | {"lock_damping_n_s_m": 1.0}])
+def test_below_the_locks_rate_one_link_on_it_shakes_itself_apart_and_above_it_rests(make_world, lock, share, settles):
+    p = make_world(rate_hz=3000, reel=lock).parameters
+    step_s, place_m, rate_m_s = 1.0 / (share * lowest_rate_of_lock_hz(p)), 6.0, 0.1
+    reel = Reel(p.reel, static_root_tension_n=1918.0, static_pull_n=1876.0, set_point_n=1726.0, step_s=step_s)
+    reel.step(0.0, place_m, 0.0, locked=True)
+    for _ in range(2000):
+        rate_m_s += step_s * reel.step(0.0, place_m, rate_m_s, locked=True) / p.hose.link_mass_kg
+        place_m += step_s * rate_m_s
+        if abs(rate_m_s) > 1e6:
+            break
+    assert (abs(rate_m_s) < 0.1) == settles
+
+
+@pytest.mark.parametrize(("share", "stays"), [(1.0, True), (0.4, False)])
+def test_hose_pushed_in_on_a_dead_reel_folds_at_the_lowest_rate_and_diverges_well_below(
+    make_world, monkeypatch, share, stays
+):
+    """A receiver that latches at 1.6 m/s and then slows down: it folds a hose that cannot be taken up."""
+    monkeypatch.setattr(dockair.sim.world, "check_step", lambda *_: None)
+    rate_hz = int(np.ceil(share * lowest_rate_of_lock_hz(make_world(**LONG_LINKS).parameters)))
+    world = make_world(p_PD_B=(0.1, 0.0, 0.0), rate_hz=rate_hz, reel_locked=lambda _: True, **LONG_LINKS)
+    finished = True
+    try:
+        for tick in range(3 * rate_hz):
+            forward_m_s = 1.6 - 0.24 * max(tick / rate_hz - 0.2, 0.0)
+            world.step(ReceiverCommand(velocity_m_s=np.array([forward_m_s, 0.0, 0.0])))
+    except DockairError:
+        finished = False
+    assert finished == stays
 
 
 WIDE_AND_LIGHT = {"rate_damping_coefficient": 20.0, "drag_diameter_m": 0.81, "inertia_kg_m2": [0.05, 0.05, 0.05]}
