@@ -67,10 +67,10 @@ def with_numbers(seen: LedObservation, count: int) -> LedObservation:
     0 ... count - 1 or is another's, too: nobody can say which of the two it is.
     """
     kept = np.isfinite(seen.centroids_px).all(axis=1) & np.isfinite(seen.sigma_px) & (seen.sigma_px > 0.0)
-    numbers, given = seen.led_numbers, np.zeros(count, dtype=int)
+    numbers = np.asarray(seen.led_numbers)
     kept &= (numbers >= 0) & (numbers < count)
-    np.add.at(given, numbers[kept], 1)
-    kept[kept] = given[numbers[kept]] == 1
+    found, times = np.unique(numbers[kept], return_counts=True)
+    kept &= np.isin(numbers, found[times == 1])
     if kept.all():
         return seen
     return only(seen, kept)

@@ -200,7 +200,7 @@ class Navigator:
             command=command,
             window=None if np.isfinite(exposure_s) else self._finder.window(self._time_s),
             frame_time_stamp_s=self._update.used_time_s,
-            candidates_px=self._candidates_px,
+            candidates_px=self._candidates_px.copy(),  # of a frame that is told from the next one by it
             led_pixels_px=self._update.led_pixels_px.copy(),
             contact_usable=contact_usable,
             phase_reason=self._guidance.phase_reason,

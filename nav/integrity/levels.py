@@ -85,9 +85,9 @@ def slope_levels(
 def separation_levels(
     passed: Sequence[Exclusion], sight: LinesOfSight, test: FaultTest
 ) -> tuple[ProtectionLevels, bool]:
-    """Return the levels of the first exclusion, Eq. (2), and whether no other is tilted to the other side of frontal.
+    """Return the levels of the first exclusion, Eq. (2), and whether its attitude is the only one that passes.
 
-    The mirror image may well pass without another LED than the one that the first leaves out.
+    Others without the same LED are its mirror image; without another one, those tilted to the other side of frontal.
 
     Args:
         passed: exclusions that pass the test; the first is believed.
@@ -97,7 +97,8 @@ def separation_levels(
     k, first = np.array(test.error_sigmas), passed[0]
     bounds = [_distance(other.pose, first.pose) + k * worst_sigmas(other.pose.covariance) for other in passed]
     tilts = [_tilt(other.pose) for other in passed]
-    alone = all(tilts[0] @ tilt > 0.0 for tilt in tilts)
+    others = zip(passed[1:], tilts[1:], strict=True)
+    alone = all(other.led != first.led and tilts[0] @ tilt > 0.0 for other, tilt in others)
     return _levels(np.max(bounds, axis=0), first.pose, sight, alone), alone
 
 

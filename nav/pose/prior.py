@@ -15,6 +15,7 @@ from dockair.rotations import Array
 
 _UNIT, _ZERO, _NOTHING = np.eye(3), np.zeros(3), np.zeros((0, 0))
 _UNIT_LENGTH = 1e-6  # error of a unit vector's length that is taken for rounding
+_ASYMMETRY = 1e-9  # of a covariance, in sigmas, that is taken for rounding
 
 Terms = tuple[Array, Array, Array, Array, Array, float]
 NO_PRIOR: Terms = (_UNIT, _ZERO, _NOTHING, _ZERO, _ZERO, 0.0)  #: what `descent_kernels.descend` takes for no prior
@@ -39,18 +40,19 @@ class PosePrior:
         shapes = R.shape, p.shape, np.shape(self.covariance)
         if shapes != ((3, 3), (3,), (6, 6)):
             raise DockairError("prior", expected="R_CD (3, 3), p_CD (3,), covariance (6, 6)", got=shapes)
-        for name, numbers in {"R_CD": R, "p_CD": p, "covariance": self.covariance}.items():
-            if not np.isfinite(numbers).all():
-                raise DockairError(f"prior.{name}", expected="finite numbers", got=numbers)
         covariance = np.asarray(self.covariance, dtype=float)
-        expected = "a covariance of full rank, symmetric and positive definite"
-        if not np.allclose(covariance, covariance.T, rtol=1e-9, atol=0.0):
+        for name, numbers in {"R_CD": R, "p_CD": p, "covariance": covariance}.items():
+            if not np.isfinite(numbers).all():
+                raise DockairError(f"prior.{name}", expected="finite numbers", got="NaN or inf among them")
+        expected, sigmas = "a covariance, symmetric and positive definite", np.sqrt(np.abs(np.diag(covariance)))
+        if (np.abs(covariance - covariance.T) > _ASYMMETRY * np.outer(sigmas, sigmas)).any():
             raise DockairError("prior.covariance", expected=expected, got="one that is not symmetric")
         try:
             np.linalg.cholesky(covariance)
             return R, p, np.linalg.inv(covariance), _ZERO, _ZERO, 0.0
         except np.linalg.LinAlgError:
-            raise DockairError("prior.covariance", expected=expected, got="one that is not") from None
+            got = f"one whose least eigenvalue is {np.linalg.eigvalsh(covariance)[0]:.3g}"
+            raise DockairError("prior.covariance", expected=expected, got=got) from None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

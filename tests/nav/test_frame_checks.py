@@ -103,3 +103,10 @@ def test_leds_with_a_name_that_is_no_led_s_or_another_s_too_are_left_out(numbers
         time_stamp_s=NOW_S, led_numbers=np.array(numbers), centroids_px=np.ones((3, 2)), sigma_px=np.full(3, 0.1)
     )
     assert with_numbers(seen, 8).led_numbers.tolist() == left
+
+
+def test_numbers_of_no_led_at_all_may_be_of_any_kind():
+    seen = LedObservation(
+        time_stamp_s=NOW_S, led_numbers=np.array([]), centroids_px=np.empty((0, 2)), sigma_px=np.array([])
+    )
+    assert with_numbers(seen, 8) is seen

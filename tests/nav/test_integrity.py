@@ -14,7 +14,8 @@ from dockair.calibration import Camera, LedRing
 from dockair.errors import DockairError
 from dockair.nav.integrity.contact import ContactLimits, Doubt, usable_for_contact
 from dockair.nav.integrity.fault_test import IntegritySettings, fault_test
-from dockair.nav.integrity.levels import ProtectionLevels
+from dockair.nav.integrity.levels import ProtectionLevels, separation_levels
+from dockair.nav.integrity.minima import Exclusion
 from dockair.nav.integrity.monitor import Integrity, IntegrityStatus, check_integrity
 from dockair.nav.integrity.sensitivity import ATTITUDE, LATERAL, RANGE, moved_by_places, sensitivity, worst_sigmas
 from dockair.nav.pose.difference import pose_difference
@@ -306,6 +307,16 @@ def test_without_another_led_the_mirror_image_may_pass_so_that_an_exclusion_does
     assert result.status is IntegrityStatus.EXCLUDED
     assert np.linalg.norm(log(result.pose.R_CD @ R.T)) > 1.3 * tilt_rad
     assert not result.mirror_ruled_out and np.isinf(result.levels.attitude_rad)
+
+
+def test_two_poses_without_the_same_led_are_no_single_attitude_on_whichever_side_they_lie():
+    R, p = pose_at(6.0, 10.0)
+    pose = solve_pose(pixels_at(R, p), RING, CAMERA, sigma_px=SIGMA_PX)
+    turned = replace(pose, R_CD=exp(np.deg2rad(2.0) * np.array([0.0, 0.6, 0.8])) @ pose.R_CD)
+    test = fault_test(8, IntegritySettings())
+    for led, alone in ((3, False), (4, True)):
+        found = [Exclusion(3, pose), Exclusion(led, turned)]
+        assert separation_levels(found, pose.measurement, test)[1] == alone
 
 
 @pytest.mark.parametrize("seed", [2163, 2749, 4691])  # rounding makes J - max t_i positive, where it is 0

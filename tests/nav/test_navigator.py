@@ -1158,27 +1158,40 @@ def test_who_writes_into_a_solution_changes_nothing_that_comes_after_it():
     for k in range(30):
         leds = range(8) if k < 20 else ()
         plain, written = (step_on_leds(sky, leds) for sky in skies)
-        for name in ("p_PD_B", "v_PD_B", "R_BD", "covariance", "led_pixels_px"):
+        for name in ("p_PD_B", "v_PD_B", "R_BD", "covariance", "led_pixels_px", "candidates_px"):
             np.testing.assert_array_equal(getattr(plain, name), getattr(written, name))
             getattr(written, name)[...] = 0.3
     assert plain.valid
 
 
+def test_who_writes_into_a_solution_does_not_hide_a_camera_that_hangs():
+    sky = Sky(None, still)
+    imu = sky.imu()
+    seen = named(sky, range(8), imu[-1].time_stamp_s)
+    sky.navigator.step(imu, seen).candidates_px[...] = 0.3
+    imu = sky.imu()
+    assert sky.navigator.step(imu, replace(seen, time_stamp_s=imu[-1].time_stamp_s)).status == "frame stuck"
+
+
 def test_the_clock_may_begin_anywhere_and_with_a_tick_that_brings_no_sample():
-    statuses = []
+    statuses, felts_m_s = [], []
     for begins_s in (0.0, 1000.0):
         sky, told, of_run = Sky(None, still), [], []
         guided, begun = sky.navigator._guidance.step, sky.navigator._update.begin_again
-        sky.navigator._guidance.step = lambda state, g=guided, told=told: told.append(state.frame_age_s) or g(state)
+        sky.navigator._guidance.step = lambda state, g=guided, told=told: told.append(state) or g(state)
         sky.navigator._update.begin_again = lambda seen, b=begun, of=of_run: of.append("begun again") or b(seen)
         sky.navigator.step((), None)
         for _ in range(6):
-            imu = [replace(each, time_stamp_s=each.time_stamp_s + begins_s) for each in sky.imu()]
+            felt = sky.imu(specific_force_m_s2=np.array([0.3, 0.0, 9.8]))
+            imu = [replace(each, time_stamp_s=each.time_stamp_s + begins_s) for each in felt]
             seen = replace(named(sky, range(8), 0.0), time_stamp_s=imu[-1].time_stamp_s)
             of_run.append(sky.navigator.step(imu, seen if sky.tick > 2 else None).status)
         statuses.append(of_run)
-        assert max(told) < 0.05
+        assert max(state.frame_age_s for state in told) < 0.05
+        felts_m_s.append([state.dv_WP_B for state in told[1:]])
     assert statuses[0] == statuses[1] and "begun again" not in statuses[1]
+    assert np.isfinite(felts_m_s).all()
+    np.testing.assert_allclose(*felts_m_s, atol=1e-9)
 
 
 @pytest.mark.parametrize(("count", "begins"), [(5, False), (6, True)])

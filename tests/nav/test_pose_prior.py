@@ -88,6 +88,15 @@ def test_direction_adds_its_information_across_and_none_about_it():
     np.testing.assert_allclose((both - alone)[3:, 3:], 0.0, atol=1e-5 * both[3:, 3:].max())
 
 
+def test_a_covariance_that_is_turned_into_other_axes_is_symmetric_but_for_rounding():
+    R = exp(np.array([0.3, -0.7, 1.1]))
+    J = np.kron(np.eye(2), R)
+    P = J @ np.diag([0.01] * 3 + [0.2] * 3) @ J.T
+    assert (P != P.T).any()
+    N = PosePrior(R_CD=R, p_CD=8.0 * X, covariance=P).terms[2]
+    np.testing.assert_allclose(N @ P, np.eye(6), atol=1e-12)
+
+
 @pytest.mark.parametrize(
     ("build", "where"),
     [
