@@ -28,6 +28,7 @@ from dockair.rotations import Array
 from dockair.sim.air.bow_wave import write_bow_wave_velocity
 from dockair.sim.air.wake import write_wake_velocity
 
+_ROUNDING = 1e-12  # of the largest singular value: below it one is 0
 _FLAT = 1e-6  # of the design's largest singular value: below it the sample points are taken to lie in one plane
 
 
@@ -142,8 +143,8 @@ def _least_squares(points_B: Array) -> Array:
     flattest = _FLAT * np.linalg.norm(np.hstack([ones, points_B]), 2)
     across = axes[np.count_nonzero(spreads > flattest) :]
     # along these all points stand at one place, from which the least squares of least norm would make a gradient
-    within = points_B - (across @ mean) @ across
-    return np.ascontiguousarray(np.linalg.pinv(np.hstack([ones, within]), rcond=_FLAT))
+    within = points_B - points_B @ across.T @ across
+    return np.ascontiguousarray(np.linalg.pinv(np.hstack([ones, within]), rcond=_ROUNDING))
 
 
 @njit(cache=True)

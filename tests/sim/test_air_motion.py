@@ -47,6 +47,13 @@ class Ramp:
         return self.rolling_rad_s * rolling_x
 
 
+class Uniform(Ramp):
+    """The same gust everywhere."""
+
+    def velocity(self, x):
+        return np.tile(self.per_metre, (len(x), 1))
+
+
 def dryden(seed=4):
     parameters = load_parameters("turbulence", TurbulenceParameters, {"sigma_m_s": 2.0})
     return DrydenField(parameters, V, STEP_S, np.random.default_rng(seed), 9.144)
@@ -180,6 +187,16 @@ def test_a_flat_set_of_points_has_no_gradient_across_itself_and_finds_those_with
     state = motion(discrete=Ramp(per_metre), points_B=flat).at(TOW, LEVEL, P_WB, LEVEL, P_WT)
     np.testing.assert_allclose(state.receiver_W, P_WB[0] * per_metre, atol=1e-13)
     np.testing.assert_allclose(state.receiver_rotation_B, [0.0, 0.2, 0.3], atol=1e-13)
+
+
+@pytest.mark.parametrize("spread_m", [0.0, 0.01])
+def test_a_plane_that_is_turned_far_off_and_almost_flat_feels_the_whole_gust(spread_m):
+    turned = exp(np.array([0.4, -0.3, 0.2]))
+    points = (POINTS * [1.0, 1.0, spread_m / np.ptp(POINTS[:, 2])] + [0.0, 0.0, -20.0]) @ turned.T
+    uniform = np.array([1.0, -2.0, 10.0])
+    state = motion(discrete=Uniform(uniform), points_B=points).at(TOW, LEVEL, P_WB, LEVEL, P_WT)
+    np.testing.assert_allclose(state.receiver_W, uniform, atol=1e-6)
+    np.testing.assert_allclose(state.receiver_rotation_B, np.zeros(3), atol=1e-6)
 
 
 ABREAST = [[1.0, 2.0, 0.0], [1.0, -2.0, 0.0], [1.0, 0.0, 0.5]]
