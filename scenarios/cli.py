@@ -282,7 +282,7 @@ def _working_folder() -> str:
 def _got(error: typer.TyperException, said: str, words: list[str]) -> str:
     """Return what was given to the option that an error is about, as the end of its line, unless it says so itself."""
     names = getattr(getattr(error, "param", None), "opts", ())
-    for word, after in pairwise([*words, ""]):
+    for word, after in reversed(list(pairwise([*words, ""]))):  # of several the last counts
         name, equals, value = word.partition("=")
         if name in names and name.startswith("-"):
             got = value if equals else after

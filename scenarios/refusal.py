@@ -7,7 +7,7 @@ from typing import Any, Literal, Union, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
-from pydantic_core import PydanticCustomError
+from pydantic_core import ErrorDetails, PydanticCustomError
 
 from dockair.errors import DockairError
 
@@ -38,13 +38,13 @@ def refusal(error: ValidationError, model: type[BaseModel], place: Callable[[str
         model: the outermost model.
         place: from a dotted key to what its writer would call the place (file and key).
     """
-    found = error.errors(include_url=False)
+    found = [_of_the_list(one) for one in error.errors(include_url=False)]
     places = [one["loc"] for one in found]
     # of a list with a wrong entry pydantic says besides that it is too short: only the entry is at fault
     found = [one for one in found if not any(_holds(one["loc"], place) for place in places)]
     first, *others = sorted(found, key=lambda one: one["type"] != _UNKNOWN)
     where = place(_dotted(first["loc"]))
-    also = [_dotted(other["loc"]) for other in others]
+    also = dict.fromkeys(_dotted(other["loc"]) for other in others if other["loc"] != first["loc"])
     if first["type"] == _UNKNOWN:
         name = str(first["loc"][-1])
         exists = [*sorted(_model_at(model, first["loc"][:-1]).model_fields), *_elsewhere(model, name)]
@@ -53,13 +53,16 @@ def refusal(error: ValidationError, model: type[BaseModel], place: Callable[[str
         return DockairError(where, **first["ctx"], also=also)
     field = _field_at(model, first["loc"])
     if first["type"] == "missing":
-        if isinstance(first["loc"][-1], int):  # too few of them: what is said of is all of them
-            return DockairError(
-                place(_dotted(first["loc"][:-1])), expected=_expected(field), got=first["input"], also=also
-            )
         return DockairError(where, expected=_expected(field), got="nothing", also=also)
     choices = () if _is_list_asked(field, first["loc"]) else _choices(field)
     return DockairError(where, expected=_expected(field), got=first["input"], exists=choices, also=also)
+
+
+def _of_the_list(one: ErrorDetails) -> ErrorDetails:
+    """Of a number that is missing in a list the list is at fault."""
+    if one["type"] == "missing" and isinstance(one["loc"][-1], int):
+        return {**one, "type": "too_short", "loc": one["loc"][:-1]}
+    return one
 
 
 def _holds(outer: Sequence[int | str], inner: Sequence[int | str]) -> bool:

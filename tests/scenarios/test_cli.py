@@ -126,6 +126,16 @@ def flights(monkeypatch, tmp_path):
         (("fly", "--set", "=1"), "--set: expected key=value, as in turbulence.sigma_m_s=1.1, got '=1'"),
         (("fly", "--seed", "-1"), "Invalid value for '--seed': Input should be greater than or equal to 0, got '-1'"),
         (
+            (
+                "fly",
+                "--seed",
+                "3",
+                "--seed",
+                "-1",
+            ),
+            "Invalid value for '--seed': Input should be greater than or equal to 0, got '-1'",
+        ),
+        (
             ("fly", "--seed=9223372036854775808"),
             "Invalid value for '--seed': Input should be less than or equal to 9223372036854775807, got '922337203685",
         ),

@@ -78,6 +78,20 @@ def test_a_wrong_value_is_refused_in_one_line_with_file_and_key(scenario_file, t
     assert caught.value.exit_code == 2
 
 
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("start.sigma_m = []", f"start.sigma_m: expected {SIGMAS}, got ()"),
+        ("faults = 3", "faults: expected "),
+    ],
+)
+def test_a_list_that_is_wrong_as_a_whole_is_told_once_and_without_the_keys_of_an_entry(scenario_file, text, said):
+    with pytest.raises(DockairError) as caught:
+        load_scenario(scenario_file(f'name = "mine"\n{text}'))
+    assert said in str(caught.value)
+    assert "also wrong" not in str(caught.value) and "exists" not in str(caught.value)
+
+
 def test_of_several_mistakes_an_unknown_key_is_told_and_the_places_of_the_others(scenario_file):
     path = scenario_file('name = "mine"\n[flight]\nairspeed_m_s = 1\naltitude_m = -1\nmach = 2')
     with pytest.raises(DockairError, match=r"flight\.mach: expected a known key, got 'mach'") as caught:
