@@ -244,7 +244,7 @@ def test_a_last_line_that_is_whole_and_no_entry_is_damage_and_stays(here, tmp_pa
 
 def test_a_damaged_manifest_is_one_line_and_fresh_writes_another(here, tmp_path):
     fly(plan(tmp_path), tmp_path / "out")
-    for text in ("", '{"plan": {"name": "p"}, "plug_ins": 3}'):
+    for text in ("", '{"schema_version": 1, "plan": {"name": "p"}, "plug_ins": 3}'):
         (tmp_path / "out/manifest.json").write_text(text)
         with pytest.raises(DockairError, match=r"manifest.json: expected "):
             fly(plan(tmp_path), tmp_path / "out")

@@ -78,7 +78,7 @@ def test_there_is_a_right_table_of_every_kind_above():
             "faults[0].stop_s: expected a time after start_s = 3.0, got 3.0",
         ),
         ("kind = 'hot_pixels', count = 0", "faults[0].count: expected an integer from 1 to 100000, got 0"),
-        ("kind = 'gyro_bias_step', rate_deg_s = [1.0]", "faults[0].rate_deg_s[1]: expected three numbers"),
+        ("kind = 'gyro_bias_step', rate_deg_s = [1.0]", "faults[0].rate_deg_s: expected three numbers"),
         ("kind = 'gyro_bias_step', rate_deg_s = [0.0, -1e300, 0.0]", "faults[0].rate_deg_s[1]: expected three numbers"),
         ("kind = 'exposure_stuck', exposure_us = 0.0", "faults[0].exposure_us: expected a number above 0.0"),
     ],

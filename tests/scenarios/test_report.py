@@ -501,7 +501,8 @@ def test_a_flight_in_two_campaigns_is_refused(tmp_path):
     for name in ("a", "b"):
         folder = tmp_path / name
         folder.mkdir()
-        manifests.write_json({"plan": {"name": name}}, folder / manifests.FILE_NAME)
+        begun = {"schema_version": manifests.SCHEMA_VERSION, "plan": {"name": name}}
+        manifests.write_json(begun, folder / manifests.FILE_NAME)
         table.write_table([_row(0)], folder)
         folders.append(folder)
     assert len(read_campaigns(folders[:1])[0].rows) == 1
