@@ -106,8 +106,9 @@ def pose_bound(
     prior = np.zeros((6, 6)) if prior_information is None else _finite(prior_information, "prior_information", (6, 6))
     information, covariance = np.full((len(points), 6, 6), np.nan), np.full((6, 6), np.nan)
     with np.errstate(over="ignore", invalid="ignore"):  # what overflows has no inverse and is told by the status
-        in_front = _in_front(points @ R.T + p)
-        seen = _on_sensor(points @ R.T + p, in_front, camera) if sensor_edges else in_front
+        points_C = points @ R.T + p
+        in_front = _in_front(points_C)
+        seen = _on_sensor(points_C, in_front, camera) if sensor_edges else in_front
         information[seen] = _information(points[seen], R, p, camera, sigma[seen])
         if prior_information is not None or seen.sum() >= 3:
             status, covariance = _inverse(information[seen].sum(axis=0) + prior)

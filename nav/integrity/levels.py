@@ -96,9 +96,8 @@ def separation_levels(
     """
     k, first = np.array(test.error_sigmas), passed[0]
     bounds = [_distance(other.pose, first.pose) + k * worst_sigmas(other.pose.covariance) for other in passed]
-    tilts = [_tilt(other.pose) for other in passed]
-    others = zip(passed[1:], tilts[1:], strict=True)
-    alone = all(other.led != first.led and tilts[0] @ tilt > 0.0 for other, tilt in others)
+    tilt = _tilt(first.pose)
+    alone = all(other.led != first.led and tilt @ _tilt(other.pose) > 0.0 for other in passed[1:])
     return _levels(np.max(bounds, axis=0), first.pose, sight, alone), alone
 
 

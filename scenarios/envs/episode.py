@@ -101,7 +101,9 @@ class Episodes(gymnasium.Env[Obs, NDArray[np.float32]], Generic[Obs]):
         self._outcome: Outcome | None = None
         self._judge, self._seed = AttemptJudge(attempts), 0
         self.imu: ImuSample | None = None  #: the newest sample; None until the first
-        self.metadata = self._metadata_of(self.chosen_scenario({}))
+        chosen = self.chosen_scenario({})
+        require_buildable(chosen)  # as every flight does when it is built, but before the first reset
+        self.metadata = self._metadata_of(chosen)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Obs, dict[str, Any]]:
         """Begin a flight; its first control tick is flown on the trimmed path.
@@ -268,9 +270,7 @@ class Episodes(gymnasium.Env[Obs, NDArray[np.float32]], Generic[Obs]):
             # a scenario's own gives way to the environment's; what is asked for here would be ignored without a word
             expected = f'"{self.sensing}", which this environment is made for'
             raise DockairError("options.set: camera.sensing", expected=expected, got=sensing)
-        scenario = self.with_sensing(scenario)
-        require_buildable(scenario)
-        return scenario
+        return self.with_sensing(scenario)
 
     def with_sensing(self, scenario: Scenario) -> Scenario:
         """Return a scenario with the environment's own sensing.
