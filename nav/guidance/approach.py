@@ -73,7 +73,7 @@ class Guidance:
         self._entered_m = 0.0  # how far off when the tip last came past it
         self._station = np.array([settings.stand_off_m, 0.0, 0.0])
         speeds = settings.closure_speed_m_s, settings.closure_acceleration_m_s2
-        self._closure = Closure(settings.closing, *speeds, self._dt)
+        self._closure = Closure(settings.closing, *speeds, self._dt, settings.response_s[0])
         self._clocks = PhaseClocks(self._dt, settings.limits)
         self._attempts, self._light = 0, Light.AMBER
         self._take_in = TakeIn(settings, self._dt)
@@ -104,7 +104,7 @@ class Guidance:
             self._keep_company(state, ring, rate)
         self._observe(state, ring, rate)
         self._reckon(state, ring)
-        self._count(state, ring, rate, lateral_m)
+        self._count(state, ring, rate, coupling, lateral_m)
         seen = state.usable and not self._coasts(state)
         self._hose.step(self.phase, coupling, coupling - ring, seen=seen)
         self._trail.step(self.phase, coupling, coupling - ring, seen=seen)
@@ -167,7 +167,7 @@ class Guidance:
         not_shown = state.not_shown and frames_come and self.phase not in TOUCHING
         self._reckoning.miss(self._u, self._axes.R_NB, not_shown=not_shown)
 
-    def _count(self, state: RelativeState, ring: Array, rate: Array, lateral_m: float) -> None:
+    def _count(self, state: RelativeState, ring: Array, rate: Array, coupling: Array, lateral_m: float) -> None:
         """Count time and way in the phase that is flown."""
         ring_ahead_m = float(ring[0])
         self._clocks.step(
@@ -179,7 +179,7 @@ class Guidance:
             light=self._light,
         )
         if self.phase is Phase.APPROACH:
-            self._close(state, ring_ahead_m, -float(rate[0]))
+            self._close(state, ring_ahead_m, float(coupling[0]), -float(rate[0]))
         if ring_ahead_m > 0.0:
             self._entered_m = 0.0
         elif self._entered_m == 0.0 and math.isfinite(lateral_m):
@@ -196,13 +196,14 @@ class Guidance:
             and self._controller.bears_the_gusts
         )
 
-    def _close(self, state: RelativeState, distance_m: float, closing_m_s: float) -> None:
+    def _close(self, state: RelativeState, distance_m: float, coupling_m: float, closing_m_s: float) -> None:
         """Say how good a moment it is to close; the longer one has been waited for, the less is asked of it."""
         s, late = self._settings, self._late
         error = float(np.hypot(*self._controller.error_to_come(self._aim_now())))
         miss = self._miss.at_contact_m(error, distance_m, s.closure_speed_m_s)
         self._closure.step(
             distance_m,
+            coupling_m,
             closing_m_s,
             known=state.usable and state.contact_usable,
             miss=miss / (late * s.limits.capture_radius_m),
@@ -263,7 +264,7 @@ class Guidance:
             self._attempts, self._passed = self._attempts + 1, None
             self._closure.begin()
         elif self.phase is Phase.CONTACT:
-            self._take_in.begin(self._closure.speed_m_s)
+            self._take_in.begin(self._u[0] - self._controller.steady_drift_m_s[0])
         elif self.phase in (Phase.BACK_OFF, Phase.BREAKAWAY):
             self._is_recalled = before is Phase.APPROACH and transition.reason == RED_LIGHT and situation.committed
             if self._passed is not None and self._closure.committed:  # else it did not mean to meet the drogue
@@ -297,7 +298,7 @@ class Guidance:
             distance_m = float(ring[0])
             wanted = Wanted(
                 distance_m=None,
-                speed_m_s=self._closure.speed_m_s,
+                speed_m_s=0.0 if self._closure.eases_off else self._closure.speed_m_s,
                 aim_m=self._aim_now() + self._clearance(ring, lateral_m),
                 patient=self._is_patient,
                 must_follow=True,

@@ -29,11 +29,22 @@ def test_what_is_commanded_at_the_coupling_is_still_flown():
 
 def test_contact_comes_to_rest_where_it_is_to_hold_and_never_goes_back():
     take_in = begun()
+    flown(take_in, Phase.CONTACT, Light.AMBER, LIMITS.slack_to_s)
     first_m_s = min(SETTINGS.closure_speed_m_s, SETTINGS.take_in_gain_1_s * LIMITS.take_in_m)
     assert take_in.speed_m_s(Phase.CONTACT, Light.AMBER) == first_m_s
     assert flown(take_in, Phase.CONTACT, Light.GREEN, 60.0) == pytest.approx(LIMITS.take_in_m, abs=1e-3)
     take_in.step(10.0 / STEP_S, Light.GREEN)
     assert take_in.speed_m_s(Phase.CONTACT, Light.GREEN) == 0.0
+
+
+def test_it_is_not_pushed_in_before_it_is_told_whether_the_hose_is_slack():
+    take_in = begun()
+    assert flown(take_in, Phase.CONTACT, Light.AMBER, LIMITS.slack_to_s - STEP_S) == 0.0
+    assert take_in.speed_m_s(Phase.CONTACT, Light.AMBER) == 0.0
+    assert flown(take_in, Phase.CONTACT, Light.AMBER, STEP_S) == 0.0
+    assert take_in.speed_m_s(Phase.CONTACT, Light.AMBER) > 0.5
+    take_in.begin(0.0)
+    assert take_in.speed_m_s(Phase.CONTACT, Light.AMBER) == 0.0
 
 
 def test_a_hold_under_amber_goes_on_by_a_set_way_and_no_further():
