@@ -73,7 +73,7 @@ class Guidance:
         self._entered_m = 0.0  # how far off when the tip last came past it
         self._station = np.array([settings.stand_off_m, 0.0, 0.0])
         speeds = settings.closure_speed_m_s, settings.closure_acceleration_m_s2
-        self._closure = Closure(settings.closing, *speeds, self._dt, settings.response_s[0])
+        self._closure = Closure(settings.closing, *speeds, self._dt)
         self._clocks = PhaseClocks(self._dt, settings.limits)
         self._attempts, self._light = 0, Light.AMBER
         self._take_in = TakeIn(settings, self._dt)

@@ -10,8 +10,8 @@ as long as the moment is hopeful. At the last moment it must be good: the predic
 the drogue's swing so small that a gust on the rest of the way can be met. Then the receiver is committed and gains its
 full speed; else it is called back to where it runs up again.
 
-What is asked for within the response time tau of the coupling is flown in contact: from there on the committed receiver
-eases off, and meets the coupling at c all the same,
+What is asked for within the response time tau (`closing`) of the coupling is flown in contact. From there on the
+committed receiver eases off, and meets the coupling at c all the same,
 
     distance to the coupling <= c tau                                                                     (2)
 
@@ -32,14 +32,10 @@ class Closure:
         full_m_s: closure speed at contact.
         ramp_m_s2: a_c.
         step_s: control period.
-        response_s: tau, delay of the tip along.
     """
 
-    def __init__(
-        self, settings: ClosingSettings, full_m_s: float, ramp_m_s2: float, step_s: float, response_s: float
-    ) -> None:
+    def __init__(self, settings: ClosingSettings, full_m_s: float, ramp_m_s2: float, step_s: float) -> None:
         self._settings, self._full_m_s, self._ramp_m_s2, self._step_s = settings, full_m_s, ramp_m_s2, step_s
-        self._response_s = response_s
         self.begin()
 
     def begin(self) -> None:
@@ -73,7 +69,7 @@ class Closure:
         falls_back = self._recalled or (not closes and distance_m < s.wait_at_m)
         goes = self.committed or (hopeful and not falls_back)
         self._ramp(goes, falls_back)
-        self.eases_off = self.eases_off or (self.committed and coupling_m <= self.speed_m_s * self._response_s)
+        self.eases_off = self.eases_off or (self.committed and coupling_m <= self.speed_m_s * s.response_s)
         self.waiting_s = self.waiting_s + self._step_s if self.speed_m_s <= 0.0 else 0.0
 
     def _ramp(self, goes: bool, falls_back: bool) -> None:

@@ -10,12 +10,12 @@ from dockair.nav.guidance.closure import Closure
 
 SETTINGS, STEP_S, FULL_M_S, RAMP_M_S2 = ClosingSettings(), 0.01, 1.2, 0.6
 LAG_S, BRAKES_M_S2 = 0.3, 0.75
-RESPONSE_S, DEPTH_M = 0.28, 0.3  # of the tip along; coupling beyond the ring
+DEPTH_M = 0.3  # ring plane to coupling
 
 
 def _flown(moment, seconds=60.0, settings=SETTINGS, start_m=4.0, blown_m_s=0.0, brakes=BRAKES_M_S2):
     """Distance and speed tick by tick of a tip with a first-order lag; `moment(t, distance)` says miss and unrest."""
-    closure, distance, speed, out = Closure(settings, FULL_M_S, RAMP_M_S2, STEP_S, RESPONSE_S), start_m, blown_m_s, []
+    closure, distance, speed, out = Closure(settings, FULL_M_S, RAMP_M_S2, STEP_S), start_m, blown_m_s, []
     for i in range(round(seconds / STEP_S)):
         miss, unrest = moment(i * STEP_S, distance)
         closure.step(distance, distance + DEPTH_M, speed, known=np.isfinite(miss), miss=miss, unrest=unrest)
@@ -95,7 +95,7 @@ def test_an_airframe_that_brakes_half_as_well_is_called_back_short_of_the_ring_t
 
 def test_its_speed_changes_by_the_ramp_but_when_it_is_called_back_by_the_rate_for_that():
     """Run up, hope lost far off, run up again, called back, and at the place to run up from run up once more."""
-    closure = Closure(SETTINGS, FULL_M_S, RAMP_M_S2, STEP_S, RESPONSE_S)
+    closure = Closure(SETTINGS, FULL_M_S, RAMP_M_S2, STEP_S)
     for distance_m, miss, rate_m_s2, comes_to in (
         (4.0, 0.5, RAMP_M_S2, SETTINGS.run_up_m_s),
         (3.0, 9.0, -RAMP_M_S2, 0.0),
@@ -118,15 +118,15 @@ def _at(closure, coupling_m, *, miss=0.5, ticks=1):
 
 
 def test_it_eases_off_one_response_time_short_of_the_coupling_and_only_once_committed():
-    closure = Closure(SETTINGS, FULL_M_S, RAMP_M_S2, STEP_S, RESPONSE_S)
+    closure = Closure(SETTINGS, FULL_M_S, RAMP_M_S2, STEP_S)
     assert not _at(closure, 4.0, ticks=500)
     assert not _at(closure, 0.1, miss=9.0)  # called back, and blown there
     closure.begin()
     _at(closure, 4.0, ticks=500)
     assert not _at(closure, 1.5, ticks=100)
     assert closure.committed and closure.speed_m_s == FULL_M_S
-    assert not _at(closure, FULL_M_S * RESPONSE_S + 1e-6)
-    assert _at(closure, FULL_M_S * RESPONSE_S - 1e-6)
+    assert not _at(closure, FULL_M_S * SETTINGS.response_s + 1e-6)
+    assert _at(closure, FULL_M_S * SETTINGS.response_s - 1e-6)
     assert _at(closure, 1.0)  # a drogue that is pushed away does not make it gain speed again
     assert closure.speed_m_s == FULL_M_S  # by which contact is timed
     closure.begin()
