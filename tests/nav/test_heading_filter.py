@@ -88,6 +88,30 @@ def test_without_frames_sigma_is_the_bias_s_times_the_time_and_the_gyro_s_walk()
     assert slow.sigma_rad == pytest.approx(expected, rel=0.02)
 
 
+def at_rest_or_turning(rate_rad_s=0.0, **sheet):
+    """Sigma of the heading after 30 s of gyros that are good but for what is said."""
+    good = GyroSheet(rate_hz=RATE_HZ, noise_density_rad_s_rthz=1e-6, bias_sigma_rad_s=1e-9, **sheet)
+    filter_ = HeadingFilter(good, PLAIN, 1e-6)  # without lift nothing tells a bias of yaw
+    rate, force = np.array([0.0, 0.0, rate_rad_s]), np.array([0.0, 0.0, G])
+    for k in range(30 * RATE_HZ + 1):
+        stamp_s = k / RATE_HZ
+        filter_.propagate([ImuSample(time_stamp_s=stamp_s, angular_rate_rad_s=rate, specific_force_m_s2=force)])
+    return filter_.sigma_rad
+
+
+def test_a_scale_factor_is_noise_that_comes_with_a_turn():
+    """White noise of density (s |w|)^2 T_s over 30 s."""
+    expected = 0.01 * 0.05 * np.sqrt(HeadingFilterSettings().turn_begins_s * 30.0)
+    assert at_rest_or_turning(0.05, scale_factor_sigma=0.01) == pytest.approx(expected, rel=1e-3)
+    assert at_rest_or_turning(0.0, scale_factor_sigma=0.01) == pytest.approx(1e-6 * np.sqrt(30.0), rel=1e-3)
+
+
+def test_a_bias_that_walks_is_a_heading_s_walk_of_its_integral():
+    """A walk of b, integrated: b^2 t^3 / 3, in 600 steps by 3/1200 less."""
+    expected = 1e-4 * np.sqrt(30.0**3 / 3.0 * (1.0 - 1.5 / 600.0))
+    assert at_rest_or_turning(bias_walk_rad_s_rts=1e-4) == pytest.approx(expected, rel=1e-4)
+
+
 def test_with_frames_and_a_gyro_of_any_bias_sigma_is_the_walk_of_what_was_seen():
     turn = Turn(60.0, STRAIGHT)
     _, errors, sigmas = flown(turn, turn.samples(), gyro(bias_sigma_deg_s=0.9))
