@@ -8,6 +8,7 @@ from dockair.nav.guidance.guidance_settings import GuidanceSettings
 from dockair.nav.guidance.predictive import Predictive
 
 SETTINGS, STEP_S, NOT_FELT = GuidanceSettings(), 0.01, np.full(3, np.nan)
+ALONG = np.array([1.0, 0.0, 0.0])
 
 
 def shown(place, rate, seconds):
@@ -167,3 +168,31 @@ def test_what_is_flown_up_does_not_ask_how_late_the_receiver_answers_to_the_left
         flown.append(controller.rate(np.zeros(3), wanted)[1:])
     assert flown[0][1] == flown[1][1]
     assert flown[0][0] != flown[1][0]
+
+
+@pytest.mark.parametrize("distance_m", [None, 4.0])
+def test_along_what_the_tip_strays_at_is_flown_against(distance_m):
+    """Blown forward by 0.1 m/s in the last tick, the drogue at rest: e by Eqs. (2) and (3) of `own_path`.
+
+    Where a place is kept, du/dt has k (v - u) besides, and u* has k times the way on which e dies away.
+    """
+    s, tau_s, dies_s = SETTINGS.predictive, SETTINGS.response_s[0], SETTINGS.predictive.straying_s[0]
+    limits = np.array(SETTINGS.acceleration_limit_m_s2), np.array(SETTINGS.jerk_limit_m_s3)
+    e = 0.1 / (1.0 + STEP_S / s.forgotten_s) ** 2
+    wanted = Wanted(distance_m=distance_m, speed_m_s=1.0, aim_m=np.zeros(2), must_follow=True)
+    rates = []
+    for blown_m_s, nearer_m in ((0.0, 0.0), (0.1, e * STEP_S)):
+        controller = Predictive(s, np.array(SETTINGS.response_s), *limits, STEP_S, SETTINGS.patient_share)
+        push = np.zeros((len(controller.looks_ahead_s), 3))
+        for k in range(300):
+            place, change = (4.0 - nearer_m, blown_m_s) if k == 299 else (4.0, 0.0)
+            sight = Sight(place_m=place * ALONG, rate_m_s=np.zeros(3), push_m_s2=push)
+            controller.observe(sight, change * ALONG)
+            controller.given(np.zeros(3), np.zeros(3))
+        rates.append(controller.rate(np.zeros(3), wanted)[0])
+    left = np.exp(-tau_s / dies_s)
+    expected = -s.smoothing_1_s * e * left
+    if distance_m is not None:
+        goes_on_m = e * (STEP_S + dies_s * (1.0 - left))
+        expected -= s.along_gain_1_s * (e * left + s.smoothing_1_s * goes_on_m)
+    assert rates[1] - rates[0] == pytest.approx(expected, rel=1e-6)
