@@ -44,6 +44,19 @@ def test_a_moment_that_is_not_good_at_the_last_is_called_back_short_of_the_ring(
     assert path[path[:, 0].argmin() :, 0].max() > SETTINGS.wait_at_m
 
 
+@pytest.mark.parametrize(
+    ("miss", "unrest", "committed"), [(0.99, 0.5, True), (1.01, 0.5, False), (0.5, 0.99, True), (0.5, 1.01, False)]
+)
+def test_at_the_last_moment_neither_miss_nor_swing_may_be_more_than_one(miss, unrest, committed):
+    """Run up far off, then 1.5 m from the ring, of the 1.8 m that it stops within."""
+    closure = Closure(SETTINGS, FULL_M_S, RAMP_M_S2, STEP_S, RESPONSE_S)
+    for _ in range(200):
+        closure.step(4.0, 4.0 + DEPTH_M, closure.speed_m_s, known=True, miss=0.5, unrest=0.5)
+    assert closure.speed_m_s == SETTINGS.run_up_m_s and not closure.committed
+    closure.step(1.5, 1.5 + DEPTH_M, closure.speed_m_s, known=True, miss=miss, unrest=unrest)
+    assert closure.committed is committed
+
+
 def test_called_back_it_runs_up_again_and_meets_the_next_good_moment_at_speed():
     path = _flown(lambda t, d: (0.5, 1.3 if t < 8.0 and d < 1.8 else 0.5))
     turned = path[:, 0].argmin() if path[-1, 0] > 0.0 else path[: round(8.0 / STEP_S), 0].argmin()
