@@ -15,6 +15,7 @@ from gymnasium.utils.env_checker import check_env
 import dockair
 from dockair.errors import DockairError
 from dockair.messages import LedObservation
+from dockair.rotations import exp, matrix_from_yaw_pitch_roll
 from dockair.scenarios.envs import DockEnv, DockFastEnv, DockPixelsEnv
 from dockair.scenarios.envs.tables import (
     ACTION,
@@ -24,6 +25,7 @@ from dockair.scenarios.envs.tables import (
     action_cost,
     clipped,
     observation_from,
+    truth_info,
 )
 from dockair.scenarios.judgement.attempts import Attempt
 from dockair.scenarios.judgement.referee import Outcome, Referee
@@ -151,6 +153,9 @@ def test_shaping_sums_to_the_distance_made_good_and_observations_are_new_objects
     steps = [env.step(np.zeros(6, np.float32)) for _ in range(10)]
     made_good = start["truth"]["distance_m"] - steps[-1][4]["truth"]["distance_m"]
     assert sum(step[1] for step in steps) == pytest.approx(made_good, abs=1e-12)
+    truth, depth_m = env.tick.truth, env._flight.world.parameters.coupling.depth_m
+    p_WK = truth.p_WD + truth.R_WD @ [depth_m, 0.0, 0.0]  # where the coupling holds the tip
+    assert steps[-1][4]["truth"]["distance_m"] == pytest.approx(np.linalg.norm(p_WK - truth.p_WP), abs=1e-12)
     assert all(not np.shares_memory(a[0], b[0]) for a, b in zip(steps, steps[1:], strict=False))
 
 
@@ -197,6 +202,15 @@ def test_a_full_deflection_costs_what_is_written(env):
     assert action_cost(high[:3], np.zeros(3), 0.05) == pytest.approx(0.5 * 0.02 * 0.05)
 
 
+@pytest.mark.parametrize(("of_the_limits", "cost"), [(1.0, 0.001), (2.0, 0.001), (-0.5, 0.00025)])
+def test_the_dense_reward_of_a_step_is_less_by_what_holding_the_action_costs(env, of_the_limits, cost):
+    """docs/environments.md: 0.02 dt mean((action / limit)^2), a step of five ticks at 100 Hz being 0.05 s."""
+    _, before = env.reset(seed=4)
+    _, reward, *_, after = env.step(np.float32(of_the_limits) * env.action_space.high)
+    made_good = before["truth"]["distance_m"] - after["truth"]["distance_m"]
+    assert made_good - reward == pytest.approx(cost, abs=1e-12)
+
+
 def test_the_receiver_goes_along_where_the_tanker_has_announced_to_turn():
     """Two seconds after the start into 25 degrees of bank: without it the drogue is 15 m aside 8 s later."""
     env = gymnasium.make("dockair/DockFast-v0", scenario="racetrack", disable_env_checker=True).unwrapped
@@ -233,6 +247,33 @@ def test_the_observation_is_made_of_the_solution_and_the_gyro(hand_made, env):
     named = dict(zip([entry.name for entry in OBSERVATION], observation, strict=True))
     assert [named[f"gyro_{axis}"] for axis in "xyz"] == list(imu[-1].angular_rate_rad_s)
     assert named["v_PD_B_x"] == solution.v_PD_B[0]
+
+
+def test_an_observation_s_attitude_sigmas_age_and_leds_are_the_solution_s(hand_made):
+    _, _, _, solution = hand_made.tick(2)
+    leds_px = solution.led_pixels_px.copy()
+    leds_px[[1, 4, 6]] = np.nan
+    told = replace(
+        solution,
+        R_BD=exp(np.array([0.1, -0.2, 0.3])),
+        covariance=np.diag(np.arange(1.0, 10.0) ** 2),
+        frame_time_stamp_s=solution.time_stamp_s - 0.02,
+        led_pixels_px=leds_px,
+    )
+    named = dict(zip([entry.name for entry in OBSERVATION], observation_from(told, None), strict=True))
+    assert [named[f"log_R_BD_{axis}"] for axis in "xyz"] == pytest.approx([0.1, -0.2, 0.3])
+    sigmas = [named[f"sigma_{of}_{axis}"] for of in ("R_BD", "p_PD_B", "v_PD_B") for axis in "xyz"]
+    assert sigmas == pytest.approx(range(1, 10))  # `NavSolution.covariance`: attitude, place, velocity
+    assert named["frame_age"] == pytest.approx(0.02)
+    assert named["leds_seen"] == 5.0
+
+
+@pytest.mark.parametrize(("v_WD", "v_WP", "closing_m_s"), [(0.0, 1.2, 1.2), (0.5, 1.2, 0.7), (0.5, 0.0, -0.5)])
+def test_info_s_closing_speed_is_positive_where_tip_and_ring_come_together(make_truth, v_WD, v_WP, closing_m_s):
+    """Along the drogue's axis, which points to the left here: what goes on along x is none of it."""
+    R_WD = matrix_from_yaw_pitch_roll(0.5 * np.pi, 0.0, 0.0)
+    truth = make_truth(1.0, R_WD=R_WD, v_WD=np.array([0.3, v_WD, 0.0]), v_WP=np.array([0.1, v_WP, 0.0]))
+    assert truth_info(truth, 4.0, None)["closing_speed_m_s"] == pytest.approx(closing_m_s)
 
 
 @pytest.mark.slow
