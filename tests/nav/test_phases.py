@@ -48,9 +48,11 @@ OPENING = {"closing_m_s": -1.0}
     [
         ("join_up", {}, None),
         ("join_up", {"station_m": 0.4}, "pre_contact"),
+        ("join_up", {"station_m": 0.51}, None),
         ("join_up", {"blind_s": 20.1}, "clear"),
         ("pre_contact", {}, None),
         ("pre_contact", {"steady_s": 3.0}, "approach"),
+        ("pre_contact", {"steady_s": 2.9}, None),
         ("pre_contact", {"steady_s": 3.0, "unsure_s": 0.01}, None),
         ("pre_contact", {"blind_s": 19.9}, None),
         ("pre_contact", {"blind_s": 20.1}, "clear"),
@@ -64,30 +66,40 @@ OPENING = {"closing_m_s": -1.0}
         ("approach", {"track_lost_s": 0.4, "ring_ahead_m": 2.1, "committed": True}, None),
         ("approach", {"track_lost_s": 0.6, "ring_ahead_m": math.nan}, "breakaway"),
         ("approach", {"doubtful_s": 0.6}, "breakaway"),
+        ("approach", {"doubtful_s": 0.4}, None),
         ("approach", {"doubtful_s": 0.6, "ring_ahead_m": 2.1, "committed": True}, "breakaway"),
         ("approach", {"doubtful_s": 0.6, "ring_ahead_m": 2.1}, None),
         ("approach", {"lateral_m": 1.1}, None),
         ("approach", {"lateral_m": 1.1, "ring_ahead_m": 0.9}, "breakaway"),
+        ("approach", {"lateral_m": 0.9, "ring_ahead_m": 0.9}, None),
         ("approach", {"entered_m": 0.3, "ring_ahead_m": -0.01}, "breakaway"),
         ("approach", {"entered_m": 0.2, "lateral_m": 0.3, "ring_ahead_m": -0.1}, None),
         ("approach", {"came_out": True, "lateral_m": 0.26, "ring_ahead_m": 0.01}, "breakaway"),
         ("approach", {"came_out": True, "lateral_m": 0.24, "ring_ahead_m": 0.01}, None),
         ("approach", {"lateral_m": 0.26, "ring_ahead_m": 0.01}, None),
         ("approach", {"closing_m_s": 2.7}, "breakaway"),
+        ("approach", {"closing_m_s": 2.5}, None),
+        ("contact", HELD | {"closing_m_s": 2.7}, "breakaway"),
         ("approach", {"waiting_s": 119.9}, None),
         ("approach", {"waiting_s": 120.1}, "back_off"),
         ("approach", {"inside_s": 1.01}, "back_off"),
+        ("approach", {"inside_s": 0.99, "ring_ahead_m": -0.1}, None),
+        ("approach", {"blind_s": 20.1}, "clear"),
         ("approach", {"ahead_m": 0.04}, "contact"),
+        ("approach", {"ahead_m": 0.06}, None),
         ("pre_contact", {"steady_s": 3.0, "light_is_red": True}, None),
         ("approach", {"light_is_red": True}, "back_off"),
         ("approach", {"light_is_red": True, "committed": True, "ring_ahead_m": 0.5}, "back_off"),
         ("approach", {"light_is_red": True, "committed": True, "ring_ahead_m": 0.3}, None),
+        ("approach", {"light_is_red": True, "committed": True, "ring_ahead_m": 0.39}, None),
+        ("approach", {"light_is_red": True, "committed": True, "ring_ahead_m": 0.41}, "back_off"),
         ("contact", HELD | {"light_is_red": True}, "back_off"),
         ("hold", HELD | {"light_is_red": True}, "disconnect"),
         ("contact", HELD | {"hose_is_slack": True}, "breakaway"),
         ("contact", HELD | {"hose_is_slack": True, "light_is_red": True}, "breakaway"),
         ("contact", HELD, None),
         ("contact", HELD | {"ahead_m": -0.3}, "back_off"),
+        ("contact", HELD | {"ahead_m": -0.19}, None),
         ("contact", HELD | {"ahead_m": -0.3, "beside_m": 0.3, "frames_stopped": True}, None),
         ("contact", HELD | {"track_lost_s": 0.6, "frames_stopped": True}, "back_off"),
         ("contact", HELD | {"ahead_m": -0.3, "entered_m": 0.3}, "breakaway"),
@@ -95,6 +107,7 @@ OPENING = {"closing_m_s": -1.0}
         ("contact", HELD | {"beside_m": 0.26}, "back_off"),
         ("contact", HELD | {"track_lost_s": 0.6}, "back_off"),
         ("contact", HELD | {"pushed_in_m": 2.26}, "hold"),
+        ("contact", HELD | {"pushed_in_m": 2.24}, None),
         ("hold", HELD | {"in_phase_s": 40.0, "green_s": 4.9, "no_fuel_s": 9.9}, None),
         ("hold", HELD | {"in_phase_s": 5.0, "green_s": 5.0}, "disconnect"),
         ("hold", HELD | {"in_phase_s": 15.0, "green_s": 4.9, "no_fuel_s": 10.0}, "disconnect"),
@@ -116,6 +129,7 @@ OPENING = {"closing_m_s": -1.0}
         ("back_off", OPENING | {"ring_ahead_m": 3.1, "unusable_s": 0.1}, None),
         ("back_off", OPENING | {"ring_ahead_m": 3.1, "attempts": 3}, "clear"),
         ("breakaway", {"ring_ahead_m": 3.1, "closing_m_s": 0.1}, None),
+        ("breakaway", {"ring_ahead_m": 3.1, "closing_m_s": 0.01}, None),
         ("breakaway", {"ring_ahead_m": 3.1, "closing_m_s": 0.1, "attempts": 3}, None),
         ("breakaway", {"in_phase_s": 10.0}, "pre_contact"),
         ("breakaway", {"in_phase_s": 10.0, "attempts": 3}, "clear"),
@@ -128,6 +142,15 @@ OPENING = {"closing_m_s": -1.0}
 def test_each_row_of_the_table(phase, changes, following):
     transition = next_phase(Phase(phase), LIMITS, dataclasses.replace(CALM, **changes))
     assert (transition.to.value if transition else None) == following
+
+
+def test_limits_of_service_practice_are_the_procedures_own():
+    """Never over 5 kt; breakaway on a track lost for 0.5 s within 2 m, 1 m off within 1 m; 3 m behind the drogue."""
+    knot_m_s = 1852.0 / 3600.0
+    assert pytest.approx(5.0 * knot_m_s, abs=0.03) == LIMITS.closure_limit_m_s  # 2.572, which procedures round
+    assert (LIMITS.lost_s, LIMITS.lost_range_m) == (0.5, 2.0)
+    assert (LIMITS.off_axis_m, LIMITS.off_axis_range_m) == (1.0, 1.0)
+    assert LIMITS.clear_m == 3.0
 
 
 def test_a_hold_of_no_time_still_needs_a_green_light():
