@@ -49,7 +49,7 @@ def test_a_moment_that_is_not_good_at_the_last_is_called_back_short_of_the_ring(
 )
 def test_at_the_last_moment_neither_miss_nor_swing_may_be_more_than_one(miss, unrest, committed):
     """Run up far off, then 1.5 m from the ring, of the 1.8 m that it stops within."""
-    closure = Closure(SETTINGS, FULL_M_S, RAMP_M_S2, STEP_S, RESPONSE_S)
+    closure = Closure(SETTINGS, FULL_M_S, RAMP_M_S2, STEP_S)
     for _ in range(200):
         closure.step(4.0, 4.0 + DEPTH_M, closure.speed_m_s, known=True, miss=0.5, unrest=0.5)
     assert closure.speed_m_s == SETTINGS.run_up_m_s and not closure.committed
