@@ -15,7 +15,8 @@ angle X from the Sun, s the sine of the elevation.
 Eq. (1) is the CIE clear sky's indicatrix, which is 1 at 90 degrees; (2) its gradation, scaled so that the zenith and
 endless air at 90 degrees from the Sun are the sheet's. w is the thickness of cloud elements over their width: it keeps
 slant paths finite where a layer is seen edge-on. J' has less Sun in it where cloud shades the air (mean of the
-layer); J_h less where the haze itself does. The light that cloud sends down is `clouds`.
+layer); J_h less where the haze itself does. The light that cloud sends down is `clouds`. Cloud, deck and haze are lit
+while the Sun stands above the horizon that their own height sees; the clear sky and the air stay as they are.
 
 Land is patches of all sizes, darker and lighter, and water. Deck and ground are asked for from the place of the camera,
 the key; what is above goes along with the camera, as W does.
@@ -32,7 +33,7 @@ from scipy.special import ndtri
 
 from dockair.rotations import Array
 from dockair.sim.camera.clouds import Droplets, Texture, optical_depth
-from dockair.sim.camera.earth import air_mass, meet_sphere, unit
+from dockair.sim.camera.earth import air_mass, dip_sine, meet_sphere, unit
 from dockair.sim.camera.radiometry import extinction_1_m
 from dockair.sim.camera.sheets import SkyParameters
 from dockair.sim.camera.weather import Weather
@@ -90,7 +91,8 @@ class SkyRadiance:
             return np.zeros(len(d))
         mu = self._slope(d) / (1.0 + self.parameters.cloud_aspect)
         through = np.exp(-self._depth_above(d) / mu - self._haze_depth * air_mass(d[:, 2]))
-        return np.where(self._surface(d[:, 2], 0.0)[0], 0.0, through)
+        ground = self._surface(d[:, 2], 0.0)[0] if self.altitude_m > 0.0 else d[:, 2] < 0.0
+        return np.where(ground, 0.0, through)
 
     def airlight(self, direction_W: Array) -> float:
         """Return the relative radiance of endless haze toward a direction (3,): what far objects fade into."""
@@ -159,7 +161,7 @@ class SkyRadiance:
         )
         if with_aureole:
             light += self._droplets.aureole(depth, mu, cosine)
-        return np.asarray(front + before * light + beyond * np.exp(-depth / mu))
+        return np.asarray(front + before * self._lit_above * light + beyond * np.exp(-depth / mu))
 
     def _land(self, d: Array, cosine: Array, key_m: Array) -> Array:
         """The ground through the air under the deck's top (or under the aircraft), Eqs. (4) and (6)."""
@@ -183,7 +185,7 @@ class SkyRadiance:
         depth = optical_depth(noise, p.deck_cover, p.deck_optical_depth)
         reflectance = 1.0 - self._droplets.transmittance(depth * (1.0 + p.cloud_aspect) / (mu + p.cloud_aspect))
         facing = np.clip(self._mu_sun * (1.0 + p.cloud_aspect * noise), 0.0, 1.0)
-        light, high = reflectance * facing * self._light_below, self.altitude_m
+        light, high = reflectance * facing * self._light_below * self._lit_deck, self.altitude_m
         clear = self._clear(d[:, 2], p.deck_top_m, high)
         return self._through_air(light, d[:, 2], cosine, p.deck_top_m, high), (1.0 - reflectance) * clear
 
@@ -212,9 +214,17 @@ class SkyRadiance:
         self._light_below = 1.0 - cover + cover * float(self._droplets.transmittance(np.asarray(depth)))
         self._direct_below = (1.0 - cover + cover * math.exp(-0.5 * depth / self._mu_sun)) / self._light_below
         self.has_deck = self.parameters.deck_cover > 0.0 and self.altitude_m > self.parameters.deck_top_m
+        self._lit_above = self._lit(self.altitude_m + self.parameters.cloud_height_m)
+        self._lit_deck = self._lit(self.parameters.deck_top_m)
         beam = math.exp(-self._haze_depth * float(air_mass(self._sun[2:])[0]))
         through = float(self._droplets.transmittance(np.asarray(self._haze_depth)))
-        self._haze_light = beam, self._mu_sun * max(through - beam, 0.0) * self._light_below
+        lit = self._lit(self.altitude_m) if self._haze_depth > 0.0 else 1.0  # without haze J_h is the clear air's J
+        self._haze_light = lit * beam, lit * self._mu_sun * max(through - beam, 0.0) * self._light_below
+
+    def _lit(self, height_m: float) -> float:
+        """1 while the Sun stands above the horizon of a height over the ground, else 0."""
+        dip = dip_sine(self.parameters.earth_radius_m, height_m) if height_m > 0.0 else 0.0
+        return 1.0 if self._sun[2] >= -dip else 0.0
 
     def _clear_mass(self, sine: Array) -> Array:
         """(n,) air mass of clear air, Eq. (2); a ray that would go through the ground counts as one that skims it."""

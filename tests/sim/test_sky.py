@@ -299,6 +299,55 @@ def test_far_objects_fade_into_the_hazy_horizon_behind_them() -> None:
     assert clear.radiance(_toward(0.0)[None])[0] < 0.5 * clear.airlight(_toward(0.0))
 
 
+def _dip_deg(height_m: float) -> float:
+    """Of the horizon below level."""
+    return math.degrees(math.acos(SHEET.earth_radius_m / (SHEET.earth_radius_m + height_m)))
+
+
+def test_cloud_above_is_lit_until_the_sun_sets_on_its_own_height() -> None:
+    """Closed and so thick that no clear sky comes through: what is left is the air below it, next to nothing."""
+    closed, up = Weather(cloud_cover=1.0, cloud_optical_depth=100.0), np.array([_toward(70.0, 90.0)])
+    dip = _dip_deg(ALTITUDE_M + SHEET.cloud_height_m)
+    lit, dark = (_law(closed, _toward(-dip + way)).radiance(up)[0] for way in (0.01, -0.01))
+    assert lit > 0.01
+    assert dark < 1e-3
+    near_sun = np.array([_toward(-dip - 0.01)])
+    thin = Weather(cloud_cover=1.0, cloud_optical_depth=0.1)
+    assert _law(thin, near_sun[0]).upward(near_sun)[0] < _law(None, near_sun[0]).upward(near_sun)[0]  # no aureole
+
+
+def test_the_deck_is_lit_until_the_sun_sets_on_its_top() -> None:
+    closed, down = replace(BARE, deck_cover=1.0), np.array([_toward(-60.0, 90.0), _toward(-90.0)])
+    lit, dark = (_law(None, _toward(-_dip_deg(SHEET.deck_top_m) + way), closed).radiance(down) for way in (0.01, -0.01))
+    assert lit.min() > 0.01
+    assert dark.max() == 0.0
+
+
+@pytest.mark.parametrize("altitude_m", [0.0, ALTITUDE_M])
+def test_haze_and_beam_last_until_the_sun_sets_on_the_camera(altitude_m: float) -> None:
+    """Fog so thin that much of the beam would still come through; endless, it is all that there is."""
+    hazy = Weather(visibility_m=50e3)
+    for elevation_deg in (-_dip_deg(altitude_m) + 0.01, -_dip_deg(altitude_m) - 0.01, -8.0):
+        sun = _toward(elevation_deg)
+        law, lit = SkyRadiance(BARE, hazy, sun, altitude_m, 7), elevation_deg > -_dip_deg(altitude_m)
+        assert (law.airlight(_toward(0.0, 90.0)) > 0.01) == lit
+        assert (law.airlight(_toward(0.0, 90.0)) == 0.0) == (not lit)
+        assert (law.beam(sun[None])[0] > 0.0) == lit
+
+
+def test_a_sun_below_the_horizon_leaves_the_clear_sky_as_it_is() -> None:
+    """Sky and air by Eq. (2) of the angle from the Sun alone: the same light 50 degrees beside a Sun at any height."""
+    for elevation_deg in (3.0, -3.0):
+        law, up = _law(sun=_toward(elevation_deg, 60.0), sheet=BARE), _toward(0.0)
+        cosine = float(up @ _toward(elevation_deg, 60.0))
+        even = _law(sun=_toward(0.0, 90.0), sheet=BARE)
+        factor = 1.0 + float(SHEET.beyond_even(np.array([cosine]))[0])
+        assert law.radiance(up[None])[0] == pytest.approx(
+            factor / (1.0 + float(SHEET.beyond_even(np.zeros(1))[0])) * even.radiance(up[None])[0], rel=1e-6
+        )
+        assert law.airlight(up) == pytest.approx(SHEET.airlight * factor, rel=1e-12)
+
+
 def test_at_night_all_is_dark() -> None:
     night = _sky(Weather(night=True, cloud_cover=0.5), _toward(10.0))
     assert np.all(_picture(night) == np.float32(SHEET.night))
