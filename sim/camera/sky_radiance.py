@@ -8,7 +8,7 @@ angle X from the Sun, s the sine of the elevation.
                 below level, down to the lowest point and up:  80 exp(D/H) - m,   D = r (1 - sqrt(1 - s^2))
     cloud above at (x, y) = height (d_x, d_y)/(s + w), crossed at mu = (s + w)/(1 + w)                             (3)
     surface below, depth h down:  d = -r s - sqrt(q),  q = (r - h)^2 - r^2 (1 - s^2),  mu = sqrt(q)/(r - h)          (4)
-    deck        R min(mu_0 (1 + w n), 1) + (1 - R) (what is below),   R = 1 - T(tau (1 + w)/(mu + w))             (5)
+    deck        R min(mu_0 (1 + w n), 1) + (1 - R) (what is below),   R = 1 - T(t),   t = tau (1 + w)/(mu + w)     (5)
     air before  L <- L exp(-b' m) + J' (1 - exp(-b' m)),   b' = aerosol (exp(-z_1/H) - exp(-z_2/H))                (6)
     haze        L <- L exp(-b_h m) + J_h (1 - exp(-b_h m)),   b_h = (3.912/V - 3.912/V_clear) depth, not below 0   (7)
 
@@ -85,12 +85,19 @@ class SkyRadiance:
         self.ambient = self._ambient()  #: mean relative radiance of all directions: what lights the Sun's lee
 
     def beam(self, directions_W: Array) -> Array:
-        """Return (n,) transmittance of cloud and haze for sunlight from (n, 3) directions; 1 without either."""
+        """Return (n,) transmittance of cloud and haze for sunlight from (n, 3) directions; 1 without either.
+
+        A deck counts where the ray goes into it from the start, with the air before it: exp(-t) of Eq. (5).
+        """
         d = unit(directions_W)
         if self.weather.night:
             return np.zeros(len(d))
         mu = self._slope(d) / (1.0 + self.parameters.cloud_aspect)
         through = np.exp(-self._depth_above(d) / mu - self._haze_depth * air_mass(d[:, 2]))
+        if self.has_deck:
+            met = np.flatnonzero(self._surface(d[:, 2], self.top_m)[0])
+            _, depth = self._deck_along(d[met], np.zeros(3))
+            through[met] *= np.exp(-depth) * self._clear(d[met, 2], self.top_m, self.altitude_m)
         ground = self._surface(d[:, 2], 0.0)[0] if self.altitude_m > 0.0 else d[:, 2] < 0.0
         return np.where(ground, 0.0, through)
 
@@ -179,15 +186,21 @@ class SkyRadiance:
     def _cloud_deck(self, d: Array, cosine: Array, key_m: Array) -> tuple[Array, Array]:
         """Light of the deck with the air before it, and the transmittance of both, Eqs. (4) to (6)."""
         p = self.parameters
-        _, distance, mu = self._surface(d[:, 2], p.deck_top_m, float(key_m[2]))
-        at = key_m[0] + d[:, 0] * distance, key_m[1] + d[:, 1] * distance, LAYER_NODE_RAD * distance / np.sqrt(mu)
-        noise = self._deck.at(*at)
-        depth = optical_depth(noise, p.deck_cover, p.deck_optical_depth)
-        reflectance = 1.0 - self._droplets.transmittance(depth * (1.0 + p.cloud_aspect) / (mu + p.cloud_aspect))
+        noise, depth = self._deck_along(d, key_m)
+        reflectance = 1.0 - self._droplets.transmittance(depth)
         facing = np.clip(self._mu_sun * (1.0 + p.cloud_aspect * noise), 0.0, 1.0)
         light, high = reflectance * facing * self._light_below * self._lit_deck, self.altitude_m
         clear = self._clear(d[:, 2], p.deck_top_m, high)
         return self._through_air(light, d[:, 2], cosine, p.deck_top_m, high), (1.0 - reflectance) * clear
+
+    def _deck_along(self, d: Array, key_m: Array) -> tuple[Array, Array]:
+        """Noise of the deck where rays (n, 3) meet it, and its optical depth along them, t of Eq. (5)."""
+        p = self.parameters
+        _, distance, mu = self._surface(d[:, 2], p.deck_top_m, float(key_m[2]))
+        at = key_m[0] + d[:, 0] * distance, key_m[1] + d[:, 1] * distance, LAYER_NODE_RAD * distance / np.sqrt(mu)
+        noise = self._deck.at(*at)
+        depth = optical_depth(noise, p.deck_cover, p.deck_optical_depth)
+        return noise, depth * (1.0 + p.cloud_aspect) / (mu + p.cloud_aspect)
 
     def _through_air(self, light: Array, sine: Array, cosine: Array, low_m: float, high_m: float) -> Array:
         """Light from below through the clear air between two heights, Eq. (6)."""

@@ -226,7 +226,24 @@ def test_closed_thick_cloud_has_neither_blobs_nor_beam() -> None:
 def test_without_cloud_and_haze_the_beam_is_whole_above_the_horizon() -> None:
     d = _directions(2000, 11)
     above = d[:, 2] > -math.sin(math.acos(6.371e6 / (6.371e6 + ALTITUDE_M)))
-    assert np.array_equal(_sky().beam(d), above.astype(float))
+    assert np.array_equal(_sky(sheet=BARE).beam(d), above.astype(float))
+
+
+def test_the_deck_stops_the_sun_that_stands_between_its_horizon_and_the_grounds() -> None:
+    """From 6 km its top at 2 km ends 2.03 degrees below level, the ground 2.49. Air 0.1 (e^-1 - e^-3) thick upright."""
+    edge = math.degrees(math.acos((6.371e6 + SHEET.deck_top_m) / (6.371e6 + ALTITUDE_M)))
+    azimuth = np.linspace(-180.0, 180.0, 400)
+    over, into = (np.array([_toward(-edge + way, a) for a in azimuth]) for way in (0.01, -0.2))
+    s = -into[0, 2]
+    air = math.exp(-0.1 * (math.exp(-1.0) - math.exp(-3.0)) / (s + 0.025 * math.exp(-11.0 * s)))
+    broken = _law()
+    assert np.array_equal(broken.beam(over), np.ones(400))
+    assert broken.beam(into).max() == pytest.approx(air, rel=1e-9)
+    assert (broken.beam(into) < 1e-3).mean() > 0.03
+    gap = np.isclose(broken.over(into, np.zeros(3))[:, 1], air, rtol=1e-9)  # as the picture has it
+    assert np.array_equal(gap, np.isclose(broken.beam(into), air, rtol=1e-9))
+    assert _law(sheet=replace(SHEET, deck_cover=1.0, deck_optical_depth=100.0)).beam(into).max() < 1e-6
+    assert np.array_equal(_law(sheet=replace(SHEET, deck_cover=0.0)).beam(into), np.ones(400))
 
 
 def test_gaps_let_the_whole_beam_through_and_cloud_takes_its_depth() -> None:
