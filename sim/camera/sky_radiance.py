@@ -267,7 +267,7 @@ class SkyRadiance:
         return meet_sphere(sine, self.parameters.earth_radius_m + top_m, self.altitude_m + rise_m - top_m)
 
     def _ambient(self) -> float:
-        """Mean radiance over a Fibonacci sphere; the aureole counts as direct light."""
+        """Mean radiance over a Fibonacci sphere; the cloud's aureole is left out of it, and of the beam."""
         if self.weather.night:
             return self.parameters.night
         k = np.arange(_AMBIENT_DIRECTIONS) + 0.5

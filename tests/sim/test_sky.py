@@ -386,6 +386,19 @@ def test_cloud_before_the_sun_makes_all_light_diffuse() -> None:
     assert shares[1] > 0.999
 
 
+@pytest.mark.parametrize(("depth", "beam", "aureole"), [(1.0, 0.226, 0.249), (2.0, 0.051, 0.175)])
+def test_what_the_aureole_takes_from_the_light_on_solids_is_as_large_as_stated(
+    depth: float, beam: float, aureole: float
+) -> None:
+    """From 35 degrees: the beam by Eq. (4) of `clouds`, the aureole's flux by the integral of Eq. (5) about the Sun."""
+    law = _law(sun=_toward(35.0))
+    mu = (math.sin(math.radians(35.0)) + SHEET.cloud_aspect) / (1.0 + SHEET.cloud_aspect)
+    assert math.exp(-depth / mu) == pytest.approx(beam, abs=5e-4)
+    cosine = 1.0 - np.geomspace(1e-9, 2.0, 20_000)
+    radiance = law._droplets.aureole(np.full(20_000, depth), np.full(20_000, mu), cosine)
+    assert 2.0 * np.trapezoid(radiance, -cosine) == pytest.approx(aureole, abs=2e-3)
+
+
 @pytest.mark.parametrize(
     ("key", "value"),
     [("cloud_cover", 1.2), ("cloud_cover", -0.1), ("cloud_optical_depth", -1.0), ("visibility_m", 0.0)],
