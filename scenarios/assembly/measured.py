@@ -95,9 +95,10 @@ def _light(scenario: Scenario) -> _Light:
     altitude_m, sun_W, weather = scenario.flight.altitude_m, scenario.sun_W, scenario.weather.as_seen
     response = responses_in_flight(sheets, nominal_camera(scenario), altitude_m, sun_W)  # nominal: alike in all seeds
     sky = SkyRadiance(sheets.sky, weather, sun_W, altitude_m, _SKY_KEY)
+    lighting = Lighting.toward(scenario.sun.lit_from_W, sky, sheets.light.sun_angular_radius_rad)
     ring = nominal_ring(scenario)
     return _Light(
-        surface_e_s=response.white_e_s * Lighting.toward(scenario.sun.lit_from_W, sky).on_ball(_AFT_W),
+        surface_e_s=response.white_e_s * lighting.on_ball(_AFT_W),
         led_e_m2_s=response.led_e_m2_sr_w_s * led_intensity_w_sr(sheets.leds) * float(ring.relative_brightness.mean()),
         extinction_1_m=extinction_1_m(weather.visibility_m),
     )

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from dockair.parameters import load_parameters
 from dockair.rotations import Array, matrix_from_yaw_pitch_roll
 from dockair.scenarios.assembly.mounting_parameters import MountingParameters
-from dockair.sim.camera.sheets import SkyParameters
+from dockair.sim.camera.sheets import LightParameters, SkyParameters
 from dockair.sim.camera.sky import Sky
 from dockair.sim.camera.sky_radiance import SkyRadiance
 from dockair.sim.camera.solids import Haze, Lighting
@@ -66,7 +66,8 @@ def _aircraft(sky: Sky, skins: list[Skin], eye_m: tuple[float, float, float]) ->
     x, y = _tangents()
     out = np.empty(_SHAPE, dtype=np.float32)
     sky.fill(out, R, x, y)
-    TracedSolids(model, Lighting.toward(_SUN_W, sky)).draw(out, data, (R, np.array(eye_m)), x, y, Haze())
+    radius_rad = load_parameters("light", LightParameters).sun_angular_radius_rad
+    TracedSolids(model, Lighting.toward(_SUN_W, sky, radius_rad)).draw(out, data, (R, np.array(eye_m)), x, y, Haze())
     return _grey(out)
 
 

@@ -59,6 +59,7 @@ class Background:
         parameters: sheet `background`.
         sky: what is seen where nothing else is.
         backend: "mujoco", "analytic", or "auto" for the first where this machine can draw.
+        sun_radius_rad: of the Sun's disc, over which cloud is taken; 0 is a point.
 
     Raises:
         DockairError: another backend; a visible geom of the model that cannot be drawn.
@@ -71,10 +72,12 @@ class Background:
         parameters: BackgroundParameters,
         sky: Heaven,
         backend: str = "auto",
+        *,
+        sun_radius_rad: float = 0.0,
     ) -> None:
         self._sky, self._blocks = sky, Blocks(camera, parameters.reduction)
         self._memory = np.empty(math.prod(self._blocks.drawn.shape), dtype=np.float32)  # new memory costs more than sky
-        light = Lighting.of(model, sky)
+        light = Lighting.of(model, sky, sun_radius_rad)
         self._solids: DrawnSolids | TracedSolids
         if available_backend(backend) == "mujoco":
             per_tangent = camera.focal_length_px / parameters.reduction

@@ -94,12 +94,15 @@ class NearInfraredCamera:
         self._sky = Sky(SkyRadiance(sheets.sky, weather, sun_direction_W, altitude_m, noise.clouds))
         self._extinction_1_m = extinction_1_m(weather.visibility_m)
         self._sun: SunView | None = None
+        sun_radius_rad = sheets.light.sun_angular_radius_rad
         self._glare = Glare(sheets.glare, sheets.lens, camera, sheets.light, self._response, wavelength)
         if sun_direction_W is not None:
             sun_W = np.array(sun_direction_W, dtype=float)
             margin = _EDGE_SIGMAS * self._spread.edge_sigma_px()
-            self._sun = SunView(model, camera, self._sky, sun_W, sheets.light.sun_angular_radius_rad, margin)
-        self._background = Background(model, camera, sheets.background, self._sky, background)
+            self._sun = SunView(model, camera, self._sky, sun_W, sun_radius_rad, margin)
+        self._background = Background(
+            model, camera, sheets.background, self._sky, background, sun_radius_rad=sun_radius_rad
+        )
         self._sources = PointSources(model, sheets, as_built, self._response, self._sun, self._extinction_1_m)
         self._defects = Defects(camera, sheets.glare, sheets.exposure, self._faults, noise.dirt, noise.hot_pixels)
         self._pattern = FixedPattern(sheets.sensor, noise.fixed_pattern, camera.height_px, camera.width_px)

@@ -4,9 +4,10 @@
 
 in units of a white Lambertian surface in normal sunlight: reflectance rho, unit normal n, unit vector s toward the
 Sun, extinction b, slant range r. `ambient` is the mean radiance of all directions, `direct` what clouds and haze let
-through of the Sun. A solid is a sphere, ellipsoid, capsule, cylinder or box, or a mesh of triangles (`meshes`), opaque
-and matt; both ways of drawing it (`drawn`, `traced`) take it from here. Over the disc of a white ball, whose surface
-has every direction that can be seen, the mean of the light at phase angle a between Sun and lens is
+through of the Sun, the mean over its disc. A solid is a sphere, ellipsoid, capsule, cylinder or box, or a mesh of
+triangles (`meshes`), opaque and matt; both ways of drawing it (`drawn`, `traced`) take it from here. Over the disc of a
+white ball, whose surface has every direction that can be seen, the mean of the light at phase angle a between Sun and
+lens is
 
     L = ambient + direct 2/(3 pi) (sin a + (pi - a) cos a)                                                       (2)
 
@@ -25,6 +26,7 @@ from numpy.typing import NDArray
 
 from dockair.errors import DockairError
 from dockair.rotations import Array
+from dockair.sim.camera.sun_beam import Beam, SunBeam
 
 VISIBLE_GROUPS: NDArray[np.uint8] = np.array([1, 1, 1, 0, 0, 0], dtype=np.uint8)  #: MuJoCo's own default
 #: Kinds of solids, as numbers for compiled code.
@@ -82,16 +84,12 @@ class Solids:
         )
 
 
-class Shines(Protocol):
+class Shines(Beam, Protocol):
     """What is asked of the sky about its light: `dockair.sim.camera.sky.Sky`."""
 
     @property
     def ambient(self) -> float:
         """Mean relative radiance of all directions."""
-        ...
-
-    def beam(self, directions_W: Array) -> Array:
-        """(n,) transmittance of sunlight from directions (n, 3)."""
         ...
 
 
@@ -104,16 +102,16 @@ class Lighting:
     direct: float  #: from the Sun
 
     @classmethod
-    def of(cls, model: mujoco.MjModel, sky: Shines) -> "Lighting":
+    def of(cls, model: mujoco.MjModel, sky: Shines, sun_radius_rad: float) -> "Lighting":
         """Sunlight along the model's first light, if it has one, as much as the sky lets through."""
         if model.nlight == 0:
             return cls(toward_W=np.array([0.0, 0.0, 1.0]), ambient=sky.ambient, direct=0.0)
-        return cls.toward(-np.array(model.light_dir[0]), sky)
+        return cls.toward(-np.array(model.light_dir[0]), sky, sun_radius_rad)
 
     @classmethod
-    def toward(cls, sun_W: Array, sky: Shines) -> "Lighting":
-        """Sunlight from (3,) the unit vector toward the Sun, as much as the sky lets through."""
-        return cls(toward_W=sun_W, ambient=sky.ambient, direct=float(sky.beam(sun_W[None])[0]))
+    def toward(cls, sun_W: Array, sky: Shines, sun_radius_rad: float) -> "Lighting":
+        """Sunlight from (3,) the unit vector toward the middle of its disc, as much as the sky lets through."""
+        return cls(toward_W=sun_W, ambient=sky.ambient, direct=SunBeam.of(sky, sun_W, sun_radius_rad).mean)
 
     def on_ball(self, lens_W: Array) -> float:
         """Return the mean relative radiance of a white ball, Eq. (2); (3,) unit vector from it toward the lens."""

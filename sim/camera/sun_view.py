@@ -3,13 +3,11 @@
     visible = mean over the disc of clear(d) beam(d)                                                             (1)
 
 clear(d) is 1 where nothing lies along the ray d, beam(d) the cloud's transmittance. For what all of the disc does
-(stray light) the mean is taken over rings of equal area; for the disc's image, pixel by pixel: clouds at every pixel,
-the scene in blocks of k x k pixels.
+(stray light) the mean is taken over the rays of `sun_beam`; for the disc's image, pixel by pixel: clouds at every
+pixel, the scene in blocks of k x k pixels.
 
 Not modelled: diffraction at the edges of what hides it; the camera's own place within its lens.
 """
-
-from typing import Protocol
 
 import mujoco
 import numpy as np
@@ -19,17 +17,11 @@ from dockair.rotations import Array
 from dockair.sim.camera.image_point import in_field
 from dockair.sim.camera.obstacles import Obstacles
 from dockair.sim.camera.occlusion import clear_directions
+from dockair.sim.camera.sun_beam import Beam, SunBeam
 
-_RINGS = 4  # of equal area, with 6, 12, 18, 24 rays: 60 rays resolve 2 % of the disc
+__all__ = ["Beam", "SunView"]
+
 _BLOCK_PX = 2
-
-
-class Beam(Protocol):
-    """What is asked of the sky: `dockair.sim.camera.sky.Sky`."""
-
-    def beam(self, directions_W: Array) -> Array:
-        """(n,) transmittance of sunlight from directions (n, 3)."""
-        ...
 
 
 class SunView:
@@ -54,13 +46,13 @@ class SunView:
         self._obstacles, self._camera, self._sky = Obstacles.of(model), camera, sky
         self.direction_W = sun_W
         self._radius_px = camera.focal_length_px * float(np.tan(radius_rad)) + margin_px
-        self._disc_W = _disc_directions(sun_W, radius_rad)
-        self._dimmed = sky.beam(self._disc_W)
-        self.beam = float(self._dimmed.mean())
+        self._disc = SunBeam.of(sky, sun_W, radius_rad)
+        self.beam = self._disc.mean
 
     def visible(self, data: mujoco.MjData, p_WC: Array) -> float:
         """Part of the disc that the lens sees, Eq. (1)."""
-        return float((self._dimmed * clear_directions(self._obstacles, data, p_WC, self._disc_W)).mean())
+        clear = clear_directions(self._obstacles, data, p_WC, self._disc.directions_W)
+        return float((self._disc.beams * clear).mean())
 
     def patch(self, data: mujoco.MjData, pose: tuple[Array, Array]) -> tuple[Array, tuple[int, int]] | None:
         """What the pixels around the disc's image see of it.
@@ -94,17 +86,3 @@ class SunView:
     def _rays_W(self, R_WC: Array, rows: Array, columns: Array) -> Array:
         u, v = np.meshgrid(columns, rows)
         return np.asarray(self._camera.rays_from_pixels(np.column_stack([u.ravel(), v.ravel()])) @ R_WC.T)
-
-
-def _disc_directions(axis: Array, radius_rad: float) -> Array:
-    """(n, 3) unit vectors over a cone of half-angle radius_rad, each standing for the same solid angle."""
-    across = np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))])
-    across /= np.linalg.norm(across)
-    basis = np.column_stack([across, np.cross(axis, across)])
-    per_ring = 6 * np.arange(1, _RINGS + 1)
-    edges = np.sqrt(np.concatenate([[0], np.cumsum(per_ring)]) / per_ring.sum())
-    radius = radius_rad * np.repeat(np.sqrt(0.5 * (edges[:-1] ** 2 + edges[1:] ** 2)), per_ring)
-    angle = np.concatenate([2.0 * np.pi * (np.arange(n) + 0.5) / n for n in per_ring])
-    offsets = radius[:, None] * np.column_stack([np.cos(angle), np.sin(angle)]) @ basis.T
-    directions = axis + offsets
-    return np.asarray(directions / np.linalg.norm(directions, axis=1, keepdims=True))
