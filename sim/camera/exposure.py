@@ -4,9 +4,9 @@
     next = exposure x (y < clipped_level ? min(target/y, longest_step) : clipped_factor), within the limits      (2)
 
 The exposure in (2) is the metered frame's own, so frames that were already under way when it changed cannot make it
-swing. A change smaller than the dead band is not made. This is what a camera's firmware can do: it knows grey levels
-and nothing of LEDs. A Sun's disc in the window has more pixels than are metered and drives the exposure to its
-shortest, LEDs or not.
+swing. A change smaller than the dead band is not made, but for one to a limit or because of a clipped frame. This is
+what a camera's firmware can do: it knows grey levels and nothing of LEDs. A Sun's disc in the window has more pixels
+than are metered and drives the exposure to its shortest, LEDs or not.
 
 Not modelled: gain control; regions of interest; steps of the sensor's row clock (2.7 us, finer in practice).
 Sources: metering by a high quantile of the histogram is common practice; the figures are in sheet `exposure`.
@@ -70,12 +70,14 @@ class ExposureControl:
         if not self._automatic:
             return self._exposure_s
         y = (brightest_level(pixels, p.metered_pixel) - self._black) / self._span
-        if y >= p.clipped_level:
+        clipped = y >= p.clipped_level
+        if clipped:
             factor = p.clipped_factor
         else:
             factor = min(p.target_level / y, p.longest_step) if y > 0.0 else p.longest_step
         wanted_s = min(max(exposure_s * factor, p.shortest_s), p.longest_s)
-        if abs(wanted_s - self._exposure_s) > p.dead_band * self._exposure_s:
+        at_limit = wanted_s in (p.shortest_s, p.longest_s)
+        if clipped or at_limit or abs(wanted_s - self._exposure_s) > p.dead_band * self._exposure_s:
             self._exposure_s = wanted_s
         return self._exposure_s
 

@@ -115,9 +115,6 @@ class ExposureParameters:
         if not self.target_level * (1.0 + self.dead_band) < self.clipped_level:
             expected = f"so that with dead_band it stays below exposure.clipped_level = {self.clipped_level}"
             raise DockairError("exposure.target_level", expected=expected, got=self.target_level)
-        if not self.clipped_factor < 1.0 - self.dead_band:
-            expected = f"less than 1 - exposure.dead_band = {1.0 - self.dead_band:g}, or clipped frames change nothing"
-            raise DockairError("exposure.clipped_factor", expected=expected, got=self.clipped_factor)
         if not self.longest_step > 1.0 + self.dead_band:
             expected = f"more than 1 + exposure.dead_band = {1.0 + self.dead_band:g}, or dark frames change nothing"
             raise DockairError("exposure.longest_step", expected=expected, got=self.longest_step)

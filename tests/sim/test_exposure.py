@@ -193,15 +193,35 @@ def test_the_next_exposure_brings_the_metered_level_to_the_target_counted_from_b
     assert control.step(np.full(SHAPE, level, dtype=np.uint8), 40e-6) == pytest.approx(wanted_s, rel=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("name", "value"), [("clipped_factor", 0.8), ("clipped_factor", 0.7), ("longest_step", 1.2), ("longest_step", 1.3)]
-)
-def test_a_step_that_the_dead_band_would_swallow_is_refused(name: str, value: float) -> None:
-    """Each alone is allowed; together the exposure would stay where frames are clipped, or dark, for good."""
-    assert replace(EXPOSURE, **{name: value}).dead_band == EXPOSURE.dead_band
-    refused = rf"exposure.{name}: expected (less|more) .*dead_band = (0.7|1.3), .*got {value}"
+@pytest.mark.parametrize("value", [1.2, 1.3])
+def test_a_step_that_the_dead_band_would_swallow_is_refused(value: float) -> None:
+    """Each alone is allowed; together the exposure would stay where frames are dark, for good."""
+    assert replace(EXPOSURE, longest_step=value).dead_band == EXPOSURE.dead_band
+    refused = rf"exposure.longest_step: expected more .*dead_band = 1.3, .*got {value}"
     with pytest.raises(DockairError, match=refused):
-        replace(EXPOSURE, dead_band=0.3, **{name: value})
+        replace(EXPOSURE, dead_band=0.3, longest_step=value)
+
+
+@pytest.mark.parametrize(("level", "way", "limit_s"), [(255, 1.05, "shortest_s"), (0, 0.95, "longest_s")])
+def test_from_within_the_dead_band_of_a_limit_it_still_goes_there(level: int, way: float, limit_s: str) -> None:
+    limit = getattr(EXPOSURE, limit_s)
+    control = ExposureControl(replace(EXPOSURE, exposure_s=way * limit), SENSOR)
+    for _ in range(2):
+        assert control.step(np.full(SHAPE, level, dtype=np.uint8), control.exposure_s) == limit
+
+
+@pytest.mark.parametrize("way", [1.05, 1.099])
+def test_light_that_asks_for_less_than_the_shortest_gets_the_shortest_without_being_clipped(way: float) -> None:
+    start_s = way * EXPOSURE.shortest_s
+    control = ExposureControl(replace(EXPOSURE, exposure_s=start_s), SENSOR)
+    rate = 1.5 * MATCHED_E_S * RING
+    assert _level(rate, start_s) < EXPOSURE.clipped_level
+    assert set(_run(control, rate, 20)[1:]) == {EXPOSURE.shortest_s}
+
+
+def test_a_clipped_frame_changes_the_exposure_by_however_little_it_is_told_to() -> None:
+    control = ExposureControl(replace(EXPOSURE, dead_band=0.3, clipped_factor=0.8, exposure_s=1e-4), SENSOR)
+    assert control.step(np.full(SHAPE, 255, dtype=np.uint8), 1e-4) == pytest.approx(0.8e-4, rel=1e-12)
 
 
 def test_exposures_and_limits_that_exclude_each_other_are_refused() -> None:
