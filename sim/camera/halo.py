@@ -15,7 +15,7 @@ that continues it with its slope, and the rest is added pixel by pixel:
 
 Both are tables in x = r/(r + 100 px), so that 4096 cells reach from 0.02 px to infinity.
 Not modelled: change of the law with the angle of incidence; halos of LEDs (below).
-An LED of 5e4 e- has 1 e- per pixel of halo at 5 px, a fiftieth of a grey level.
+An LED of 5e4 e- has 0.008 e- per pixel of halo at 5 px, by (1) and the sheet: 1.5e-4 of a grey level.
 Sources: Harvey, Light-Scattering Characteristics of Optical Surfaces, thesis, University of Arizona, 1976; its form
 was found again in measurements of camera lenses: Ritt et al., Sensors 20 (2020) 6308.
 """

@@ -3,10 +3,13 @@
 import numpy as np
 import pytest
 
+from dockair.calibration import Camera
 from dockair.messages import Window
 from dockair.rotations import Array
 from dockair.sim.camera.coarse_grid import CoarseGrid, nodes_around
+from dockair.sim.camera.electronics import output_gain
 from dockair.sim.camera.halo import Halo
+from dockair.sim.camera.sheets import CameraSheets
 
 SHARES, CORES, EXPONENTS = np.array([8e-4, 4e-3, 6e-3]), np.array([29.0, 87.0, 13.5]), np.array([1.25, 1.5, 1.5])
 SUN_PX = 13.5
@@ -121,3 +124,13 @@ def test_an_leds_halo_stays_below_a_grey_level() -> None:
     """The module leaves it out: 5e4 electrons, halo of surfaces and dust, 53 e- a grey level of eight bits."""
     led = Halo(SHARES[:2], CORES[:2], EXPONENTS[:2], 0.5).densities(np.array([0.0, 5.0])).sum(axis=0) * 5e4
     assert led.max() < 53.0 / 40.0
+
+
+def test_the_halo_of_an_led_is_as_faint_as_stated() -> None:
+    """Eq. (1) with the sheet's shares and cores: 5e4 e- make 0.008 e- in a pixel 5 px off, far below a grey level."""
+    sheets = CameraSheets.load()
+    glare, focal_px = sheets.glare, Camera().focal_length_px
+    led = Halo(glare.halo_share, glare.halo_core_rad * focal_px, glare.halo_exponent, 0.0)
+    electrons = 5e4 * float(led.densities(np.array([5.0])).sum())
+    assert electrons == pytest.approx(0.0078, abs=5e-5)
+    assert electrons * output_gain(sheets.sensor) == pytest.approx(1.5e-4, rel=0.05)
