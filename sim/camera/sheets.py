@@ -38,10 +38,16 @@ class FilterParameters:
     effective_index: float
 
     def __post_init__(self) -> None:
-        """Refuse a band that ends before it begins."""
+        """Refuse a band that ends before it begins, and one whose ramps meet below the sheet's transmittance."""
         if not self.cut_on_m < self.cut_off_m:
             expected = f"less than filter.cut_off_m = {self.cut_off_m} m"
             raise DockairError("filter.cut_on_m", expected=expected, got=self.cut_on_m)
+        half_ramps_m = 0.5 * (self.cut_on_ramp_m + self.cut_off_ramp_m)
+        if self.cut_off_m - self.cut_on_m < half_ramps_m:
+            expected = (
+                f"at least {self.cut_on_m + half_ramps_m:g} m, where filter.transmittance is reached between ramps"
+            )
+            raise DockairError("filter.cut_off_m", expected=expected, got=self.cut_off_m)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -1,10 +1,13 @@
 """What a camera's sheets refuse although every value is in its range: combinations that no camera can have."""
 
+from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from dockair.errors import DockairError
+from dockair.sim.camera.radiometry import filter_transmittance
 from dockair.sim.camera.sheets import CameraSheets
 
 NODES = [750e-9, 800e-9, 850e-9, 900e-9, 950e-9, 1000e-9, 1050e-9, 1100e-9]
@@ -18,6 +21,11 @@ NODES = [750e-9, 800e-9, 850e-9, 900e-9, 950e-9, 1000e-9, 1050e-9, 1100e-9]
         ("sensor", {"wavelength_m": [NODES[0], *NODES[:7]]}, "sensor.wavelength_m: expected rising"),
         ("sensor", {"converter_bits": 12, "outputs": 4}, "sensor.clock_hz: expected up to 4e"),
         ("filter_long_pass", {"cut_on_m": 900e-9, "cut_off_m": 700e-9}, "filter.cut_on_m: expected less than"),
+        (
+            "filter_long_pass",
+            {"cut_on_m": 850e-9, "cut_off_m": 864e-9},
+            "filter.cut_off_m: expected at least 8.8e-07 m",
+        ),
         ("glare", {"dirt_smallest_rad": 0.06, "dirt_largest_rad": 0.03}, "glare.dirt_smallest_rad: expected at most"),
         ("sky", {"zenith": 0.1, "airlight": 0.1}, "sky.zenith: expected less than sky.airlight"),
         ("sky", {"aureole_decay_1_rad": 0.5}, "sky.aureole_decay_1_rad: expected a decay that leaves light"),
@@ -28,3 +36,16 @@ def test_values_that_exclude_each_other_are_refused(sheet: str, values: dict[str
     with pytest.raises(DockairError) as caught:
         CameraSheets.load(overrides={sheet: values})
     assert str(caught.value).startswith(words)
+
+
+@pytest.mark.parametrize(("cut_on_ramp_m", "cut_off_ramp_m"), [(20e-9, 20e-9), (35e-9, 5e-9)])
+def test_ramps_that_just_fit_into_the_band_leave_the_sheets_transmittance_at_its_peak(
+    cut_on_ramp_m: float, cut_off_ramp_m: float
+) -> None:
+    ramps = {"cut_on_ramp_m": cut_on_ramp_m, "cut_off_ramp_m": cut_off_ramp_m}
+    band = {"cut_on_m": 840e-9, "cut_off_m": 860.01e-9}
+    filter_ = CameraSheets.load("band_pass", {"filter_band_pass": {**band, **ramps}}).filter
+    peak = filter_transmittance(filter_, np.linspace(820e-9, 880e-9, 6001)).max()
+    assert peak == pytest.approx(filter_.transmittance, rel=1e-3)
+    with pytest.raises(DockairError, match="filter.cut_off_m: expected at least 8.6e-07 m"):
+        replace(filter_, cut_off_m=859.9e-9)
