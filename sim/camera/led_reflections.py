@@ -95,7 +95,7 @@ def led_reflection_rows(
     """
     leds_W, axis = np.asarray(leds_W, dtype=float), vector(axis_W)
     intensity_w_sr = np.asarray(intensity_w_sr, dtype=float)
-    limit = surfaces.faintest_reflection * max(0.0, *intensity_w_sr.tolist())
+    limit = surfaces.faintest_reflection * float(intensity_w_sr.max(initial=0.0))
     eye, near, poses = vector(p_WC), (mirrors.near_balls, mirrors.near_tubes), (data.geom_xpos, data.geom_xmat)
     pattern = pattern_exponent, surfaces.led_side_light
     wanted = _wanted(near, poses, leds_W, axis, eye, finishes(surfaces), pattern[1], intensity_w_sr, limit)

@@ -35,6 +35,7 @@ from numpy.typing import NDArray
 from scipy.special import roots_legendre
 
 from dockair.calibration import Camera
+from dockair.errors import DockairError
 from dockair.rotations import Array
 from dockair.sim.camera.sheets import LensParameters
 
@@ -84,7 +85,14 @@ class Spread:
 
 
 def airy_px(lens: LensParameters, camera: Camera, wavelength_m: float) -> float:
-    """Return q [px], Eq. (3); the first dark ring has the radius 1.22 q."""
+    """Return q [px], Eq. (3); the first dark ring has the radius 1.22 q.
+
+    Raises:
+        DockairError: the lens cannot be focused so near.
+    """
+    if not lens.focus_distance_m > camera.focal_length_m:
+        expected = f"more than the camera's focal length, {camera.focal_length_m} m"
+        raise DockairError("lens.focus_distance_m", expected=expected, got=lens.focus_distance_m)
     m = lens.focus_distance_m / (lens.focus_distance_m - camera.focal_length_m)
     return m * wavelength_m * lens.f_number / camera.pixel_pitch_m
 

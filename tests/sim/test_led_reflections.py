@@ -315,3 +315,9 @@ def test_a_dark_led_reflects_nothing() -> None:
     led = np.array([[3.0, 1.5, 0.0]])
     found = find_led_reflections(*world, Mirrors.of(world[0]), EYE, led, AFT, np.zeros(1), 2.6, IDEAL)
     assert found.p_W.shape == (0, 3) and found.led.shape == (0,)
+
+
+def test_where_there_is_no_led_nothing_is_reflected() -> None:
+    world = scene_of(_sphere(np.array([4.0, 0.0, 0.0]), 0.2))
+    found = find_led_reflections(*world, Mirrors.of(world[0]), EYE, np.empty((0, 3)), AFT, np.empty(0), 2.6, IDEAL)
+    assert found.p_W.shape == (0, 3) and found.led.shape == (0,)

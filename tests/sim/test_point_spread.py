@@ -7,9 +7,11 @@ import pytest
 from scipy.special import j1, roots_legendre
 
 from dockair.calibration import Camera
+from dockair.errors import DockairError
 from dockair.parameters import load_parameters
+from dockair.sim.camera.optics import PointSpread
 from dockair.sim.camera.point_spread import Spread, airy_px, blur_px, core, spectrum, transfer
-from dockair.sim.camera.sheets import LensParameters
+from dockair.sim.camera.sheets import LensParameters, SensorParameters
 
 LENS = load_parameters("lens", LensParameters)
 CAMERA = Camera()
@@ -59,6 +61,15 @@ def test_an_image_that_falls_behind_the_sensor_makes_farther_points_sharp() -> N
 
 def test_diffraction_is_wavelength_times_f_number_at_the_image_distance_of_the_focus() -> None:
     assert airy_px(_lens(8.0), CAMERA, LED_M) == pytest.approx(850e-9 * 8.0 / 5.5e-6 * 10.0 / (10.0 - 0.016), rel=1e-12)
+
+
+@pytest.mark.parametrize("distance_m", [CAMERA.focal_length_m, 0.5 * CAMERA.focal_length_m])
+def test_a_focus_not_beyond_the_focal_length_is_refused(distance_m: float) -> None:
+    """A long lens of a camera file may have it, and its image is nowhere."""
+    lens = replace(LENS, focus_distance_m=distance_m)
+    refused = rf"lens.focus_distance_m: expected more than the camera's focal length, 0.016 m, got {distance_m}"
+    with pytest.raises(DockairError, match=refused):
+        PointSpread(lens, load_parameters("sensor", SensorParameters), CAMERA, LED_M)
 
 
 def test_in_focus_the_transfer_function_is_the_round_apertures() -> None:
