@@ -110,3 +110,6 @@ def test_pose_without_lines_of_sight_is_averaged_as_a_gaussian():
     np.testing.assert_allclose(found.covariance, P, rtol=1e-6, atol=1e-6 * np.abs(P).max())
     innovation = pose_difference(pose.R_CD, pose.p_CD, prior.R_CD, prior.p_CD)
     assert found.gate_chi2 == pytest.approx(innovation @ np.linalg.solve(S, innovation))
+    volumes = np.linalg.slogdet(P)[1] - np.linalg.slogdet(prior.covariance)[1]
+    expected = 0.5 * (volumes - innovation @ np.linalg.solve(S, innovation) - pose.chi2)  # Eq. (1): J has both costs
+    assert found.log_evidence == pytest.approx(expected)
