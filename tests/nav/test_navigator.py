@@ -875,12 +875,34 @@ def test_of_three_leds_one_that_is_left_out_leaves_no_pose_and_its_claim_ages(re
 
 
 def test_with_the_attitude_one_of_four_leds_that_is_bent_away_is_seen(render):
-    """LED 4 is 4 px off: nothing is corrected by it."""
+    """LED 4 is 4 px off: nothing is corrected by it, and the pose is that of the other three."""
     sky = with_four_leds(render, 6)
     sky.bent_px[4] = 4.0, 0.0
     solution = sky.run(0.1)
     used = np.flatnonzero(np.isfinite(solution.led_pixels_px).all(axis=1)).tolist()
-    assert solution.status != "pose used" or 4 not in used
+    assert solution.valid and (solution.status, used) == ("pose used", [2, 5, 7])
+    assert np.linalg.norm(solution.p_PD_B - still(0.0)) < 0.005
+
+
+@pytest.mark.parametrize(
+    ("alone_leds", "status", "used"), [(6, "pose used", (2, 5, 7)), (0, "pose inconsistent", None)]
+)
+def test_of_four_named_leds_the_attitude_tells_which_is_bent_away_and_nothing_else_does(alone_leds, status, used):
+    """LED 4 is 4 px off in the camera's measurement itself, which no finder has left out: any three fit."""
+    sky = Sky(None, still)
+    sky.navigator = Navigator(sky.sheets, NavigatorSettings(alone_leds=alone_leds))
+    for numbers in [range(8)] * 50 + [(2, 4, 5, 7)] * 20:
+        step_on_leds(sky, numbers)
+    for _ in range(10):
+        sky.imu()
+        imu = sky.imu()
+        seen = named(sky, (2, 4, 5, 7), imu[-1].time_stamp_s)
+        seen.centroids_px[1] += 4.0, 0.0
+        solution = sky.navigator.step(imu, seen)
+        assert solution.status == status
+        kept = tuple(np.flatnonzero(np.isfinite(solution.led_pixels_px).all(axis=1)))
+        assert used is None or kept == used
+    assert used is None or np.linalg.norm(solution.p_PD_B - still(0.0)) < 0.02
 
 
 def test_clutter_gets_an_led_s_name_no_oftener_than_is_said(render):
