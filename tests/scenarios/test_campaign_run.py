@@ -1026,6 +1026,18 @@ def test_before_the_first_flight_is_done_a_log_says_just_that(tmp_path, monkeypa
     assert text.getvalue() == "0 of 4 flights, none done yet\n"
 
 
+def test_the_pace_is_that_of_this_run_and_what_is_left_is_what_no_run_has_flown(monkeypatch):
+    """Of 100 flights 40 were done before and 10 in these two minutes: five a minute, 50 left."""
+    clock = SimpleNamespace(monotonic=lambda: 1000.0)
+    monkeypatch.setattr("dockair.scenarios.campaign.progress.time", clock)
+    progress = CampaignProgress(Console(file=io.StringIO()))
+    progress._total, progress._earlier, progress._now = 100, 40, 10
+    clock.monotonic = lambda: 1120.0
+    assert progress._pace() == "5.0 a minute, 10 min 0 s left"
+    progress._errors = 2
+    assert progress._pace() == "5.0 a minute, 10 min 0 s left, 2 errors"
+
+
 def test_the_samplers_of_the_command_line_are_those_of_the_plan():
     from typing import get_args
 
