@@ -23,7 +23,7 @@ class TakeIn:
 
     def __init__(self, settings: GuidanceSettings, step_s: float) -> None:
         self._settings, self._step_s = settings, step_s
-        self._told = max(round(settings.limits.slack_to_s / step_s), 1)  # ticks from contact on
+        self._told = round(settings.limits.slack_to_s / step_s)  # ticks from contact on
         self._ticks = 0  # since contact
         self.pushed_in_m = 0.0  #: toward the tanker since the coupling was reached
         self._push_to_m = 0.0  # how far it is pushed in at most
@@ -48,9 +48,9 @@ class TakeIn:
     def speed_m_s(self, phase: Phase, light: Light) -> float:
         """Speed along that contact and hold ask for beyond the drogue's drift."""
         s = self._settings
-        if phase is Phase.CONTACT and self._ticks < self._told:
-            return 0.0
         if phase is Phase.CONTACT:  # slows down so as to stop where it is to hold
+            if self._ticks < self._told:
+                return 0.0
             to_go = max(s.limits.take_in_m - self.pushed_in_m, 0.0)
             return float(min(s.closure_speed_m_s, s.take_in_gain_1_s * to_go))
         if light is Light.FLASHING_AMBER:

@@ -73,7 +73,7 @@ class Background:
         sky: Heaven,
         backend: str = "auto",
         *,
-        sun_radius_rad: float = 0.0,
+        sun_radius_rad: float,
     ) -> None:
         self._sky, self._blocks = sky, Blocks(camera, parameters.reduction)
         self._memory = np.empty(math.prod(self._blocks.drawn.shape), dtype=np.float32)  # new memory costs more than sky

@@ -19,8 +19,6 @@ from dockair.sim.camera.obstacles import Obstacles
 from dockair.sim.camera.occlusion import clear_directions
 from dockair.sim.camera.sun_beam import Beam, SunBeam
 
-__all__ = ["Beam", "SunView"]
-
 _BLOCK_PX = 2
 
 

@@ -740,6 +740,7 @@ def test_a_drogue_that_is_pushed_along_by_the_probe_is_not_chased():
     eased_s = SETTINGS.funnel_s + SETTINGS.closing.response_s - DEPTH_M / SETTINGS.closure_speed_m_s
     assert np.abs(pushing[:, 1:]).max() < 0.01
     assert pushing[:, 0].min() > SETTINGS.closure_speed_m_s - 1.05 * eased_s * SETTINGS.acceleration_limit_m_s2[0]
+    assert pushing[:, 0].max() < SETTINGS.closure_speed_m_s
     assert np.ptp(pushing[round((SETTINGS.funnel_s + 0.25) * RATE_HZ) :, 0]) < 1e-3
 
 

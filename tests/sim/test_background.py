@@ -85,7 +85,7 @@ def make(request: pytest.FixtureRequest) -> Iterator[Callable[..., Background]]:
         model: mujoco.MjModel, camera: Camera = CAMERA, reduction: int = 2, sky: PlainSky | None = None
     ) -> Background:
         sheet = BackgroundParameters(reduction=reduction)
-        made.append(Background(model, camera, sheet, sky or PlainSky(), request.param))
+        made.append(Background(model, camera, sheet, sky or PlainSky(), request.param, sun_radius_rad=0.0))
         return made[-1]
 
     yield build
@@ -376,7 +376,9 @@ def test_both_ways_of_drawing_agree_on_the_whole_scene(make_world: Callable[...,
     sky.ambient, sky.direct = 0.25, 0.75
     pictures = []
     for backend in ("mujoco", "analytic"):
-        background = Background(world.model, Camera(), BackgroundParameters(reduction=2), sky, backend)
+        background = Background(
+            world.model, Camera(), BackgroundParameters(reduction=2), sky, backend, sun_radius_rad=0.0
+        )
         pictures.append(background.electrons(world.data, pose, Camera().full_window, 255.0))
         background.close()
     difference = np.abs(pictures[0] - pictures[1])
@@ -392,10 +394,10 @@ def test_what_cannot_be_drawn_is_named_before_the_flight() -> None:
     model = spec.compile()
     for backend in ("mujoco", "analytic"):
         with pytest.raises(DockairError, match="geom ground: expected a sphere, .*, got 'plane'"):
-            Background(model, CAMERA, BackgroundParameters(reduction=2), PlainSky(), backend)
+            Background(model, CAMERA, BackgroundParameters(reduction=2), PlainSky(), backend, sun_radius_rad=0.0)
 
 
 def test_a_background_that_does_not_exist_is_refused_with_those_that_do() -> None:
     model, _ = _scene()
     with pytest.raises(DockairError, match="exists: auto, mujoco, analytic"):
-        Background(model, CAMERA, BackgroundParameters(reduction=2), PlainSky(), "vulkan")
+        Background(model, CAMERA, BackgroundParameters(reduction=2), PlainSky(), "vulkan", sun_radius_rad=0.0)
