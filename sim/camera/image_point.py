@@ -10,6 +10,7 @@ ab being the direction's slopes across the axis and m the margin's.
 """
 
 import math
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
@@ -48,7 +49,10 @@ def in_field(camera: Camera, direction_C: Array) -> bool:
     return bool(math.hypot(*direction_C[1:]) <= margin_slope(camera) * direction_C[0])
 
 
+@lru_cache(maxsize=8)
 def margin_slope(camera: Camera) -> float:
-    """Slope m: of the array's farthest corner, distortion left out, and some more."""
+    """Slope m: of the array's farthest corner, distortion left out, and some more; no less than distortion makes it."""
     (u, v), width, height = camera.principal_point_px, camera.width_px - 1.0, camera.height_px - 1.0
-    return _MARGIN * math.hypot(max(u, width - u), max(v, height - v)) / camera.focal_length_px
+    corners = camera.rays_from_pixels(np.array([[0.0, 0.0], [width, 0.0], [0.0, height], [width, height]]))
+    straight = math.hypot(max(u, width - u), max(v, height - v)) / camera.focal_length_px
+    return max(_MARGIN * straight, float(np.max(np.hypot(corners[:, 1], corners[:, 2]) / corners[:, 0])))

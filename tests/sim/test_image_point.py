@@ -59,3 +59,14 @@ def test_the_field_ends_a_third_beyond_the_corners() -> None:
     inside = [in_field(camera, _off_axis(angle, about_deg)) for angle in (0.0, corner_deg, corner_deg + 3.0)]
     assert inside == [True, True, True]
     assert not any(in_field(camera, _off_axis(angle, about_deg)) for angle in (corner_deg + 15.0, 89.9, 90.0, 120.0))
+
+
+def test_the_field_reaches_the_corners_of_a_lens_that_distorts_much() -> None:
+    """A barrel of 27 % sees a third farther out at the corners than a lens that does not distort."""
+    camera = replace(Camera(), focal_length_m=0.005, distortion=(-0.15, 0.02, 0.0, 0.0, 0.0))
+    corners = np.array([[0.0, 0.0], [2047.0, 0.0], [0.0, 1087.0], [2047.0, 1087.0]])
+    rays = camera.rays_from_pixels(corners)
+    bent = np.hypot(*(corners[0] - camera.principal_point_px)) / camera.focal_length_px
+    assert np.hypot(rays[0, 1], rays[0, 2]) / rays[0, 0] > 1.31 * bent
+    np.testing.assert_allclose(image_points(camera, 20.0 * rays), corners, rtol=0.0, atol=1e-3)
+    assert in_field(camera, rays[0])
