@@ -69,8 +69,8 @@ def with_numbers(seen: LedObservation, count: int) -> LedObservation:
     kept = np.isfinite(seen.centroids_px).all(axis=1) & np.isfinite(seen.sigma_px) & (seen.sigma_px > 0.0)
     numbers = np.asarray(seen.led_numbers)
     kept &= (numbers >= 0) & (numbers < count)
-    found, times = np.unique(numbers[kept], return_counts=True)
-    kept &= np.isin(numbers, found[times == 1])
+    named = numbers[kept].tolist()
+    kept[kept] = [named.count(number) == 1 for number in named]
     if kept.all():
         return seen
     return only(seen, kept)
