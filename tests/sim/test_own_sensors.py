@@ -24,15 +24,35 @@ QUIET = OwnSensorsParameters(
 STILL = (np.eye(3), np.zeros(3), np.zeros(3), np.zeros(3))
 
 
-def test_noise_has_the_strength_of_the_sheet() -> None:
-    """3000 samples of each of 13 channels; chi2, false alarm 1e-5 in all."""
+def noise() -> np.ndarray:
+    """(3000, 13) samples of each channel, over its strength in the sheet."""
     sensors, rows = OwnSensors(PARAMETERS, SAMPLE_S, np.random.default_rng(4)), []
     for _ in range(3000):
         R, w, f, v, airspeed = sensors.step(*STILL, 180.0)
         rows.append([R[2, 1], R[0, 2], R[1, 0], *w, *f, *v, airspeed - 180.0])
-    sums = np.sum((np.array(rows) / PARAMETERS.sigmas) ** 2, axis=0)
+    return np.array(rows) / PARAMETERS.sigmas
+
+
+def test_noise_has_the_strength_of_the_sheet() -> None:
+    """chi2, false alarm 1e-5 in all 13 channels."""
+    sums = np.sum(noise() ** 2, axis=0)
     low, high = chi2.ppf([5e-6 / 13, 1.0 - 5e-6 / 13], 3000)
     assert np.all((low < sums) & (sums < high))
+
+
+def test_no_channels_noise_tells_of_anothers_or_of_its_own_next_sample() -> None:
+    """Correlations of n independent samples have the spread 1/sqrt(n); 5.3 of them, false alarm 1e-5 in 91."""
+    rows, most = noise(), 5.3 / np.sqrt(3000)
+    between = np.corrcoef(rows.T)[np.triu_indices(13, 1)]
+    following = np.mean(rows[1:] * rows[:-1], axis=0)
+    assert np.abs(between).max() < most and np.abs(following).max() < most
+
+
+def test_noise_is_drawn_anew_every_ten_milliseconds_and_held() -> None:
+    sensors = OwnSensors(PARAMETERS, 1e-3, np.random.default_rng(6))
+    rates = np.array([sensors.step(*STILL, 180.0)[1].copy() for _ in range(50)]).reshape(5, 10, 3)
+    np.testing.assert_array_equal(rates, rates[:, :1].repeat(10, axis=1))
+    assert np.all(np.diff(rates[:, 0], axis=0) != 0.0)
 
 
 def test_noise_is_the_same_function_of_time_whatever_the_step() -> None:
