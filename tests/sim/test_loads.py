@@ -75,6 +75,24 @@ def test_drag_crisis_is_passed_without_a_jump():
     assert np.all(np.diff(coefficient) <= 1e-12)
 
 
+def test_drag_crisis_lies_about_the_sheets_reynolds_number_as_wide_either_way_as_the_sheet_says():
+    """From R_c / ratio to R_c ratio, half of the fall at R_c, and in log Re as much is left as has been lost before."""
+    middle, ratio, e = HOSE.crisis_reynolds, HOSE.crisis_width_ratio, np.array([1.0, 0.0, 0.0])
+
+    def fallen(reynolds):
+        """Share of the fall of C_n across the stream."""
+        u = reynolds * VISCOSITY / DIAMETER
+        c_n = -hose_load_per_length(e, np.array([0.0, 0.0, -u]), K)[2] / (0.5 * DENSITY * DIAMETER * u**2)
+        low, high = HOSE.normal_drag_coefficient, HOSE.supercritical_drag_coefficient
+        return (low - c_n) / (low - high)
+
+    assert fallen(0.999 * middle / ratio) == pytest.approx(0.0, abs=1e-12) and fallen(1.02 * middle / ratio) > 1e-4
+    assert fallen(1.001 * middle * ratio) == pytest.approx(1.0, abs=1e-12) and fallen(0.98 * middle * ratio) < 0.9999
+    assert fallen(middle) == pytest.approx(0.5, abs=1e-12)
+    for part in (0.2, 0.5, 0.8):
+        assert fallen(middle * ratio**part) + fallen(middle * ratio**-part) == pytest.approx(1.0, abs=1e-12)
+
+
 def test_air_at_rest_never_feeds_energy_into_the_tow():
     rng = np.random.default_rng(7)
     for _ in range(300):
