@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -16,6 +17,7 @@ from dockair.sim.hose.coupling import (
     probe_in_coupling,
     stays,
 )
+from dockair.sim.hose.probe_push import probe_push
 
 COUPLING = load_parameters("coupling", CouplingParameters)
 SEATED = ProbeInCoupling(distance_m=0.0, angle_rad=0.05, closing_speed_m_s=1.2, pull_n=0.0)
@@ -98,6 +100,25 @@ def test_a_nozzle_taken_while_it_presses_on_the_bottom_is_not_thrown_out_by_that
     for _ in range(60):
         truth = world.step(ReceiverCommand(velocity_m_s=np.array([speed, 0.0, 0.0])))
         assert truth.latched
+
+
+@pytest.mark.parametrize(("probe", "drogue", "ways"), [("ball", "table", -1.0), ("table", "ball", 1.0)])
+def test_push_is_that_of_the_probe_on_the_drogue_whichever_of_them_mujoco_names_first(probe, drogue, ways):
+    """A ball of 2 kg at rest on a table, which it pushes down and which pushes it up; another ball there is neither."""
+    spec = mujoco.MjSpec()
+    spec.worldbody.add_geom(name="table", type=mujoco.mjtGeom.mjGEOM_BOX, size=[1.0, 1.0, 0.1])
+    for name, x, mass in (("ball", 0.2, 2.0), ("other", -0.2, 5.0)):
+        body = spec.worldbody.add_body(name=name, pos=[x, 0.0, 0.15])
+        body.add_freejoint()
+        body.add_geom(name=name, type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[0.05, 0.0, 0.0], mass=mass)
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    for _ in range(1000):
+        mujoco.mj_step(model, data)
+    mujoco.mj_forward(model, data)
+    is_probe, is_drogue = (np.arange(model.ngeom) == model.geom(name).id for name in (probe, drogue))
+    weight = 2.0 * 9.81  # of MuJoCo's own gravity
+    np.testing.assert_allclose(probe_push(model, data, is_probe, is_drogue), [0.0, 0.0, ways * weight], atol=0.01)
 
 
 @pytest.mark.parametrize("direction_deg", np.arange(0.0, 360.0, 45.0))
