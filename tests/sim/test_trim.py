@@ -162,6 +162,17 @@ def test_path_beyond_the_engine_or_the_wing_is_refused_with_its_figures(path: di
         steady_trim(AIRFRAME, 180.0, standard_atmosphere(6000.0), **path)
 
 
+def test_descent_that_needs_less_than_idle_thrust_is_refused_and_one_that_needs_a_little_more_is_flown() -> None:
+    """To first order the thrust falls by the weight's part along the path; idle is 0.34 kN at 120 m/s and 3000 m."""
+    unmanned, air = load_parameters("airframe_unmanned", DerivativeAirframe), standard_atmosphere(3000.0)
+    level = level_trim(unmanned, 120.0, air)
+    idle_n, weight = level.thrust_range.idle_n, unmanned.mass_kg * G
+    slopes = [-(level.thrust_n - share * idle_n) / weight for share in (1.5, 0.5)]
+    assert steady_trim(unmanned, 120.0, air, climb_rad=slopes[0]).thrust_n == pytest.approx(1.5 * idle_n, rel=0.1)
+    with pytest.raises(DockairError, match="airspeed_m_s"):
+        steady_trim(unmanned, 120.0, air, climb_rad=slopes[1])
+
+
 def test_trim_beyond_the_derivatives_range_is_refused() -> None:
     """At 70 m/s and 3000 m the unmanned aircraft would need 0.75 of lift, inside; at 50 m/s 1.47, outside."""
     unmanned = load_parameters("airframe_unmanned", DerivativeAirframe)
