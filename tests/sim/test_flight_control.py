@@ -1,6 +1,7 @@
 """The flight control by itself; flown on a rigid body it is in test_receiver.py, its gains are in test_regulator.py."""
 
 import copy
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -11,6 +12,9 @@ from dockair.rotations import exp
 from dockair.sim.air.atmosphere import standard_atmosphere
 from dockair.sim.aircraft.aerodynamics import AirframeParameters
 from dockair.sim.aircraft.flight_control import FlightControl, FlightControlParameters
+from dockair.sim.aircraft.linear_model import linear_model
+from dockair.sim.aircraft.regulator import design as gains_of
+from dockair.sim.aircraft.regulator import tip_velocity
 from dockair.sim.aircraft.trim import level_trim, steady_trim
 
 AIRFRAME = load_parameters("airframe", AirframeParameters)
@@ -19,6 +23,14 @@ PARAMETERS = load_parameters("flight_control", FlightControlParameters)
 
 PROBE_B = np.array([6.0, -0.9, 0.6])
 AIR = standard_atmosphere(6000.0)
+TOLERANCES = {  # of a part: the sheet's keys
+    "velocity_m_s": "velocity_tolerance_m_s",
+    "integral_m": "integral_tolerance_m",
+    "attitude_rad": "attitude_tolerance_rad",
+    "rate_rad_s": "rate_tolerance_rad_s",
+    "surfaces_rad": "surface_tolerance_rad",
+    "thrust_m_s2": "thrust_tolerance_m_s2",
+}
 ZERO, AHEAD = np.zeros(3), np.array([180.0, 0.0, 0.0])
 
 
@@ -120,6 +132,22 @@ def test_models_rates_are_as_late_as_the_measured_ones() -> None:
     np.testing.assert_allclose(late[-1], weights @ np.array(rates), rtol=1e-9, atol=1e-15)
 
 
+@pytest.mark.parametrize(("share", "left"), [(0.5, 1.0), (1.5, 0.5), (-1.5, 0.5), (2.5, 0.0)])
+def test_reference_to_the_side_is_taken_back_with_the_bank_that_the_model_flies(share: float, left: float) -> None:
+    """Eq. (2) of `reference`: whole up to the sheet's first bank, none from the second on, up it stays; one tick."""
+    (first, last), jerks = PARAMETERS.increment_bank_rad, []
+    for part in (0.0, share):
+        beyond = abs(part) - 1.0
+        bank = np.sign(part) * (first + beyond * (last - first) if beyond > 0.0 else first * abs(part))
+        design = control()
+        commands(design, AHEAD)
+        design.model.R_WB[:] = exp(np.array([bank, 0.0, 0.0])) @ design.model.R_WB
+        commands(design, AHEAD, acceleration_m_s2=np.array([0.0, 20.0, 20.0]))
+        jerks.append(design.reference.chain[2].copy())
+    assert np.abs(jerks[0][1:]).min() > 0.1
+    np.testing.assert_allclose(jerks[1][1:], jerks[0][1:] * [left, 1.0], rtol=1e-6, atol=1e-9)
+
+
 def test_busy_surfaces_get_the_gains_for_busy_surfaces() -> None:
     """From one state, with b of `rate_relief` at 1 and at 0: the commands differ by (K - K_busy) times the error."""
     design = control()
@@ -198,6 +226,21 @@ def test_integral_is_held_while_an_actuator_is_at_its_limit() -> None:
     np.testing.assert_array_equal(design._memory["z"], 0.0)
 
 
+@pytest.mark.parametrize("stuck", range(4), ids=["elevator", "aileron", "rudder", "thrust"])
+def test_both_integrals_are_held_whichever_actuator_is_at_its_limit(stuck: int) -> None:
+    """One that cannot leave a place beside that of trim, while the other three are free."""
+    trim, design = level_trim(AIRFRAME, 180.0, AIR), control(1e-2)
+    at = np.append(trim.surfaces_rad, trim.thrust_n / AIRFRAME.mass_kg)[stuck] + 1e-3
+    design._memory["limits"][:, stuck] = at
+    for _ in range(20):
+        u = commands(design, np.array([180.3, 0.2, -0.1]), velocity_m_s=np.array([0.4, 0.3, 0.2]))
+    u[3] /= AIRFRAME.mass_kg
+    lowest, highest = design._memory["limits"]
+    assert ((lowest < u) & (u < highest)).tolist() == [i != stuck for i in range(4)]
+    np.testing.assert_array_equal(design._memory["z"], 0.0)
+    np.testing.assert_array_equal(design._memory["x_m"][13:], 0.0)
+
+
 def test_models_integral_adds_up_its_velocity_less_the_reference_and_is_held_while_its_command_is_at_a_limit() -> None:
     """Eq. (1); the second control has no thrust beyond that of trim."""
     free, held, step_s, expected = control(1e-2), control(1e-2), 1e-2, np.zeros(3)
@@ -222,3 +265,49 @@ def test_a_copy_goes_on_as_the_original_would_have_and_leaves_it_alone() -> None
     np.testing.assert_array_equal([commands(one, off_path, velocity_m_s=np.ones(3)) for _ in range(20)], ahead)
     assert not np.shares_memory(one._memory["x_m"], two._memory["x_m"])
     assert not np.shares_memory(one.model.R_WB, two.model.R_WB)
+
+
+def test_every_number_of_the_sheet_arrives_where_its_key_says() -> None:
+    """In a sheet without two equal numbers; a part's keys are its fields' names and what they are of."""
+    sheet = {}
+    for k, field in enumerate(fields(PARAMETERS)):
+        size = np.size(getattr(PARAMETERS, field.name))
+        sheet[field.name] = 10.0 * k + (np.arange(size) if size > 1 else 0.0)
+    told = replace(PARAMETERS, **sheet)
+    keys: dict[str, dict[str, str]] = {
+        "own_sensors": {},
+        "path": {name: f"path_{name}" for name in ("bandwidth_rad_s", "damping", "catching_up")},
+        "relief": {name: f"relief_{name}" for name in ("time_s", "busy_share", "least", "stop_share")},
+        "swing": {name: f"swing_{name}" for name in ("frequency_rad_s", "damping")},
+        "tolerances": TOLERANCES,
+        "following_tolerances": {name: f"following_{key}" for name, key in TOLERANCES.items()},
+        "reference_limits": {
+            "gain_1_s": "reference_gain_1_s",
+            "bandwidth_rad_s": "smoothing_bandwidth_rad_s",
+            "damping": "smoothing_damping",
+            "acceleration_m_s2": "acceleration_limit_m_s2",
+            "jerk_m_s3": "jerk_limit_m_s3",
+            "velocity_m_s": "velocity_limit_m_s",
+            "bank_rad": "increment_bank_rad",
+        },
+    }
+    for part, renamed in keys.items():
+        group = getattr(told, part)
+        for field in fields(group):
+            expected = sheet[renamed.get(field.name, field.name)]
+            np.testing.assert_array_equal(getattr(group, field.name), expected, err_msg=f"{part}.{field.name}")
+    relaxed = ("velocity_m_s", "integral_m", "attitude_rad", "rate_rad_s")
+    factors = dict(zip(relaxed, told.busy_tolerance_factors, strict=True))
+    for field in fields(told.tolerances):
+        expected = factors.get(field.name, 1.0) * getattr(told.tolerances, field.name)
+        np.testing.assert_array_equal(getattr(told.busy_tolerances, field.name), expected)
+
+
+def test_gains_are_designed_for_gusts_that_pass_at_the_airspeed_over_the_sheets_length() -> None:
+    """V/L in dg/dt = -(V/L) g, and the sheet's weights, each in its place."""
+    p, trim = PARAMETERS, level_trim(AIRFRAME, 180.0, AIR)
+    weights = p.tolerances, p.busy_tolerances, p.following_tolerances
+    plant, C = linear_model(AIRFRAME, trim), tip_velocity(trim.R_WB, PROBE_B)
+    expected, ours = gains_of(plant, C, *weights, 180.0 / p.gust_length_m, p.swing), control().schedule.gains
+    for name in ("K", "K_busy", "K_followed", "K_command"):
+        np.testing.assert_allclose(getattr(ours, name), getattr(expected, name), rtol=1e-9, atol=1e-12)
