@@ -102,10 +102,13 @@ def test_gradient_of_the_air_pitches_it_by_what_the_tail_feels_and_not_by_the_do
 
 
 def test_beyond_its_range_the_flow_angles_hold() -> None:
-    end = AIRFRAME.angle_of_attack_ends_rad[1]
-    np.testing.assert_allclose(in_stability_axes(end + 0.2)[[0, 2, 4]], in_stability_axes(end)[[0, 2, 4]], atol=1e-12)
-    side = AIRFRAME.sideslip_end_rad
-    np.testing.assert_allclose(in_stability_axes(0.0, 0.5)[[1, 3, 5]], in_stability_axes(0.0, side)[[1, 3, 5]])
+    """At both ends of either."""
+    for end, beyond in zip(AIRFRAME.angle_of_attack_ends_rad, (-0.2, 0.2), strict=True):
+        held, at_end = in_stability_axes(end + beyond), in_stability_axes(end)
+        np.testing.assert_allclose(held[[0, 2, 4]], at_end[[0, 2, 4]], atol=1e-12)
+    for side in (-AIRFRAME.sideslip_end_rad, AIRFRAME.sideslip_end_rad):
+        held, at_end = in_stability_axes(0.0, np.sign(side) * 0.5), in_stability_axes(0.0, side)
+        np.testing.assert_allclose(held[[1, 3, 5]], at_end[[1, 3, 5]])
 
 
 def test_it_is_the_smaller_the_lighter_and_the_slower_one() -> None:

@@ -216,13 +216,14 @@ def test_commanded_turn_moves_the_trim_to_that_of_the_turn() -> None:
     assert row.trim[9] * AIRFRAME.mass_kg == pytest.approx(turn.thrust_n, rel=0.02)
 
 
-def test_integral_is_held_while_an_actuator_is_at_its_limit() -> None:
-    """A speed 40 m/s too low asks for more than military thrust: nothing is added up."""
+@pytest.mark.parametrize(("speed_m_s", "end"), [(140.0, "military_n"), (220.0, "idle_n")])
+def test_integral_is_held_while_an_actuator_is_at_its_limit(speed_m_s: float, end: str) -> None:
+    """A speed 40 m/s too low asks for more than military thrust, one too high for less than idle: nothing is added."""
     design = control(1e-2)
     commands(design, np.array([180.0, 0.0, 0.0]))
     for _ in range(50):
-        u = commands(design, np.array([140.0, 0.0, 0.0]))
-    assert u[3] == pytest.approx(level_trim(AIRFRAME, 180.0, AIR).thrust_range.military_n)
+        u = commands(design, np.array([speed_m_s, 0.0, 0.0]))
+    assert u[3] == pytest.approx(getattr(level_trim(AIRFRAME, 180.0, AIR).thrust_range, end))
     np.testing.assert_array_equal(design._memory["z"], 0.0)
 
 

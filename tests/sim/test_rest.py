@@ -101,3 +101,16 @@ def test_in_air_that_differs_along_the_hose_every_link_is_in_balance_in_its_own(
         rest_shape(hose, drogue, wind, rho, nu).p_WH for wind in (winds[0], np.tile(winds[0], (hose.links + 1, 1)))
     ]
     assert np.array_equal(*uniform)
+
+
+def test_air_acts_at_the_links_middles_and_where_the_drogues_drag_balances_its_weight_about_the_hoses_end():
+    hose, drogue = load_parameters("hose", HoseParameters), load_parameters("drogue", DrogueParameters)
+    wind, rho, nu = np.array([-120.0, 0.0, 0.0]), 0.909, 1.863e-5
+    rest = rest_shape(hose, drogue, wind, rho, nu)
+    places, end = rest.air_places_W(drogue), rest.p_WH[-1]
+    force = drogue_force(rest.t_D_W, wind, load_coefficients(hose, drogue, rho, nu))
+    weight = np.array([0.0, 0.0, -9.80665 * drogue.mass_kg])
+    mass = (drogue.centre_of_mass_x_m - drogue.hose_joint_x_m) * rest.t_D_W
+    np.testing.assert_allclose(np.cross(places[-1] - end, force) + np.cross(mass, weight), 0.0, atol=1e-9)
+    np.testing.assert_allclose(np.cross(places[-1] - end, rest.t_D_W), 0.0, atol=1e-12)
+    np.testing.assert_allclose(2.0 * places[:-1] - rest.p_WH[:-1], rest.p_WH[1:], atol=1e-12)
