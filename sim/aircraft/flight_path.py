@@ -6,6 +6,8 @@ For the turn rate r against the commanded one r_c, and alike for the slope's, wi
 
 so that after a change the heading is where the command's integral is (for the slope: the height), although r came
 late. The limit is the rate of roll p: tan(bank) = V r / g, so r' <= p g / (V cos(bank)^2).
+Bank and slope are limited as commanded; what is flown while it makes up for what it lagged goes beyond, after a step
+to the limits at 180 m/s to 1.4 times the bank and 1.7 times the slope.
 Not modelled: wind; the path is one in the air mass.
 """
 
@@ -25,9 +27,9 @@ class FlightPathParameters:
     bandwidth_rad_s: float
     damping: float
     catching_up: float  #: kappa
-    bank_limit_rad: float
+    bank_limit_rad: float  #: of the command
     roll_rate_limit_rad_s: float
-    climb_limit_rad: float
+    climb_limit_rad: float  #: of the command
     climb_rate_limit_rad_s: float
 
 
