@@ -113,6 +113,18 @@ def test_mirror_image_keeps_the_tilt_turns_it_around_and_its_own_mirror_image_is
         np.testing.assert_allclose(back, R, atol=1e-12)
 
 
+@pytest.mark.parametrize("leds", [[0, 1, 2, 3], [1, 4, 6], [0, 1, 2, 3, 4]])
+def test_mirror_image_of_part_of_the_ring_is_about_the_line_of_sight_to_the_middle_of_that_part(leds):
+    """The middle m stays, the normal n is reflected about the line s to it: 2 (s'n) s - n."""
+    points, middle_D = RING[leds], RING[leds].mean(axis=0)
+    for R, p in random_poses(20, 2.0, 30.0):
+        Q, s = mirrored(R, p, points)
+        middle = R @ middle_D + p
+        sight, normal = middle / np.linalg.norm(middle), R[:, 0]
+        np.testing.assert_allclose(Q @ middle_D + s, middle, atol=1e-12)
+        np.testing.assert_allclose(Q[:, 0], 2.0 * (sight @ normal) * sight - normal, atol=1e-12)
+
+
 def test_mirror_image_looks_the_same_to_first_order():
     """Its LEDs are at most (radius/range)^2 away in the image, the pose's own tilt moves them by far more."""
     R, p = matrix_from_yaw_pitch_roll(0.0, 0.35, 0.0), np.array([20.0, 0.0, 0.0])
@@ -124,6 +136,13 @@ def test_mirror_image_looks_the_same_to_first_order():
 def test_position_for_the_true_attitude_is_exact():
     for R, p in random_poses(50, 1.0, 30.0):
         np.testing.assert_allclose(position_for_attitude(rays(R, p), RING, R), p, rtol=1e-8)
+
+
+def test_position_is_in_front_of_the_camera_also_when_the_attitude_is_upside_down():
+    """Rolled half a turn the ring's LEDs are their opposites, and fit best as far behind the camera."""
+    for R, p in random_poses(20, 1.0, 30.0):
+        upside_down = R @ exp(np.array([np.pi, 0.0, 0.0]))
+        np.testing.assert_allclose(position_for_attitude(rays(R, p), RING, upside_down), p, rtol=1e-8)
 
 
 def test_position_is_finite_when_all_rays_are_one():
