@@ -94,16 +94,20 @@ def test_a_frame_of_now_adds_nothing_and_no_frame_at_all_promises_nothing():
 
 def test_a_belief_that_is_less_sure_of_itself_promises_no_more_than_that():
     coasting = asked(np.full(3, 0.001))
-    k = float(np.sqrt(chi2.isf(CoastingSettings().risk, 2)))
+    one, two = np.sqrt(chi2.isf(CoastingSettings().risk, [1, 2]))
     added = coasting.added(FRAME, HORIZON_S, np.array([0.0, 0.04, 0.02]))
-    assert added.lateral_m == pytest.approx(FRAME.lateral_m + k * 0.04)
+    assert added.lateral_m == pytest.approx(FRAME.lateral_m + two * 0.04)
     assert added.range_m < FRAME.range_m + 0.005
+    along = coasting.added(FRAME, HORIZON_S, np.array([0.03, 0.0, 0.0]))
+    assert along.range_m == pytest.approx(FRAME.range_m + one * 0.03)
+    assert along.lateral_m < FRAME.lateral_m + 0.006
 
 
 def test_only_a_belief_that_was_asked_lately_is_like_those_that_were():
     assert not CoastingError().is_of(0.0)
     coasting = asked(np.full(3, 0.02), seconds=10.0)
-    assert coasting.is_of(10.1) and not coasting.is_of(11.0)
+    asked_s = 9.9  # the last time
+    assert coasting.is_of(asked_s + 0.99 * HORIZON_S) and not coasting.is_of(asked_s + 1.01 * HORIZON_S)
     assert not coasting.due(9.95) and coasting.due(10.0)  # 9.9 s was the last
 
 
