@@ -288,11 +288,28 @@ def test_while_the_mirror_image_may_be_it_the_level_reaches_it_and_no_attitude_i
     result = checked(pixels_at(R, p, seed=5))
     other = result.pose.alternative
     assert other is not None and not result.mirror_ruled_out and np.isinf(result.levels.attitude_rad)
-    found = sensitivity(result.pose.measurement, other.R_CD, other.p_CD, other.covariance)
-    test, apart = fault_test(10, IntegritySettings()), other.p_CD - result.pose.p_CD
-    there = found.slopes.max(axis=0) * test.least_fault + np.array(test.error_sigmas) * found.sigmas
-    assert result.levels.range_m >= abs(apart[0]) + there[RANGE] - 1e-12
-    assert result.levels.lateral_m >= np.hypot(*apart[1:]) + there[LATERAL] - 1e-12
+    test, apart, bounds = fault_test(10, IntegritySettings()), other.p_CD - result.pose.p_CD, []
+    for pose in (result.pose, other):
+        found = sensitivity(result.pose.measurement, pose.R_CD, pose.p_CD, pose.covariance)
+        bounds.append(found.slopes.max(axis=0) * test.least_fault + np.array(test.error_sigmas) * found.sigmas)
+    here, there = bounds
+    assert result.levels.range_m == pytest.approx(max(here[RANGE], abs(apart[0]) + there[RANGE]))
+    assert result.levels.lateral_m == pytest.approx(max(here[LATERAL], np.hypot(*apart[1:]) + there[LATERAL]))
+
+
+def test_the_mirror_image_is_ruled_out_when_it_fails_without_its_worst_led_too():
+    """Its cost is solved again without each LED; where it crosses T of 8, that of all eight is above it."""
+    threshold, between = fault_test(8, IntegritySettings()).threshold, 0
+    for range_m in np.arange(12.0, 18.0, 0.25):
+        pixels = pixels_at(*pose_at(range_m, 15.0))
+        pose = solve_pose(pixels, RING, CAMERA, sigma_px=SIGMA_PX)
+        other, result, costs = pose.alternative, check_integrity(pose), []
+        for rest in (np.arange(8) != led for led in range(8)):
+            start = other.R_CD, other.p_CD
+            costs.append(solve_pose(pixels[rest], RING[rest], CAMERA, sigma_px=SIGMA_PX, initial=start).chi2)
+        assert result.mirror_ruled_out == (min(costs) > threshold)
+        between += min(costs) < threshold < other.chi2
+    assert between > 0
 
 
 @pytest.mark.parametrize("seed", [963, 1158, 1483, 1922, 2285])  # believed 7 to 19 degrees off, on the wrong side
@@ -316,7 +333,22 @@ def test_two_poses_without_the_same_led_are_no_single_attitude_on_whichever_side
     test = fault_test(8, IntegritySettings())
     for led, alone in ((3, False), (4, True)):
         found = [Exclusion(3, pose), Exclusion(led, turned)]
-        assert separation_levels(found, pose.measurement, test)[1] == alone
+        levels, only = separation_levels(found, pose.measurement, test)
+        reach = np.deg2rad(2.0) + test.error_sigmas[2] * worst_sigmas(pose.covariance)[ATTITUDE]
+        assert only == alone and levels.attitude_rad == pytest.approx(reach if alone else np.inf)
+
+
+def test_aside_of_the_boresight_two_poses_are_on_either_side_of_the_line_of_sight_to_the_drogue():
+    """Both of their axes lie on one side of the boresight."""
+    R, p = pose_at(6.0, 0.0, (0.3, 0.0))
+    pose = solve_pose(pixels_at(R, p), RING, CAMERA, sigma_px=SIGMA_PX)
+    sight_rad = np.arctan(0.3)
+    near, far = (
+        replace(pose, R_CD=exp(np.array([0.0, 0.0, sight_rad + np.deg2rad(turn_deg)]))) for turn_deg in (-6.0, 6.0)
+    )
+    found, test = [Exclusion(3, near), Exclusion(4, far)], fault_test(8, IntegritySettings())
+    assert near.R_CD[1, 0] > 0.1 and far.R_CD[1, 0] > 0.1
+    assert not separation_levels(found, pose.measurement, test)[1]
 
 
 @pytest.mark.parametrize("seed", [2163, 2749, 4691])  # rounding makes J - max t_i positive, where it is 0
@@ -382,6 +414,25 @@ def test_an_attitude_prior_is_a_pose_prior_that_knows_no_place():
     assert attitude.levels.range_m == pytest.approx(pose.levels.range_m, rel=1e-3)
 
 
+def test_an_attitude_prior_that_knows_no_roll_is_two_measurements():
+    R, p = pose_at(20.0, 10.0)
+    prior = AttitudePrior.from_sigmas(R, np.array([np.inf, *np.deg2rad([3.0, 3.0])]))
+    assert checked(pixels_at(R, p, seed=6), prior=prior).threshold == pytest.approx(chi2.isf(1e-4, 2 * 8 - 4))
+
+
+def test_a_prior_that_contradicts_the_frame_is_told():
+    """J has the prior's share: the squared Mahalanobis distance of the frame's own pose, where that is linear."""
+    R, p = pose_at(4.0, 20.0)
+    alone = solve_pose(pixels_at(R, p, seed=7), RING, CAMERA, sigma_px=SIGMA_PX)
+    prior = attitude_prior(exp(np.deg2rad([0.0, 1.5, 2.0])) @ R, p, sigma_deg=0.3)
+    d = pose_difference(alone.R_CD, alone.p_CD, prior.R_CD, prior.p_CD)
+    share = d @ np.linalg.solve(prior.covariance + alone.covariance, d)
+    result = check_integrity(alone, prior)
+    assert alone.chi2 < result.threshold
+    assert result.status is IntegrityStatus.INCONSISTENT
+    assert result.chi2 == pytest.approx(alone.chi2 + share, rel=0.1)
+
+
 def test_a_direction_is_two_measurements_and_rules_the_mirror_image_out():
     R, p = pose_at(20.0, 10.0)
     hose = DirectionPrior(axis_C=R[:, 0], sigma_rad=np.deg2rad(2.0), axis_D=np.array([1.0, 0.0, 0.0]))
@@ -399,6 +450,20 @@ def test_what_the_solver_was_told_to_spare_or_not_to_look_for_is_looked_for(opti
     )
     assert told.status is plain.status is IntegrityStatus.CONSISTENT and not told.mirror_ruled_out
     assert told.chi2 == pytest.approx(plain.chi2, rel=1e-6)
+    assert told.levels.range_m == pytest.approx(plain.levels.range_m, rel=1e-3)
+
+
+def test_a_mirror_image_within_some_sigmas_is_a_minimum_of_its_own():
+    """20 m, 4 degrees: 8 sigma away, found by the monitor itself as by the solver."""
+    R, p = pose_at(20.0, 4.0)
+    plain, told = (
+        check_integrity(solve_pose(pixels_at(R, p), RING, CAMERA, sigma_px=SIGMA_PX, initial=(R, p), options=o))
+        for o in (PoseOptions(), PoseOptions(mirror=False))
+    )
+    pose, other = told.pose, told.pose.alternative
+    assert other is not None
+    d = pose_difference(pose.R_CD, pose.p_CD, other.R_CD, other.p_CD)
+    assert 25.0 < d @ np.linalg.solve(other.covariance, d) < 100.0
     assert told.levels.range_m == pytest.approx(plain.levels.range_m, rel=1e-3)
 
 
@@ -500,8 +565,9 @@ def test_contact_is_usable_at_2_m_and_not_at_30_m():
 @pytest.mark.parametrize("age_s", [0.41, -0.01, float("nan"), float("inf")])
 def test_a_frame_of_another_age_than_recent_is_a_doubt(age_s):
     near = checked(pixels_at(*pose_at(2.0, 5.0), seed=9))
-    assert usable_for_contact(near, 0.39).usable
-    assert usable_for_contact(near, age_s).doubts == (Doubt.AGE,)
+    for in_basket in (False, True):
+        assert usable_for_contact(near, 0.39, in_basket=in_basket).usable
+        assert usable_for_contact(near, age_s, in_basket=in_basket).doubts == (Doubt.AGE,)
 
 
 @pytest.mark.parametrize(
@@ -514,7 +580,8 @@ def test_a_frame_of_another_age_than_recent_is_a_doubt(age_s):
 )
 def test_a_frame_that_did_not_pass_is_a_doubt_whatever_its_levels(status, doubt):
     near = checked(pixels_at(*pose_at(2.0, 5.0), seed=9))
-    assert usable_for_contact(replace(near, status=status), 0.0).doubts == (doubt,)
+    for in_basket in (False, True):  # that holds the tip; it does not make a pose right
+        assert usable_for_contact(replace(near, status=status), 0.0, in_basket=in_basket).doubts == (doubt,)
 
 
 def test_the_basket_holds_the_tip_sideways_but_not_along():
