@@ -56,7 +56,10 @@ def test_where_the_problem_is_linear_it_is_the_kalman_update():
         ours = pose_difference(found.R_CD, found.p_CD, prior.R_CD, prior.p_CD)
         np.testing.assert_array_less(np.abs(ours - step), 0.05 * sigma)
         np.testing.assert_allclose(found.covariance / np.outer(sigma, sigma), P / np.outer(sigma, sigma), atol=0.03)
-        assert found.gate_chi2 == pytest.approx(innovation @ np.linalg.solve(S, innovation), abs=0.1)
+        distance = innovation @ np.linalg.solve(S, innovation)
+        assert found.gate_chi2 == pytest.approx(distance, abs=0.1)
+        volumes = np.linalg.slogdet(P)[1] - np.linalg.slogdet(prior.covariance)[1]
+        assert found.log_evidence == pytest.approx(0.5 * (volumes - distance - pose.chi2), abs=0.1)
 
 
 def test_likelihood_ratio_is_chi_square_with_six_degrees_of_freedom():
@@ -113,3 +116,20 @@ def test_pose_without_lines_of_sight_is_averaged_as_a_gaussian():
     volumes = np.linalg.slogdet(P)[1] - np.linalg.slogdet(prior.covariance)[1]
     expected = 0.5 * (volumes - innovation @ np.linalg.solve(S, innovation) - pose.chi2)  # Eq. (1): J has both costs
     assert found.log_evidence == pytest.approx(expected)
+    step = prior.covariance @ np.linalg.solve(S, innovation)
+    np.testing.assert_allclose(pose_difference(found.R_CD, found.p_CD, prior.R_CD, prior.p_CD), step, atol=1e-12)
+
+
+@pytest.mark.parametrize("with_lines_of_sight", [True, False])
+def test_likelihood_ratio_is_against_the_better_minimum_whichever_comes_first(with_lines_of_sight):
+    """A start on the wrong side puts the worse minimum first; of the two ratios that changes nothing."""
+    R, p = matrix_from_yaw_pitch_roll(0.0, np.deg2rad(8.0), 0.0), np.array([20.0, 0.0, 0.0])
+    pixels = CAMERA.pixels_from_points(RING @ R.T + p) + 0.05 * np.random.default_rng(5).normal(size=(8, 2))
+    prior, gates = PosePrior(R_CD=R, p_CD=p, covariance=np.diag([0.2**2] * 3 + [0.3**2] * 3)), []
+    for start in (R, p), mirrored(R, p, RING):
+        pose = solve_pose(pixels, RING, CAMERA, sigma_px=0.05, initial=start)
+        assert pose.alternative is not None and abs(pose.alternative.chi2 - pose.chi2) > 5.0
+        known = pose if with_lines_of_sight else replace(pose, measurement=None)
+        gates.append(sorted(found.gate_chi2 for found in posteriors(prior, known)))
+    assert len(gates[0]) == 2
+    assert gates[0] == pytest.approx(gates[1], abs=0.01)
