@@ -44,6 +44,19 @@ def test_prior_chooses_the_side_that_the_frame_cannot(kind):
     assert found > 10
 
 
+@pytest.mark.parametrize("kind", range(4))
+def test_what_prior_and_frame_cost_together_decides_which_minimum_comes_first(kind):
+    """20 m, 12 degrees, pixels of the mirror image: it costs the frame nothing and a prior of 6 degrees 16."""
+    R, p = tilted(12.0, 20.0)
+    Q, s = mirrored(R, p, RING)
+    pixels = CAMERA.pixels_from_points(RING @ Q.T + s)
+    pose = solve_pose(pixels, RING, CAMERA, prior=priors(R, p, np.deg2rad(6.0))[kind])
+    assert pose.alternative is not None
+    assert np.linalg.norm(log(pose.R_CD @ R.T)) < np.deg2rad(1.0)
+    assert pose.cost + 5.0 < pose.alternative.cost and pose.chi2 > pose.alternative.chi2 + 5.0
+    assert pose.ambiguous
+
+
 @pytest.mark.parametrize("kind", range(1, 4))
 def test_a_start_on_the_wrong_side_does_not_decide_against_the_prior(kind):
     R, p = tilted(8.0, 15.0)
