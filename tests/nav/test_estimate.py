@@ -64,9 +64,10 @@ def test_rms_and_chi2_are_those_of_the_pixels():
     for R, p in random_poses(20, 2.0, 12.0):
         sigma = rng.uniform(0.05, 0.3, 8)
         pixels = pixels_of(R, p, LENS) + sigma[:, None] * rng.normal(size=(8, 2))
+        pixels[rng.permutation(8)[: rng.integers(3)]] = np.nan
         estimate = solve_pose(pixels, RING, LENS, sigma_px=sigma, initial=(R, p))
         residual = pixels - pixels_of(estimate.R_CD, estimate.p_CD, LENS)
-        assert estimate.rms_px == pytest.approx(np.sqrt(np.mean(residual**2)), rel=1e-3)
+        assert estimate.rms_px == pytest.approx(np.sqrt(np.nanmean(residual**2)), rel=1e-3)
         np.testing.assert_allclose(estimate.led_chi2, np.sum(residual**2, axis=1) / sigma**2, rtol=1e-2, atol=1e-3)
         assert estimate.chi2 == pytest.approx(np.nansum(estimate.led_chi2))
 
@@ -168,10 +169,22 @@ def test_the_other_minimum_is_found_from_either_start():
             again = solve_pose(pixels, RING, CAMERA, sigma_px=0.05, initial=(start.R_CD, start.p_CD))
             assert again.alternative is not None
             assert again.chi2 == pytest.approx(start.chi2, rel=1e-3)
+            assert again.reprojection_ratio == pytest.approx(first.reprojection_ratio, rel=1e-3)
             assert sorted([again.chi2, again.alternative.chi2]) == pytest.approx(
                 [first.chi2, first.alternative.chi2], rel=1e-3
             )
     assert both > 180
+
+
+def test_minima_are_the_same_two_however_large_the_noise_is_said_to_be():
+    """20 m, 4 degrees: with 0.4 px they are two sigma apart, and still two."""
+    R, p = tilted(4.0, 20.0)
+    small, large = (solve_pose(pixels_of(R, p), RING, CAMERA, sigma_px=s, initial=(R, p)) for s in (0.05, 0.4))
+    assert small.alternative is not None and large.alternative is not None
+    np.testing.assert_allclose(large.alternative.R_CD, small.alternative.R_CD, atol=1e-4)
+    np.testing.assert_allclose(large.alternative.p_CD, small.alternative.p_CD, atol=1e-3)
+    d = error(large, large.alternative.R_CD, large.alternative.p_CD)
+    assert 1.0 < d @ np.linalg.solve(large.covariance, d) < 9.0
 
 
 def test_attitude_prior_removes_the_range_bias_of_the_frontal_ring():
@@ -304,6 +317,16 @@ def test_reprojection_ratio_and_ambiguity_follow_the_two_minima():
     assert ratios[0] > 0.9 > 0.2 > ratios[1] > 0.0
 
 
+@pytest.mark.parametrize(("more", "ambiguous"), [(24.9, True), (25.1, False), (-1000.0, True)])
+def test_a_pose_is_ambiguous_unless_the_other_minimum_costs_25_more(more, ambiguous):
+    """A start may have led to what costs far more than the other: then the other is the likelier one."""
+    R, p = tilted(15.0, 15.0)
+    pose = solve_pose(pixels_of(R, p), RING, CAMERA)
+    assert pose.alternative is not None
+    pose = replace(pose, alternative=replace(pose.alternative, cost=pose.cost + more))
+    assert pose.ambiguous == ambiguous
+
+
 def test_condition_is_that_of_the_pixel_jacobian_in_metres():
     """By NumPy: squared, since the information is its square; a frontal far ring stands out."""
     for range_m, tilt_deg, low, high in ((3.0, 20.0, 10.0, 300.0), (30.0, 1.0, 1e4, 1e6)):
@@ -314,6 +337,24 @@ def test_condition_is_that_of_the_pixel_jacobian_in_metres():
         assert estimate.condition == pytest.approx(np.linalg.cond(J) ** 2, rel=1e-3)
         assert low < estimate.condition < high
     assert np.isnan(solve_pose(np.full((8, 2), np.nan), RING, CAMERA).condition)
+
+
+def test_condition_of_part_of_the_ring_has_the_root_mean_square_radius_about_its_middle():
+    (R, p), points = tilted(20.0, 3.0), RING[:4]
+    estimate = solve_pose(pixels_of(R, p, points=points), points, CAMERA, initial=(R, p))
+    _, J = model.pixels(mrp_from_matrix(R), p, points, lens_of(CAMERA), model.LOCAL)
+    radius = np.sqrt(np.mean(np.sum((points - points.mean(axis=0)) ** 2, axis=1)))
+    assert radius < 0.8 * 0.25
+    J = J.reshape(-1, 6) / np.repeat([radius, 1.0], 3)
+    assert estimate.condition == pytest.approx(np.linalg.cond(J) ** 2, rel=1e-3)
+
+
+def test_a_descent_that_has_not_arrived_is_a_status_without_covariance_or_alternative():
+    R, p = tilted(15.0, 6.0)
+    start = exp(np.full(3, 0.01)) @ R, 1.002 * p
+    estimate = solve_pose(pixels_of(R, p), RING, CAMERA, method="gradient", initial=start)
+    assert estimate.status is PoseStatus.NOT_CONVERGED
+    assert np.isnan(estimate.covariance).all() and estimate.alternative is None and not estimate.ambiguous
 
 
 @pytest.mark.parametrize("camera", [CAMERA, LENS], ids=["pinhole", "distorted"])
