@@ -93,6 +93,10 @@ def test_camera_in_the_drogue_is_the_other_way_round_of_each_error():
     np.testing.assert_allclose(
         sample / np.outer(scale, scale), bound.camera_in_drogue / np.outer(scale, scale), atol=0.05
     )
+    along, left, up = np.sqrt(np.diag(sample)[3:])
+    assert bound.camera_range_sigma_m == pytest.approx(along, rel=0.02)
+    assert bound.camera_lateral_sigma_m == pytest.approx(np.hypot(left, up), rel=0.02)
+    assert bound.camera_range_sigma_m > 2.0 * np.sqrt(bound.covariance[3, 3])  # the drogue's x is not the camera's
 
 
 def test_range_and_lateral_are_along_and_across_the_line_of_sight():
@@ -114,6 +118,19 @@ def test_leds_off_the_sensor_or_behind_the_camera_do_not_count():
     assert np.isnan(bound.information[~bound.seen]).all() and np.isfinite(bound.information[bound.seen]).all()
     behind = pose_bound(RING, np.eye(3), np.array([-5.0, 0.0, 0.0]), CAMERA, sensor_edges=False)
     assert behind.status is DopStatus.BEHIND_CAMERA and np.isnan(behind.covariance).all() and not behind.seen.any()
+
+
+def test_an_led_counts_up_to_the_edge_of_the_last_pixel_on_all_four_sides():
+    """Pixel centres are whole numbers, so that the sensor ends half a pixel beyond the first and the last."""
+    width, height, within = CAMERA.width_px, CAMERA.height_px, 0.4
+    for inside, outside in (
+        ((-within, 500.0), (-1.0 + within, 500.0)),
+        ((width - 1.0 + within, 500.0), (width - within, 500.0)),
+        ((900.0, -within), (900.0, -1.0 + within)),
+        ((900.0, height - 1.0 + within), (900.0, height - within)),
+    ):
+        points = 5.0 * CAMERA.rays_from_pixels(np.array([inside, outside]))
+        assert pose_bound(points, np.eye(3), np.zeros(3), CAMERA).seen.tolist() == [True, False]
 
 
 def test_leds_in_front_and_off_the_sensor_are_not_behind_the_camera_and_leave_what_is_known_beside_them():

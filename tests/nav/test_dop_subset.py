@@ -60,6 +60,7 @@ def test_the_search_leaves_a_choice_that_no_single_exchange_improves(n, k, seed,
     first = best_subset(dop, k, criterion, settings=SubsetSettings(exhaustive_up_to=0, max_nodes=1))
     searched, tried = (best_subset(dop, k, criterion, settings=setting) for setting in (SEARCH, ALL))
     assert first.value > 1.004 * tried.value
+    assert first.status is SubsetStatus.NOT_PROVEN and first.at_least <= tried.value * (1.0 + 1e-9)
     assert searched.members.tolist() == tried.members.tolist() and searched.status is SubsetStatus.OPTIMAL
 
 
