@@ -323,6 +323,12 @@ def test_held_attitude_stays_and_the_position_is_the_minimum_for_it():
     theirs = least_squares(residuals, p, x_scale="jac", xtol=1e-15, ftol=1e-15, gtol=1e-15)
     np.testing.assert_allclose(end.p_CD, theirs.x, atol=1e-8)
     np.testing.assert_allclose(end.information[3:, 3:], theirs.jac.T @ theirs.jac, rtol=1e-4)
+    prior = PosePrior(R_CD=R, p_CD=p + [0.05, -0.02, 0.01], covariance=np.diag([1e-2] * 3 + [1e-4, 1e-6, 1e-6]))
+    sigma = np.sqrt(np.diag(prior.covariance)[3:])
+    both = descend(sight, held, 1.2 * p, LEVENBERG_MARQUARDT, prior, hold_attitude=True)
+    theirs = least_squares(lambda t: np.append(residuals(t), (prior.p_CD - t) / sigma), p, x_scale=sigma, xtol=1e-15)
+    assert both.converged and np.linalg.norm(both.p_CD - end.p_CD) > 1e-3
+    np.testing.assert_allclose(both.p_CD, theirs.x, atol=1e-7)
 
 
 def test_direction_prior_turns_the_axis_there_and_leaves_the_roll():
