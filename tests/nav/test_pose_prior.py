@@ -5,7 +5,9 @@ import pytest
 
 from dockair.calibration import Camera, LedRing
 from dockair.errors import DockairError
+from dockair.nav.pose import descent_kernels
 from dockair.nav.pose.estimate import PoseStatus, solve_pose
+from dockair.nav.pose.levenberg_marquardt import levenberg_marquardt
 from dockair.nav.pose.planar import mirrored
 from dockair.nav.pose.prior import AttitudePrior, DirectionPrior, PosePrior
 from dockair.rotations import Array, exp, log, matrix_from_yaw_pitch_roll
@@ -66,6 +68,21 @@ def test_a_start_on_the_wrong_side_does_not_decide_against_the_prior(kind):
     np.testing.assert_allclose(log(pose.R_CD @ R.T), 0.0, atol=1e-4)
     assert pose.cost < 1e-3
     assert pose.alternative is not None and pose.alternative.cost > pose.cost + 5.0
+
+
+@pytest.mark.parametrize("kind", range(4))
+def test_a_prior_has_its_say_also_from_a_start_with_the_range_far_off(kind):
+    """Ten times as far the first descent does not arrive; the second is as good as one from the truth."""
+    (R, _), p = tilted(12.0, 8.0), np.array([8.0, 1.0, -0.5])
+    pixels = CAMERA.pixels_from_points(RING @ R.T + p)
+    prior = priors(exp(np.deg2rad([0.5, 1.0, -1.0])) @ R, p, np.deg2rad(1.0))[kind]
+    near, far = (solve_pose(pixels, RING, CAMERA, initial=(R, factor * p), prior=prior) for factor in (1.0, 10.0))
+    assert near.measurement is not None
+    first = levenberg_marquardt(near.measurement, R, 10.0 * p, prior=prior)
+    assert first.outcome == descent_kernels.NOT_CONVERGED
+    assert near.status is far.status is PoseStatus.CONVERGED
+    assert far.cost == pytest.approx(near.cost, rel=1e-3) and near.cost > 1.0
+    np.testing.assert_allclose(far.covariance, near.covariance, rtol=1e-3, atol=1e-3 * near.covariance[3, 3])
 
 
 @pytest.mark.parametrize("kind", range(4))
