@@ -226,6 +226,14 @@ def test_rays_are_the_cameras_and_what_was_not_seen_is_left_out(camera):
     np.testing.assert_array_equal(sight.sigma_px, 1.0 + np.array(kept))
 
 
+@pytest.mark.parametrize("axis", range(3))
+def test_leds_that_differ_along_one_axis_alone_stand_apart(axis):
+    points = RING[[0, 0]] + 0.1 * np.outer([0.0, 1.0], np.eye(3)[axis])
+    pixels = np.array([[900.0, 500.0], [901.0, 500.0]])
+    for q, apart in ((points, 2), (points[[0, 0]], 1)):
+        assert seen_lines_of_sight(pixels, q, lens_of(CAMERA), np.ones(2))[2] == apart
+
+
 def test_a_pixel_that_no_ray_makes_counts_as_not_seen():
     """A lens of barrel distortion has an edge: k1 = -0.3 shows nothing beyond 0.7 focal lengths from its centre."""
     camera = replace(CAMERA, distortion=(-0.3, 0.0, 0.0, 0.0, 0.0))
