@@ -9,6 +9,7 @@ from dockair.calibration import Camera, LedRing
 from dockair.errors import DockairError
 from dockair.nav.pose import descent_kernels, model
 from dockair.nav.pose.descent import DescentSettings, PosePrior, descend
+from dockair.nav.pose.difference import pose_difference
 from dockair.nav.pose.glsdc import GLSDC, glsdc
 from dockair.nav.pose.gradient import GRADIENT, gradient
 from dockair.nav.pose.levenberg import LEVENBERG, levenberg
@@ -91,6 +92,18 @@ def test_gradient_creeps_and_says_that_it_has_not_arrived():
     assert end.outcome == descent_kernels.NOT_CONVERGED and end.iterations == GRADIENT.max_iterations
     assert np.isnan(end.covariance).all() and np.isnan(end.information).all()
     assert 5.0 * least < end.cost < first / 5.0
+
+
+def test_a_third_of_a_sigma_from_the_minimum_is_not_arrived_though_steps_are_as_short():
+    """Along the axis that is seen worst 2000 steps go a hundredth of the way: a short step is no proof."""
+    seen = sight(isotropic=True)
+    least = levenberg_marquardt(seen, R_TRUE, P_TRUE)
+    values, vectors = np.linalg.eigh(least.information)
+    x = 0.3 * vectors[:, 0] / np.sqrt(values[0])
+    end = gradient(seen, exp(x[:3]) @ least.R_CD, least.p_CD + x[3:])
+    d = pose_difference(end.R_CD, end.p_CD, least.R_CD, least.p_CD)
+    assert 0.25 < np.sqrt(d @ least.information @ d) < 0.3
+    assert end.outcome == descent_kernels.NOT_CONVERGED and end.iterations == GRADIENT.max_iterations
 
 
 def test_the_tilt_of_a_frontal_start_does_not_run_away():
