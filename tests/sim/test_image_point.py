@@ -70,3 +70,11 @@ def test_the_field_reaches_the_corners_of_a_lens_that_distorts_much() -> None:
     assert np.hypot(rays[0, 1], rays[0, 2]) / rays[0, 0] > 1.31 * bent
     np.testing.assert_allclose(image_points(camera, 20.0 * rays), corners, rtol=0.0, atol=1e-3)
     assert in_field(camera, rays[0])
+
+
+@pytest.mark.parametrize("kind", [list, np.array], ids=["list", "array"])
+def test_a_sheet_of_lists_or_arrays_images_as_one_of_tuples(kind) -> None:  # type: ignore[no-untyped-def]
+    told = Camera(principal_point_px=kind([1020.5, 540.0]), distortion=kind(FOLDING.distortion))
+    camera, p = replace(FOLDING, principal_point_px=(1020.5, 540.0)), np.array([_off_axis(20.0, 30.0)])
+    assert told == camera
+    np.testing.assert_array_equal(image_points(told, p), image_points(camera, p))
