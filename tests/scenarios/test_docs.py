@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from dockair.scenarios.statistics import wilson_interval
+
 ROOT = Path(__file__).parents[2]
 
 
@@ -59,3 +61,22 @@ def test_every_relative_link_leads_somewhere():
         if not (page.parent / target).exists()
     ]
     assert broken == []
+
+
+COUNT_AND_INTERVAL = re.compile(r"(\d+) of (\d+) \(([\d.]+)-([\d.]+) %\)")
+
+
+def test_an_interval_beside_a_count_is_wilsons():
+    pages = [*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md")]
+    found = [(page, m) for page in pages for m in COUNT_AND_INTERVAL.finditer(page.read_text(encoding="utf-8"))]
+    assert len(found) >= 12
+    wrong = []
+    for page, m in found:
+        limits = wilson_interval(int(m[1]), int(m[2]))
+        said = [
+            f"{100.0 * limit:.{len(text.partition('.')[2])}f}"
+            for limit, text in zip(limits, m.groups()[2:], strict=True)
+        ]
+        if said != [m[3], m[4]]:
+            wrong.append(f"{page.relative_to(ROOT)}: {m[0]}, Wilson's {'-'.join(said)} %")
+    assert not wrong
