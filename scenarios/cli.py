@@ -5,6 +5,7 @@ has failed; 2 bad input; 3 the machine lacks something; 130 stopped. With `--jso
 else; progress and errors go to stderr. Modules that are slow to import are imported by the command that needs them.
 """
 
+import errno
 import json
 import sys
 from dataclasses import asdict
@@ -27,6 +28,9 @@ from dockair.scenarios.whole_file import NO_ROOM
 
 if TYPE_CHECKING:
     from dockair.scenarios.schema import Scenario
+
+#: Of an OSError, where a path is to blame that somebody has given.
+_NO_FILE = (errno.EACCES, errno.EPERM, errno.EISDIR, errno.ENOTDIR, errno.ENAMETOOLONG)
 
 app = typer.Typer(
     name="dockair",
@@ -310,11 +314,11 @@ def main() -> None:
         if isinstance(ended.__context__, BrokenPipeError):  # of a pipe within: typer would pass it over with status 1
             raise ended.__context__ from None
         raise
-    except (PermissionError, IsADirectoryError, NotADirectoryError) as error:
-        path = error.filename2 or error.filename or "a file"  # of two, the second is the one that was to be written
-        print(f"dockair: {path}: expected a file that may be used, got {error.strerror}", file=sys.stderr)
-        sys.exit(2)
     except OSError as error:
+        if error.errno in _NO_FILE:
+            path = error.filename2 or error.filename or "a file"  # of two, the second is the one that was to be written
+            print(f"dockair: {path}: expected a file that may be used, got {error.strerror}", file=sys.stderr)
+            sys.exit(2)
         if error.errno not in NO_ROOM:
             raise
         print(f"dockair: {error.filename or 'disk'}: expected room to write, got a full disk", file=sys.stderr)

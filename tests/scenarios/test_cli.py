@@ -147,6 +147,15 @@ def flights(monkeypatch, tmp_path):
         (("fly", "--sed", "1"), "No such option: --sed"),
         (("fyl",), "No such command 'fyl'"),
         (("replay", "nowhere"), "nowhere: expected the folder of a recorded flight, got 'no such folder'"),
+        (("replay", "n" * 300), f"{'n' * 300}: expected a file that may be used, got File name too long"),
+        (
+            ("allan", "n" * 300 + ".csv", "--rate-hz", "100"),
+            f"{'n' * 300}.csv: expected a file that may be used, got File name too long",
+        ),
+        (
+            ("design-ring", "--camera", "n" * 300, "--out", "."),
+            f"{'n' * 300}: expected a file that may be used, got File name too long",
+        ),
         (("replay",), "Missing argument 'OUT'"),
         (("bench", "defualt"), "scenario: expected a scenario of the library"),
         (("fly", "levels"), "scenario: expected a scenario, got 'a plan, for dockair campaign levels'"),
@@ -334,7 +343,7 @@ def test_a_full_disk_is_one_line_and_status_three(command, flights, monkeypatch)
     assert err == "dockair: out/default-0/episode.rrd: expected room to write, got a full disk\n"
 
 
-@pytest.mark.parametrize("number", [errno.EISDIR, errno.ENOTDIR, errno.EACCES])
+@pytest.mark.parametrize("number", [errno.EISDIR, errno.ENOTDIR, errno.EACCES, errno.EPERM, errno.ENAMETOOLONG])
 def test_a_file_that_cannot_be_one_is_one_line_and_status_two(number, command, flights, monkeypatch):
     def fly(*_, **__):
         raise OSError(number, os.strerror(number), "out/.part", None, "out/result.json")
