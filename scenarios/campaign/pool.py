@@ -188,6 +188,7 @@ class Pool:
 def _how_it_died(status: int | None) -> str:
     if status is None or status >= 0:
         return f"process ended with status {status}, {DEATHS_OF_A_JOB} times"
-    name = signal.Signals(-status).name
+    names = {known.value: known.name for known in signal.Signals}
+    name = names.get(-status, f"signal {-status}")  # of the real-time signals only the ends of their range have names
     why = ", as when memory runs out" if -status == signal.SIGKILL else ""
     return f"process ended by {name}{why}, {DEATHS_OF_A_JOB} times"

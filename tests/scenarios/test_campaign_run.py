@@ -1078,6 +1078,13 @@ def test_a_flight_that_breaks_its_process_is_a_row_and_not_the_end(tmp_path, cap
     assert sum("raise ValueError" in entry.get("traceback", "") for entry in journal) == 1
 
 
+@pytest.mark.parametrize("number", [signal.SIGRTMIN, signal.SIGRTMIN + 3, signal.SIGTERM])
+def test_a_process_that_ends_by_any_signal_is_an_error_that_says_which(number):
+    said = pool_module._how_it_died(-number)
+    assert said.endswith(", 2 times")
+    assert str(int(number)) in said or signal.Signals(number).name in said
+
+
 @pytest.mark.slow
 def test_a_process_that_dies_once_is_no_error(fakes, tmp_path):
     assert [row["error"] for row in fly(plan(tmp_path, 1), tmp_path / "out", "mortal_once").rows] == [""]
