@@ -1,6 +1,5 @@
 """What a campaign showed, in figures: a line for each group of flights that may be pooled."""
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -39,7 +38,7 @@ def _group(group: Group, claimed: Accept | None) -> dict[str, Any]:
         "first_attempt": _share(group.first_attempt),
         "success": _share(group.success),
         "refuelled": _share(group.refuelled),
-        "outcomes": dict(Counter(row["outcome"] for row in group.rows).most_common()),
+        "outcomes": dict(group.outcomes),
         "causes": dict(group.causes),
         "causes_of_flights_without_attempt": dict(group.causes_without_attempt),
         "unsafe": len(group.unsafe),
