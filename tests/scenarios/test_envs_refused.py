@@ -74,6 +74,11 @@ WRONG_OPTIONS = [
     ({"seed": -1}, "options.seed: expected an integer from 0 to 9223372036854775807, got -1"),
     ({"seed": 2.9}, "options.seed: expected an integer from 0 to 9223372036854775807, got 2.9"),
     ({"seed": "x"}, "options.seed: expected an integer from 0 to 9223372036854775807, got 'x'"),
+    (
+        {"set": {"accept.outcome": "miss"}},
+        "options.set: accept.outcome: expected a key that decides the flight, got 'miss'",
+    ),
+    ({"set": {"claim": "docks"}}, "options.set: claim: expected a key that decides the flight, got 'docks'"),
     ({"set": {"seed": 5}}, 'options.set: seed: expected the option "seed" in its place, or reset(seed=...), got 5'),
     ({"set": {"navigation.navigator": "nosuch:Class"} | MEASURED}, "navigation.navigator: expected an importable"),
     ({"set": {"flight.duration_s": 0.01}}, "flight.duration_s: expected more than the one control tick that reset"),
