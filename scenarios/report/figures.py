@@ -13,11 +13,10 @@ from matplotlib.patches import Circle
 from matplotlib.ticker import MaxNLocator
 
 from dockair.rotations import Array
-from dockair.scenarios.report.groups import CAPTURE_M, CLOSING_BAND_M_S, Group, Share
+from dockair.scenarios.report.groups import CLOSING_BAND_M_S, GOOD_CONTACT, Group, Share
 from dockair.scenarios.report.headings import Headings, headings_of
 from dockair.scenarios.report.svg import STYLE, as_svg, say
 
-CLOSING_LIMIT_M_S = 2.6
 _FRAME_M = 0.6  # half the side of the picture of where tips went
 _NO_RIM = "no rim: this table does not say its radius"  # of before it was a column
 _CLOSING_AXIS_M_S = 2.8
@@ -81,7 +80,7 @@ def _scatter(ax: Axes, group: Group) -> None:
             clip_on=False,
         )  # fmt: skip
     outside = int((np.abs(_places(group.attempts)) > _FRAME_M).any(axis=1).sum())
-    ax.add_patch(Circle((0.0, 0.0), CAPTURE_M, fill=False, color="tab:green", linestyle="--"))
+    ax.add_patch(Circle((0.0, 0.0), GOOD_CONTACT.radial_offset_m, fill=False, color="tab:green", linestyle="--"))
     for rim_m in group.rims_m:
         ax.add_patch(Circle((0.0, 0.0), rim_m, fill=False, color="black"))
     if not group.rims_m:
@@ -108,7 +107,7 @@ def _places(attempts: Sequence[Mapping[str, Any]]) -> Array:
 def _closing(ax: Axes, group: Group) -> None:
     ax.set_title("closing speed of the contacts")
     ax.axvspan(*CLOSING_BAND_M_S, color="tab:green", alpha=0.12)
-    ax.axvline(CLOSING_LIMIT_M_S, color="tab:red", linestyle="--")
+    ax.axvline(GOOD_CONTACT.closure_speed_m_s, color="tab:red", linestyle="--")
     speeds = group.closing_m_s
     outside = int(((speeds < 0.0) | (speeds > _CLOSING_AXIS_M_S)).sum())
     bins = np.linspace(0.0, _CLOSING_AXIS_M_S, 57)

@@ -23,6 +23,7 @@ from dockair.rotations import Array
 from dockair.scenarios.accept import has_refuelled
 from dockair.scenarios.campaign.points import runs_of
 from dockair.scenarios.campaign.row import SET
+from dockair.scenarios.judgement.attempts import RefereeLimits
 from dockair.scenarios.judgement.no_attempt import cause_and_ending, ending
 from dockair.scenarios.statistics import wilson_interval
 from dockair.scenarios.tables.crew import OUR_NAVIGATOR
@@ -30,7 +31,7 @@ from dockair.scenarios.tables.crew import OUR_NAVIGATOR
 Row = Mapping[str, Any]
 
 CLOSING_BAND_M_S = (1.0, 1.5)  # service practice
-CAPTURE_M = 0.15  # of the tip from the ring's centre, inside which a contact is asked for
+GOOD_CONTACT = RefereeLimits()  # what a contact is asked for
 SENSING_IN_WORDS = {"camera": "camera", "measurements": "measurement model", "truth": "perfect navigation"}
 NOT_SAID = "not said"  # in place of a cause
 _SPELT_OUT = 3  # keys that a plan draws: of more a title says how many
@@ -204,7 +205,7 @@ class Group:
     @property
     def inside_capture_radius(self) -> Share:
         """Contacts within the distance from the basket's centre that a docking is asked for."""
-        return Share(int((self.offsets_m <= CAPTURE_M).sum()), len(self.contacts))
+        return Share(int((self.offsets_m <= GOOD_CONTACT.radial_offset_m).sum()), len(self.contacts))
 
     @property
     def outcomes(self) -> list[tuple[str, int]]:

@@ -19,6 +19,7 @@ from dockair.scenarios.report.acceptance import claim_of, shortfalls_of
 from dockair.scenarios.report.cause_words import meaning_of
 from dockair.scenarios.report.folders import Campaign
 from dockair.scenarios.report.groups import (
+    GOOD_CONTACT,
     Group,
     Row,
     cause_without_attempt,
@@ -31,7 +32,9 @@ from dockair.scenarios.report.headings import headings_of, rms
 from dockair.scenarios.report.pairs import beside_perfect_navigation, side_by_side
 from dockair.scenarios.report.timelines import timelines
 
-LIMITS = "0.15 m, 10 degrees, 2.6 m/s"
+LIMITS = (
+    f"{GOOD_CONTACT.radial_offset_m:g} m, {GOOD_CONTACT.angle_deg:g} degrees, {GOOD_CONTACT.closure_speed_m_s:g} m/s"
+)
 #: What no page may hold: control characters, half of a pair of UTF-16.
 _NO_TEXT = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]")
 
