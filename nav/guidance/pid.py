@@ -4,7 +4,7 @@ With e the place of the drogue less what is wanted, axis by axis,
 
     u* = k_p e + k_i integral of e + k_d e',     du/dt = s (u* - u)                                       (1)
 
-and while closing at c, along, u* = k_i integral of e + c + k_d (e' + c). The e of k_p e is clipped: a drogue that is
+and while closing at c, along, u* = k_i integral of e + c + k_d (e' + c). The term k_p e is clipped: a drogue that is
 far off is gone to, not rushed at. The integral is held while the drogue is not seen, along while closing, and on an
 axis on which the drogue is farther off than a bias explains: what is integrated on the way in would carry the receiver
 past where it is to stand (wind-up).
@@ -77,17 +77,17 @@ class Pid:
         s = self._settings
         error, error_rate = self._place.copy(), self._rate.copy()
         error[1:] += wanted.aim_m
-        limits = np.full(3, s.error_max_m)
+        limits = np.full(3, s.proportional_1_s * s.error_max_m)
         if wanted.distance_m is None:
             error[0], speed = 0.0, wanted.speed_m_s
             error_rate[0] += speed
         else:
             error[0] -= wanted.distance_m
-            limits[0], speed = wanted.speed_m_s / s.proportional_1_s, 0.0
+            limits[0], speed = wanted.speed_m_s, 0.0
         if self._seen:
             near = np.where(np.abs(error) < s.integrated_m, error, 0.0)
             self._integral = self._integral + s.integral_1_s2 * near * self._step_s
-        proportional = s.proportional_1_s * np.clip(error, -limits, limits)
+        proportional = np.clip(s.proportional_1_s * error, -limits, limits)
         target = proportional + self._integral + s.derivative * error_rate
         target[0] += speed
         return np.asarray(s.smoothing_1_s * (target - u))

@@ -1,6 +1,7 @@
 """The baseline on its way in, against a receiver that flies the velocity asked for a response time later."""
 
 from collections import deque
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -70,6 +71,15 @@ def test_an_axis_is_integrated_while_its_own_error_is_small():
     np.testing.assert_allclose(held((4.1 + near_m, 0.1, 0.0), 4.0), 10.0 * k_i * np.array([0.0, 0.1, 0.0]))
     np.testing.assert_array_equal(held((4.1, 0.1, 0.1), None)[0], 0.0)  # closing
     np.testing.assert_array_equal(held((4.1, 0.1, 0.1), 4.0, seen=False), 0.0)
+
+
+def test_a_gain_of_none_leaves_integral_and_rate():
+    s, place_m, rate_m_s = replace(SETTINGS.pid, proportional_1_s=0.0), np.array([4.2, 0.1, -0.1]), np.full(3, 0.2)
+    pid = Pid(s, 0.01)
+    pid.observe(Sight(place_m=place_m, rate_m_s=rate_m_s, push_m_s2=np.zeros((1, 3))), NOT_FELT)
+    asked = pid.rate(np.zeros(3), Wanted(distance_m=4.0, speed_m_s=1.5, aim_m=np.zeros(2)))
+    wanted = s.integral_1_s2 * 0.01 * np.array([0.2, 0.1, -0.1]) + s.derivative * rate_m_s
+    np.testing.assert_allclose(asked, s.smoothing_1_s * wanted, rtol=1e-12)
 
 
 FAR, MOST = 1.5 / SETTINGS.pid.proportional_1_s, SETTINGS.pid.error_max_m
