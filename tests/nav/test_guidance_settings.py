@@ -4,6 +4,7 @@ from dataclasses import fields
 from math import inf, nan
 from typing import get_args
 
+import numpy as np
 import pytest
 
 from dockair.errors import DockairError
@@ -13,7 +14,7 @@ from dockair.nav.guidance.closing import ClosingSettings
 from dockair.nav.guidance.guidance_settings import GuidanceSettings, PidSettings, PredictiveSettings
 from dockair.nav.guidance.path_plan import PlanSettings
 from dockair.nav.guidance.phases import PhaseLimits
-from dockair.nav.guidance.swing_model import HoseMode, SwingSettings
+from dockair.nav.guidance.swing_model import HoseMode, SwingSettings, step_noise
 
 ALL = (
     GuidanceSettings,
@@ -75,6 +76,7 @@ def test_a_vector_has_as_many_numbers_as_its_axes(cls):
         (SwingSettings, {"frequency_ratios": (1.0, -1.0)}, "frequency_ratios"),
         (SwingSettings, {"modes": ()}, "swing.modes: expected one HoseMode or more"),
         (SwingSettings, {"modes": (1.0,)}, "swing.modes: expected one HoseMode or more"),
+        (SwingSettings, {"modes": HoseMode(**MODE)}, "swing.modes: expected one HoseMode or more"),
         (HoseMode, MODE | {"frequency_hz": (0.3, 0.0, 0.3)}, "swing.modes.frequency_hz"),
         (HoseMode, MODE | {"damping": (nan, 0.1, 0.1)}, "swing.modes.damping"),
         (GuidanceSettings, {"limits": None}, "guidance.limits: expected PhaseLimits"),
@@ -83,6 +85,16 @@ def test_a_vector_has_as_many_numbers_as_its_axes(cls):
 def test_what_nothing_can_be_flown_with_is_refused_at_once(cls, values, said):
     with pytest.raises(DockairError, match=said):
         cls(**values)
+
+
+@pytest.mark.parametrize("kind", [list, np.array])
+def test_a_hose_of_lists_or_arrays_is_the_one_of_tuples(kind):
+    """It is found again by them: a list cannot be a key."""
+    mode = HoseMode(**{name: kind(value) for name, value in MODE.items()})
+    swing = SwingSettings(modes=[mode], gust_time_s=kind((3.0,) * 3), frequency_ratios=kind((0.9, 1.0)))
+    same = SwingSettings(modes=(HoseMode(**MODE),), frequency_ratios=(0.9, 1.0))
+    assert swing == same and hash(swing) == hash(same)
+    assert step_noise(swing, 1, 0.01) is step_noise(same, 1, 0.01)
 
 
 @pytest.mark.parametrize(
