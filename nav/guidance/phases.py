@@ -83,10 +83,11 @@ class PhaseLimits:
     breakaway_s: float = 10.0  # assumed: backing off at 1 m/s clears any attempt in this time
 
     def __post_init__(self) -> None:
-        where, told_s = "guidance.limits", self.slack_from_s + self.slack_over_s
+        where = "guidance.limits"
         counted = "slack_from_s", "slack_over_s", "slack_to_s", "slack_before_s", "slack_far_s"  # in ticks
         never = [limit.name for limit in fields(self) if limit.name not in counted]  # any other limit may be infinite
         check_numbers(where, self, zero=("stabilise_s", "hold_s", "push_on_m"), infinite=never)
+        told_s = self.slack_from_s + self.slack_over_s
         if not told_s <= self.slack_to_s:
             expected = f"slack_from_s + slack_over_s = {told_s:g} at least"
             raise DockairError(f"{where}.slack_to_s", expected=expected, got=self.slack_to_s)

@@ -49,6 +49,13 @@ def test_no_number_may_be_unknown(cls):
 
 
 @pytest.mark.parametrize("cls", ALL)
+def test_a_number_in_quotes_is_refused_with_its_name(cls):
+    for name, _ in numbers(cls):
+        with pytest.raises(DockairError, match=f"{name}: expected .*got '1.0'"):
+            cls(**{name: "1.0"})
+
+
+@pytest.mark.parametrize("cls", ALL)
 def test_a_vector_has_as_many_numbers_as_its_axes(cls):
     for name, count in numbers(cls):
         if count != 1:
