@@ -85,7 +85,8 @@ class PhaseLimits:
     def __post_init__(self) -> None:
         where = "guidance.limits"
         counted = "slack_from_s", "slack_over_s", "slack_to_s", "slack_before_s", "slack_far_s"  # in ticks
-        never = [limit.name for limit in fields(self) if limit.name not in counted]  # any other limit may be infinite
+        flown = "take_in_m", "beside_m", "late_radius"  # reckoned with, not only compared
+        never = [limit.name for limit in fields(self) if limit.name not in (*counted, *flown)]  # others may be infinite
         check_numbers(where, self, zero=("stabilise_s", "hold_s", "push_on_m"), infinite=never)
         told_s = self.slack_from_s + self.slack_over_s
         if not told_s <= self.slack_to_s:

@@ -73,6 +73,9 @@ def test_a_vector_has_as_many_numbers_as_its_axes(cls):
         (GuidanceSettings, {"stand_off_m": "4"}, "guidance.stand_off_m"),
         (PhaseLimits, {"patience_s": 0.0}, "guidance.limits.patience_s"),
         (PhaseLimits, {"slack_far_s": inf}, "guidance.limits.slack_far_s"),
+        (PhaseLimits, {"beside_m": inf}, "guidance.limits.beside_m: expected a finite number"),  # an aim of NaN
+        (PhaseLimits, {"take_in_m": inf}, "guidance.limits.take_in_m: expected a finite number"),  # pushed in for ever
+        (PhaseLimits, {"late_radius": inf, "patience_s": inf}, "guidance.limits.late_radius: expected a finite number"),
         (PhaseLimits, {"attempts_max": 2.5}, "guidance.limits.attempts_max: expected an integer"),
         (PhaseLimits, {"slack_from_s": 0.45}, "slack_to_s: expected slack_from_s .* = 0.53 at least, got 0.5"),
         (PhaseLimits, {"late_radius": 0.9}, "late_radius"),
