@@ -87,7 +87,7 @@ class PhaseLimits:
         counted = "slack_from_s", "slack_over_s", "slack_to_s", "slack_before_s", "slack_far_s"  # in ticks
         flown = "take_in_m", "beside_m", "late_radius"  # reckoned with, not only compared
         never = [limit.name for limit in fields(self) if limit.name not in (*counted, *flown)]  # others may be infinite
-        check_numbers(where, self, zero=("stabilise_s", "hold_s", "push_on_m"), infinite=never)
+        check_numbers(where, self, zero=("stabilise_s", "take_in_m", "hold_s", "push_on_m"), infinite=never)
         told_s = self.slack_from_s + self.slack_over_s
         if not told_s <= self.slack_to_s:
             expected = f"slack_from_s + slack_over_s = {told_s:g} at least"

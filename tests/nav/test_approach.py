@@ -988,6 +988,13 @@ def held(plant, settings=SETTINGS, light=None, seconds=120.0):
     return guidance.phase_reason, np.array(take_in), np.array(green)
 
 
+def test_who_is_to_push_nothing_in_holds_from_contact_on_and_goes_by_the_light():
+    settings = dataclasses.replace(SETTINGS, limits=dataclasses.replace(TAKE_IN, take_in_m=0.0))
+    reason, take_in, green = held(Plant(), settings)
+    assert take_in[0] < 0.1 and reason == REFUELLED
+    assert green.sum() / RATE_HZ == pytest.approx(settings.limits.hold_s, abs=2.1 / RATE_HZ)
+
+
 @pytest.mark.parametrize("settings", [SETTINGS, PID])
 def test_a_hold_that_falls_short_of_the_range_pushes_on_until_fuel_has_flowed_for_its_time(settings):
     """Back by 0.2 m/s more than is held: of 1.5 m as reckoned too little is left for any fuel."""

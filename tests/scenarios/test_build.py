@@ -17,6 +17,7 @@ from dockair.scenarios.assembly.mounting_parameters import MountingParameters
 from dockair.scenarios.assembly.parts import build, guidance_settings
 from dockair.scenarios.message_log import numbers
 from dockair.scenarios.schema import load_scenario
+from dockair.scenarios.tables.crew import Guidance
 from dockair.scenarios.truth_navigation import TruthNavigator
 from dockair.sim.hose.coupling import CouplingParameters
 
@@ -82,6 +83,15 @@ def test_guidance_takes_the_scenarios_figures():
     assert settings.closure_speed_m_s == 1.0
     assert settings.limits.hold_s == 7.0
     assert settings.stand_off_m == 4.0
+
+
+def test_guidance_can_be_told_the_least_and_the_most_that_a_scenario_may_say():
+    """What the table of keys takes is not refused later, under another name."""
+    for name, field in Guidance.model_fields.items():
+        for limit in field.metadata:
+            for value in (getattr(limit, side, None) for side in ("ge", "le")):
+                if value is not None:
+                    guidance_settings(load_scenario("default", {f"guidance.{name}": value}))
 
 
 @pytest.mark.parametrize(("hold_s", "slot_s"), [(5.0, 39.0), (10.0, 34.0), (20.0, float("inf"))])
