@@ -10,7 +10,8 @@ drogue on a taut hose, too,
 
 The hose is told to be slack as soon as one of them is too large. Both are of a mean, for the waves turn the drogue to
 and fro, and what is left of that is the sag. Gusts turn it on a taut hose, too; a nose that is down has to be so by
-less than one that is up or aside, where no sag takes it.
+less than one that is up or aside, where no sag takes it. The way along the funnel is part of a': without it the two
+kinds are no farther apart.
 
 Contact is when the tip has come to the coupling: one that is still on its way there along the funnel turns the drogue
 by itself. Nothing is said where the drogue has not been seen on the probe for half of that time.
