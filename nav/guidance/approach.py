@@ -105,7 +105,7 @@ class Guidance:
         self._observe(state, ring, rate)
         self._reckon(state, ring)
         self._count(state, ring, rate, coupling, lateral_m)
-        seen = state.usable and not self._coasts(state)
+        seen = self._is_seen(state)
         self._hose.step(self.phase, coupling, coupling - ring, seen=seen)
         self._trail.step(self.phase, coupling, coupling - ring, seen=seen)
         situation = self._situation(state, ring, rate, coupling, lateral_m)
@@ -124,14 +124,14 @@ class Guidance:
         elif self.phase not in TOUCHING:  # on the probe it stays where it was seen
             self._place = self._reckoning.place_m
         pushed = self._closure.committed  # a drogue in the bow wave says nothing about the path
-        learns = state.usable and self.phase in _FOLLOWING and not pushed
+        learns = self._is_seen(state) and self.phase in _FOLLOWING and not pushed
         self._formation.follow(self._place, rate if state.usable else np.zeros(3), learns=learns)
 
     def _observe(self, state: RelativeState, ring: Array, rate: Array) -> None:
         """Show the drogue to the controller, and its distance from the probe's line to the prediction of the miss."""
         change = np.full(3, np.nan) if self._formation.is_led else self._axes.R_NB @ state.dv_WP_B
         touches = self.phase in TOUCHING or (self.phase in (Phase.APPROACH, *GOING_BACK) and ring[0] <= 0.0)
-        if not state.usable or touches or self._coasts(state):  # a drogue that the probe pushes would lead it astray
+        if touches or not self._is_seen(state):  # a drogue that the probe pushes would lead it astray
             self._controller.observe(None, change)
             self._miss.skip()
             return
@@ -152,9 +152,9 @@ class Guidance:
         if self.phase is Phase.APPROACH:
             self._passed = ring[1:].copy() if ring[0] < self._settings.limits.come_along_m else None
 
-    def _coasts(self, state: RelativeState) -> bool:
-        """Whether the state is a forecast of the fusion's, and nothing measured."""
-        return state.age_s > self._settings.limits.frames_stop_s
+    def _is_seen(self, state: RelativeState) -> bool:
+        """Whether the drogue is known, and not by a forecast of the fusion's alone."""
+        return state.usable and state.age_s <= self._settings.limits.frames_stop_s
 
     def _reckon(self, state: RelativeState, ring: Array) -> None:
         """Keep where the drogue should be: on the probe, a frame that does not show it says nothing."""

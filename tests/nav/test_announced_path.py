@@ -312,3 +312,19 @@ def test_what_is_learnt_of_the_path_begins_with_what_was_commanded_before_it_was
         learnt.append(guidance._formation.path.left_m_s)
     assert command.velocity_m_s[1] > 0.1
     assert learnt[0] > 0.4 * learnt[1] > 0.0
+
+
+def test_a_forecast_of_the_drogue_says_nothing_about_the_path():
+    """One that is older than frames may be is of the fusion's own making: it leads nobody aside."""
+    learnt = []
+    for age_s in (0.02, 0.2):
+        guidance = Guidance(GuidanceSettings(), 100)
+        guidance.announce(_said())
+        for _ in range(100):
+            guidance.step(_astern(0.0))
+        before = guidance._formation.path.left_m_s
+        aside = replace(_astern(0.0), rate_PD_B=np.array([0.0, 0.2, 0.0]), age_s=age_s)
+        guidance.step(aside)
+        guidance.step(aside)
+        learnt.append(guidance._formation.path.left_m_s - before)
+    assert learnt[0] > 0.0 and learnt[1] == 0.0
