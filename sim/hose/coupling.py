@@ -9,9 +9,9 @@ Within capture distance of the coupling point:
 
 Why the release force of 1.9 kN is reached: at rest the hose carries the drogue's drag (1.7 kN) by itself and the
 coupling feels nothing; held within the reel's stroke it is pushed with some 100-200 N, the reel's set-point being below
-the static tension. A receiver that backs off at 1 m/s takes the hose out against its outer stop; there all further
-pull goes through the coupling, over and above the drogue's drag: it lets go 20 ms after the hose has met the buffer,
-the root then carrying 4.1 kN.
+the static tension, less what the receiver's bow wave takes off the drag (some 120 N). A receiver that backs off at
+1 m/s takes the hose out against its outer stop; there all further pull goes through the coupling, over and above the
+drogue's drag: it lets go 20 ms after the hose has met the buffer, the root then carrying 4.1 kN.
 
 Not modelled: the toggles' friction, wear, a coupling that fails to let go.
 Source of the limits: assets/parameters/coupling.toml.
