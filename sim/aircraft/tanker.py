@@ -7,8 +7,9 @@ over a time T by the step s of the fifth order, u = t/T:
     heading' = r,     v = V (cos gamma cos heading, cos gamma sin heading, sin gamma)                     (2)
     tan(bank) = V r cos gamma / (V gamma' + g cos gamma)                                                  (3)
 
-Eq. (3) is coordinated flight: no side force in the tanker's own axes, x along its way through the air. s has no jump
-up to its second derivative, so that the roll acceleration has none either. A turn of bank b rolls in over the time
+Eq. (3) is coordinated flight: no side force in the tanker's own axes, x along its way through the air. Its bank is that
+of the turn, left wing down positive like r; `bank_rad`, right wing down positive, is its negative. s has no jump up to
+its second derivative, so that the roll acceleration has none either. A turn of bank b rolls in over the time
 
     T = 15/8 tan(b) / p          (p: limit of the roll rate),      r = g tan(b) / V                       (4)
 
