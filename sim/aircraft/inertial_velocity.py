@@ -2,7 +2,7 @@
 
     db = -b / T dt + sigma sqrt(2 / T) dw   per axis, stationary from t = 0                  (1)
 
-drawn exactly at knots `KNOT_S` apart and linear in between: T is hundreds of times longer, and so the drift is the same
+drawn exactly at knots `KNOT_S` apart and linear in between: T is a thousand times longer, and so the drift is the same
 function of time whatever the physics step. Without it a plant that regulates its velocity would hand over a noise-free
 velocity relative to the tanker.
 Not modelled: Schuler oscillation, noise of the accelerometers, correlation between the axes.
