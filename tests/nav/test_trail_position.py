@@ -74,9 +74,7 @@ def test_where_it_trailed_long_ago_is_forgotten():
     assert np.abs(held(trail, (0.0, 0.0), 1.0)[-1]).max() < GAIN_M_S * np.radians(0.2)
 
 
-@pytest.mark.parametrize(
-    "said", [{"seen": False}, {"coupling": np.array([0.3, 0.0, 0.0])}, {"coupling": np.array([0.0, 0.3, 0.0])}]
-)
+@pytest.mark.parametrize("said", [{"seen": False}, *({"coupling": 0.3 * one} for one in np.eye(3))])
 def test_a_drogue_that_is_not_seen_on_the_probe_says_nothing(said):
     trail = seen_before()
     assert held(trail, (3.0, 3.0), 1.0).any()
@@ -96,6 +94,33 @@ def test_what_is_seen_on_the_probe_is_not_how_it_trails():
     trail = seen_before()
     first = held(trail, (3.0, 3.0), 1.0)[-1]
     np.testing.assert_array_equal(held(trail, (3.0, 3.0), 60.0)[-1], first)
+
+
+@pytest.mark.parametrize("phase", [Phase.JOIN_UP, Phase.PRE_CONTACT])
+def test_how_it_trailed_is_seen_from_farther_astern_too(phase):
+    trail = new()
+    held(trail, (0.0, 0.0), 20.0, phase=phase, coupling=np.array([4.0, 0.0, 0.0]))
+    np.testing.assert_allclose(held(trail, (3.0, -2.0), 1.0)[-1], GAIN_M_S * np.radians((3.0, -2.0)), atol=1e-6)
+
+
+def test_what_is_only_believed_before_contact_is_not_how_it_trailed():
+    trail = seen_before()
+    held(trail, (20.0, 20.0), 5.0, phase=Phase.APPROACH, coupling=np.array([1.0, 0.0, 0.0]), seen=False)
+    np.testing.assert_allclose(held(trail, (0.0, 0.0), 1.0)[-1], 0.0, atol=1e-12)
+
+
+def test_at_the_next_contact_too_it_stays_where_it_is_while_the_hose_is_looked_at():
+    trail, looked_at = seen_before(), round(LIMITS.slack_to_s / STEP_S)
+    held(trail, (3.0, 3.0), 5.0)
+    held(trail, (0.0, 0.0), 10.0, phase=Phase.APPROACH, coupling=np.array([1.0, 0.0, 0.0]))
+    asked = held(trail, (3.0, 3.0), 2.0, phase=Phase.CONTACT)
+    assert (asked[: looked_at - 1] == 0.0).all() and (asked[looked_at + 1 :] > 0.0).all()
+
+
+def test_the_hose_is_looked_at_no_longer_for_a_drogue_that_is_out_of_view_meanwhile():
+    trail = seen_before()
+    held(trail, (3.0, 3.0), LIMITS.slack_to_s, phase=Phase.CONTACT, seen=False)
+    assert (held(trail, (3.0, 3.0), 1.0, phase=Phase.CONTACT)[1:] > 0.0).all()
 
 
 @pytest.mark.parametrize("deg_m", [4.0, 9.0])
