@@ -92,7 +92,8 @@ def test_what_is_reckoned_below_the_field_is_left_there():
 @pytest.mark.parametrize("case", ["frames show it or do not come", "no field", "beside"])
 def test_frames_say_nothing_where(case):
     field = None if case == "no field" else FIELD
-    place = np.array([0.9 if case == "beside" else 5.0, 0.0, -0.5])
+    place = np.array([0.9 if case == "beside" else 5.0, 0.0, -0.1])
+    assert FIELD.out_m(place, FIELD.nearest_edge(place)).any()
     reckoning = DeadReckoning(SETTINGS, STEP_S, field)
     reckoning.see(place, place, STILL, bearable=True)
     for _ in range(300):
@@ -173,3 +174,64 @@ def test_in_a_tick_place_and_drift_go_their_shares_of_the_way_out_of_the_field()
     reckoning.miss(u, LEVEL, not_shown=True)
     np.testing.assert_allclose(reckoning.place_m - place, STEP_S * (drift - u + 2.0 * out_m / T), atol=1e-12)
     np.testing.assert_allclose(reckoning.drift_m_s - drift, STEP_S * out_m / T**2, atol=1e-12)
+
+
+def test_looked_for_in_vain_beyond_an_edge_it_is_looked_for_beyond_no_other_until_it_is_seen_again():
+    """A camera that stays blind: back where it went out of view it is left there."""
+    places, _ = led_by_a_blind_camera(True, 3000)
+    back = int(np.argmax(np.linalg.norm(np.diff(places, axis=0), axis=1) > 1.0)) + 1
+    assert 100 < back < 1500
+    np.testing.assert_allclose(places[back:], np.tile(places[0], (3001 - back, 1)), atol=1e-9)
+
+
+def test_what_it_may_have_drifted_by_is_counted_from_when_it_was_seen_last():
+    """Lost a second time, after a long while out of view, it is looked for no farther than the first time."""
+    reckoning, place, farthest_m = DeadReckoning(SETTINGS, STEP_S, FIELD), np.array([5.0, 0.0, -0.5]), []
+    for _ in range(2):
+        reckoning.see(place, place, STILL, bearable=True)
+        own, moved_m = np.zeros(3), []
+        for _ in range(1500):
+            u = reckoning.drift_m_s + reckoning.astern_m_s()
+            reckoning.miss(u, LEVEL, not_shown=True)
+            own = own + u * STEP_S
+            moved_m.append(np.linalg.norm(reckoning.place_m + own - place))
+        farthest_m.append(max(moved_m))
+    assert farthest_m[0] > SETTINGS.unseen_swing_m
+    assert farthest_m[1] == pytest.approx(farthest_m[0])
+
+
+@pytest.mark.parametrize("bank_rad", [-0.4, 0.4])
+def test_the_edge_that_it_goes_out_by_is_the_one_that_the_camera_sees_it_nearest_to(bank_rad):
+    """Low and outside of a turn: nearest to the lower edge of a level field, and to the side of a banked one."""
+    R_NB, reckoning = exp(np.array([bank_rad, 0.0, 0.0])), DeadReckoning(SETTINGS, STEP_S, FIELD)
+    place = np.array([5.0, -1.8 * np.sign(bank_rad), -0.6])
+    reckoning.see(place, place, STILL, bearable=True)
+    for _ in range(100):
+        reckoning.miss(STILL, R_NB, not_shown=True)
+    _, left_m, up_m = R_NB.T @ (reckoning.place_m - place)
+    assert abs(left_m) > 0.1 > 10.0 * abs(up_m)
+
+
+def test_once_gusts_can_be_borne_again_more_of_what_is_learnt_is_believed():
+    reckoning = reckoned((4.0, 0.0, 0.0), (0.0, 3.0, 0.0), STILL, 1, bearable=False)
+    place = np.array([4.0, 0.0, 0.0])
+    reckoning.see(place, place, np.array([0.0, 3.0, 0.0]), bearable=True)
+    reckoning.miss(STILL, LEVEL, not_shown=True)
+    np.testing.assert_allclose(reckoning.drift_m_s, (0.0, SETTINGS.unseen_drift_m_s, 0.0))
+
+
+@pytest.mark.parametrize("left_m", [-9.0, 9.0])
+def test_to_either_side_it_goes_astern_no_faster_than_it_backs_off(left_m):
+    far = reckoned((4.0, left_m, left_m), STILL, STILL, 1)
+    np.testing.assert_allclose(far.astern_m_s()[1:], np.sign(left_m) * SETTINGS.back_off_speed_m_s)
+
+
+def test_once_an_edge_is_given_up_no_more_is_believed_of_the_drift_than_before():
+    """Half a swing had taught 3 m/s to the left."""
+    reckoning, place, drifts = DeadReckoning(SETTINGS, STEP_S, FIELD), np.array([5.0, 0.0, -0.5]), []
+    reckoning.see(place, place, np.array([0.0, 3.0, 0.0]), bearable=True)
+    for _ in range(3000):
+        reckoning.miss(reckoning.drift_m_s + reckoning.astern_m_s(), LEVEL, not_shown=True)
+        drifts.append(reckoning.drift_m_s)
+    assert np.abs(drifts).max() == pytest.approx(SETTINGS.unseen_drift_m_s)
+    np.testing.assert_allclose(drifts[-1], (0.0, SETTINGS.unseen_drift_m_s, 0.0))
