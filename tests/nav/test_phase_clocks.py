@@ -151,3 +151,30 @@ def test_green_counts_in_the_hold_alone_and_stands_still_under_another_light():
     assert (clocks.green_s, clocks.no_fuel_s, clocks.in_phase_s) == (1.5, 0.0, 2.5)
     after(clocks, amber).begin(Phase.HOLD)
     assert clocks.green_s == clocks.no_fuel_s == 0.0
+
+
+def test_a_gap_in_the_frames_that_leaves_the_claim_of_contact_leaves_steadiness():
+    still = (Phase.PRE_CONTACT, SEEN, {"steady": True})
+    gap = (still[0], dataclasses.replace(SEEN, frame_age_s=1.0), {"steady": True})
+    clocks = after(PhaseClocks(STEP_S, LIMITS), still, still, gap)
+    assert clocks.frames_stopped and clocks.steady_s == 1.5
+
+
+def test_a_drogue_out_of_view_is_lost_though_nobody_says_how_old_its_newest_frame_is():
+    clocks = after(PhaseClocks(STEP_S, LIMITS), (Phase.APPROACH, SEEN, {}))
+    untold = dataclasses.replace(UNSEEN, age_s=0.0)
+    assert after(clocks, *[(Phase.APPROACH, untold, {})] * 3).track_lost_s == 1.5
+
+
+def test_under_any_light_but_green_no_fuel_flows():
+    lights = (Light.AMBER, Light.FLASHING_AMBER, Light.RED)
+    clocks = after(PhaseClocks(STEP_S, LIMITS), *[(Phase.HOLD, SEEN, {"light": light}) for light in lights])
+    assert (clocks.no_fuel_s, clocks.green_s) == (1.5, 0.0)
+
+
+@pytest.mark.parametrize("phase", [Phase.CONTACT, Phase.DISCONNECT, Phase.BACK_OFF, Phase.PRE_CONTACT])
+def test_only_an_approach_counts_how_long_the_tip_is_past_the_ring_s_plane(phase):
+    """With the drogue on the probe it is there all the time; and from there it has not come out of the basket."""
+    clocks = after(PhaseClocks(STEP_S, LIMITS), (Phase.APPROACH, SEEN, {"ring_ahead_m": -0.1}))
+    after(clocks, *[(phase, SEEN, {"ring_ahead_m": ring_ahead_m}) for ring_ahead_m in (-0.3, 0.3)])
+    assert clocks.inside_s == 0.5 and not clocks.came_out
