@@ -144,3 +144,71 @@ def test_it_eases_off_one_response_time_short_of_the_coupling_and_only_once_comm
     assert closure.speed_m_s == FULL_M_S  # by which contact is timed
     closure.begin()
     assert not closure.eases_off
+
+
+def running_up(full_m_s=FULL_M_S):
+    """Run up as fast as it does, 4 m from the ring, in calm air."""
+    closure = Closure(SETTINGS, full_m_s, RAMP_M_S2, STEP_S)
+    told(closure, 4.0, ticks=200)
+    return closure
+
+
+def told(closure, distance_m, *, ticks=1, known=True, miss=0.5, unrest=0.5):
+    for _ in range(ticks):
+        at = distance_m, distance_m + DEPTH_M, closure.speed_m_s
+        closure.step(*at, known=known, miss=miss, unrest=unrest)
+
+
+def test_who_is_called_back_is_not_committed_by_a_good_moment_while_it_still_closes():
+    """What it has lost of its speed it would not gain again on the rest of the way."""
+    closure = running_up()
+    told(closure, 1.9, miss=9.0)
+    told(closure, 1.4)
+    assert closure.speed_m_s > 0.0 and not closure.committed
+    told(closure, 1.4, ticks=200)
+    assert closure.speed_m_s == -SETTINGS.retreat_m_s and not closure.committed
+
+
+@pytest.mark.parametrize("distance_m", [0.5, 2.5])
+def test_who_stands_too_near_to_gain_its_speed_falls_back_first_however_good_the_moment(distance_m):
+    closure = Closure(SETTINGS, FULL_M_S, RAMP_M_S2, STEP_S)
+    told(closure, distance_m, ticks=200)
+    assert closure.speed_m_s == -SETTINGS.retreat_m_s and not closure.committed
+    told(closure, SETTINGS.wait_at_m, ticks=500)
+    assert closure.speed_m_s == SETTINGS.run_up_m_s
+
+
+def test_it_neither_runs_up_nor_is_committed_on_what_contact_may_not_be_flown_on():
+    standing = Closure(SETTINGS, FULL_M_S, RAMP_M_S2, STEP_S)
+    told(standing, 4.0, ticks=200, known=False)
+    assert standing.speed_m_s == 0.0
+    closing = running_up()
+    told(closing, 1.5, known=False)
+    assert not closing.committed
+
+
+def test_it_runs_up_no_faster_than_it_is_to_close():
+    assert running_up(full_m_s=0.5).speed_m_s == 0.5
+
+
+def test_it_waits_for_as_long_as_it_has_not_closed_since_it_last_did():
+    closure = Closure(SETTINGS, FULL_M_S, RAMP_M_S2, STEP_S)
+    told(closure, 4.0, ticks=100, miss=9.0)
+    assert closure.waiting_s == pytest.approx(1.0)
+    told(closure, 4.0)
+    assert closure.speed_m_s > 0.0 and closure.waiting_s == 0.0
+    told(closure, 4.0, ticks=10, miss=9.0)
+    assert closure.speed_m_s == 0.0 and closure.waiting_s == pytest.approx(0.1, abs=1.1 * STEP_S)
+    told(closure, 2.5, ticks=100, miss=9.0)  # falling back is no closing either
+    assert closure.speed_m_s < 0.0 and closure.waiting_s == pytest.approx(1.1, abs=1.1 * STEP_S)
+
+
+def test_every_approach_begins_from_a_stand():
+    closure = running_up()
+    told(closure, 1.5)
+    assert closure.committed
+    closure.begin()
+    assert (closure.speed_m_s, closure.waiting_s, closure.committed) == (0.0, 0.0, False)
+    told(closure, 4.0, ticks=100, miss=9.0)
+    closure.begin()
+    assert closure.waiting_s == 0.0
