@@ -1,5 +1,7 @@
 """The way pushed in and the speed with which to go on, by the pod's light."""
 
+from dataclasses import replace
+
 import pytest
 
 from dockair.messages import Light
@@ -69,3 +71,31 @@ def test_the_next_contact_begins_anew():
     take_in.begin(0.0)
     assert take_in.pushed_in_m == 0.0
     assert flown(take_in, Phase.HOLD, Light.AMBER, 60.0) == pytest.approx(LIMITS.take_in_m + LIMITS.push_on_m, abs=0.01)
+
+
+def test_how_far_the_light_was_green_is_forgotten_by_the_next_contact():
+    take_in = begun()
+    take_in.step(7.0 / STEP_S, Light.GREEN)
+    take_in.begin(0.0)
+    assert flown(take_in, Phase.HOLD, Light.AMBER, 60.0) == pytest.approx(LIMITS.take_in_m + LIMITS.push_on_m, abs=0.01)
+
+
+def test_beyond_the_inner_limit_no_fuel_has_flown_and_no_way_is_gained_to_push_on():
+    take_in = begun()
+    take_in.step(7.0 / STEP_S, Light.FLASHING_AMBER)
+    assert take_in.speed_m_s(Phase.HOLD, Light.AMBER) == 0.0
+
+
+def test_it_is_pushed_in_no_faster_than_it_was_closed_upon_however_far():
+    limits = replace(LIMITS, take_in_m=2.0 * SETTINGS.closure_speed_m_s / SETTINGS.take_in_gain_1_s)
+    take_in = TakeIn(replace(SETTINGS, limits=limits), STEP_S)
+    take_in.begin(0.0)
+    flown(take_in, Phase.CONTACT, Light.AMBER, LIMITS.slack_to_s)
+    assert take_in.speed_m_s(Phase.CONTACT, Light.AMBER) == SETTINGS.closure_speed_m_s
+
+
+def test_nothing_is_pushed_into_a_hose_that_is_dead():
+    take_in = begun()
+    take_in.step(0.0, Light.RED)
+    assert take_in.speed_m_s(Phase.HOLD, Light.AMBER) > 0.0
+    assert take_in.speed_m_s(Phase.HOLD, Light.RED) == 0.0
