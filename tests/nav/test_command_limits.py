@@ -71,3 +71,17 @@ def test_however_coarse_the_ticks_the_limit_of_the_velocity_is_come_to_and_not_p
     u, _ = commanded(np.tile(100.0 * np.eye(3)[axis], (400, 1)), 0.05, np.zeros(400, bool))
     assert u[-1, axis] == pytest.approx(FASTEST_M_S, abs=2e-3)
     assert u.max() < FASTEST_M_S + 2e-3
+
+
+@pytest.mark.parametrize("patient", [False, True])
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_who_is_beyond_the_limit_of_the_velocity_may_brake_as_hard_as_inside_it(axis, patient):
+    """As where the velocity has turned quickly."""
+    along, braking = np.eye(3)[axis], []
+    for speed_m_s in (0.5 * FASTEST_M_S, 1.03 * FASTEST_M_S):
+        limits, u, u_dot = CommandLimits(SETTINGS, 0.01), speed_m_s * along, np.zeros(3)
+        for _ in range(20):
+            u, u_dot = limits.step(u, u_dot, -5.0 * along, patient=patient)
+        braking.append(u_dot)
+    assert braking[0][axis] < -0.3
+    np.testing.assert_allclose(braking[1], braking[0], atol=1e-4)
