@@ -80,6 +80,15 @@ def test_changes_come_in_the_order_in_which_they_begin_whatever_was_said_first()
     assert flown[1500, 0] == pytest.approx(TURN) and flown[-1, 0] == pytest.approx(0.0)
 
 
+def test_a_change_that_begins_while_the_last_one_comes_in_goes_on_from_where_that_has_come_to():
+    path = AnnouncedPath()
+    path.announce(_said(starts_s=0.0, entry_s=6.0))
+    path.announce(_said(starts_s=3.0, entry_s=6.0, turn=0.0, climb=-0.05))
+    turn = _flown(path, 10.0)[:, 0]
+    assert turn[298] == pytest.approx(0.5 * TURN, rel=0.02) and turn[-1] == pytest.approx(0.0, abs=1e-12)
+    assert np.abs(np.diff(turn)).max() < 1.1 * 1.875 * TURN * 0.01 / 6.0  # the step's steepest
+
+
 def test_bank_of_a_turn_is_that_of_coordinated_flight():
     path = AnnouncedPath()
     path.announce(_said(starts_s=0.0, entry_s=0.1, turn=GRAVITY * np.tan(np.radians(25.0)) / AIRSPEED))
@@ -130,6 +139,29 @@ def test_a_descent_that_is_announced_in_a_turn_leaves_what_was_learnt_of_the_tur
     assert before == pytest.approx(0.02, rel=0.1)
     assert learnt[TURN][0] == learnt[TURN][1]
     assert learnt[1.01 * TURN][0] == 0.0
+
+
+def test_another_turn_leaves_what_was_learnt_of_the_velocity_as_well_known_as_it_was():
+    """A drogue that swings by 1 m/s for a tick then moves what is learnt as little as before, not as at the first."""
+    moved = {}
+    for when, seconds, turns in (("at first", 0.0, False), ("later", 30.0, False), ("later, anew", 30.0, True)):
+        path = AnnouncedPath()
+        path.announce(_said(starts_s=60.0))
+        if turns:
+            path.announce(_said(starts_s=30.0, entry_s=0.0, turn=0.01))
+        for _ in range(round(seconds / 0.01) + 2):
+            path.step(0.01, 0.0)
+        path.step(0.01, 1.0)
+        moved[when] = path.left_m_s
+    assert moved["later"] < 0.5 * moved["at first"]
+    assert moved["later, anew"] == pytest.approx(moved["later"], rel=0.05)
+
+
+def test_nothing_is_learnt_of_a_path_before_one_is_announced():
+    path = AnnouncedPath()
+    for _ in range(100):
+        path.step(0.01, 0.5)
+    assert path.left_m_s == path.flown_rad_s == 0.0
 
 
 def test_without_sight_of_the_drogue_the_path_goes_on_as_learnt():
