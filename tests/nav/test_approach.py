@@ -11,7 +11,7 @@ from dockair.messages import Light, PodSignal, ReceiverCommand
 from dockair.nav.guidance.approach import Guidance, GuidanceSettings, PhaseLimits, RelativeState
 from dockair.nav.guidance.field_of_view import FieldOfView
 from dockair.nav.guidance.path_plan import PlanSettings
-from dockair.nav.guidance.phases import REFUELLED, Phase
+from dockair.nav.guidance.phases import RED_LIGHT, REFUELLED, Phase
 
 RATE_HZ = 50
 DEPTH_M = 0.3  # ring plane to coupling
@@ -1042,3 +1042,141 @@ def test_a_hold_under_a_green_light_is_no_other_than_one_of_which_the_light_says
         ticks = sum(phase is Phase.HOLD for phase, _ in flown)
         assert ticks / RATE_HZ == pytest.approx(SETTINGS.limits.hold_s, abs=1.1 / RATE_HZ)
     assert commands[0].tobytes() == commands[1].tobytes()
+
+
+def begin(guidance):
+    """Stand 4 m astern until an approach is begun; the ticks that it takes."""
+    guidance.signal(PodSignal(time_stamp_s=0.0, light=Light.AMBER))
+    for ticks in range(1, 20 * RATE_HZ):
+        guidance.step(state([4.0, 0.0, 0.0]))
+        if guidance.phase is Phase.APPROACH:
+            return ticks
+    raise AssertionError("no approach")
+
+
+def call_back(guidance, now):
+    """By a red light."""
+    guidance.signal(PodSignal(time_stamp_s=0.0, light=Light.RED))
+    guidance.step(now)
+    assert (guidance.phase, guidance.phase_reason) == (Phase.BACK_OFF, RED_LIGHT)
+
+
+AT_ONCE = dataclasses.replace(SETTINGS, limits=dataclasses.replace(TAKE_IN, stabilise_s=0.0))
+
+
+def test_after_an_attempt_that_was_called_back_a_whole_swing_is_followed_anew_before_the_next():
+    guidance = Guidance(AT_ONCE, RATE_HZ)
+    for _ in range(2):
+        assert begin(guidance) / RATE_HZ == pytest.approx(SETTINGS.closing.swing_s, abs=3.1 / RATE_HZ)
+        call_back(guidance, state([4.0, 0.0, 0.0]))
+
+
+@pytest.mark.parametrize(("swings", "anew"), [(0.8, False), (1.1, True)])
+def test_how_well_the_drogue_is_followed_is_known_until_it_has_been_out_of_view_for_a_whole_swing(swings, anew):
+    swing_s, guidance = SETTINGS.closing.swing_s, Guidance(AT_ONCE, RATE_HZ)
+    for _ in range(round(swing_s * RATE_HZ) - 5):
+        guidance.step(state([4.0, 0.0, 0.0]))
+    for _ in range(round(swings * swing_s * RATE_HZ)):
+        guidance.step(state([4.0, 0.0, 0.0], usable=False, contact_usable=False))
+    assert guidance.phase is Phase.PRE_CONTACT
+    assert begin(guidance) / RATE_HZ == pytest.approx(swing_s if anew else 0.1, abs=3.1 / RATE_HZ)
+
+
+def on_its_way_to(ahead_m):
+    """Plant, guidance and its newest state, so far from the ring in the first approach; from 1.5 m on committed."""
+    plant, guidance = Plant(), Guidance(SETTINGS, RATE_HZ)
+    now = plant.step(ReceiverCommand())
+    while now.p_PD_B[0] > ahead_m:
+        now = plant.step(guidance.step(now))
+    return plant, guidance, now
+
+
+@pytest.mark.parametrize(
+    ("why", "from_m", "follows"), [(RED_LIGHT, 1.2, True), (RED_LIGHT, 2.0, False), ("closing too fast", 1.2, False)]
+)
+def test_only_who_was_committed_and_called_back_by_the_light_follows_a_drogue_near_by(why, from_m, follows):
+    """It goes aside 0.7 m ahead of a receiver that still closes; one that may come beside it stays clear of it."""
+    (_, guidance, _), committed = on_its_way_to(from_m), from_m < 1.5
+    if why == RED_LIGHT:
+        guidance.signal(PodSignal(time_stamp_s=0.0, light=Light.RED))
+    else:
+        guidance.step(state([1.1, 0.0, 0.0], [-2.7, 0.0, 0.0]))
+    for t in np.arange(RATE_HZ // 2) / RATE_HZ:
+        place, rate = [0.7, 0.3 * np.sin(np.pi * t), 0.0], [-0.5, 0.3 * np.pi * np.cos(np.pi * t), 0.0]
+        command = guidance.step(state(place, rate, contact_usable=committed))
+    assert guidance.phase in (Phase.BACK_OFF, Phase.BREAKAWAY) and guidance.phase_reason == why
+    assert command.velocity_m_s[0] > 0.5
+    assert command.velocity_m_s[1] > 0.3 if follows else abs(command.velocity_m_s[1]) < 0.05
+
+
+def missed(guidance):
+    """Come to the plane of a ring that is 0.1 m to the left, and then beside the basket."""
+    guidance.step(state([0.1, 0.1, 0.0], [-1.2, 0.0, 0.0]))
+    guidance.step(state([-0.1, 0.3, 0.0], [-1.2, 0.0, 0.0]))
+    assert (guidance.phase, guidance.phase_reason) == (Phase.BREAKAWAY, "beside the basket")
+
+
+def test_what_a_miss_has_taught_is_aimed_at_in_the_next_approach_and_not_astern():
+    plant, guidance, now = on_its_way_to(0.5)
+    missed(guidance)
+    left_m = {}
+    while plant.t < 60.0 and (guidance.phase is not Phase.APPROACH or now.p_PD_B[0] > 2.5):
+        now = plant.step(guidance.step(now))
+        left_m[guidance.phase] = now.p_PD_B[1]
+    assert abs(left_m[Phase.PRE_CONTACT]) < 0.005
+    assert left_m[Phase.APPROACH] == pytest.approx(-guidance._aim[0], abs=0.005) and guidance._aim[0] > 0.02
+
+
+def test_who_is_called_back_before_the_ring_s_plane_learns_nothing_from_where_the_drogue_was():
+    _, guidance, _ = on_its_way_to(0.5)
+    call_back(guidance, state([0.5, 0.1, 0.0], [-1.2, 0.0, 0.0]))
+    np.testing.assert_array_equal(guidance._aim, np.zeros(2))
+
+
+def test_a_miss_teaches_once_though_the_next_attempt_does_not_see_the_ring_s_plane():
+    """All that this one is told is forecast from old frames; a red light calls it back on the last metres."""
+    _, guidance, _ = on_its_way_to(0.5)
+    missed(guidance)
+    learnt = guidance._aim
+    assert learnt.any()
+    begin(guidance)
+    for ahead_m in (*np.full(2 * RATE_HZ, 4.0), 1.5):
+        guidance.step(state([ahead_m, 0.0, 0.0], age_s=0.2, frame_age_s=0.2))
+    assert guidance._closure.committed
+    call_back(guidance, state([1.5, 0.0, 0.0], age_s=0.2, frame_age_s=0.2))
+    np.testing.assert_array_equal(guidance._aim, learnt)
+
+
+@pytest.mark.parametrize(
+    ("ahead_m", "changes"), [(4.0, {"usable": False}), (4.0, {"sigma_lateral_m": 0.1}), (4.6, {}), (3.4, {})]
+)
+def test_an_approach_is_begun_from_the_stand_off_point_on_a_place_that_is_known_now(ahead_m, changes):
+    """0.4 s after it would have been begun; a moment of not knowing stops steadiness, and does not end it."""
+    limits = dataclasses.replace(TAKE_IN, stabilise_s=SETTINGS.closing.swing_s + 0.5)
+    settings = dataclasses.replace(SETTINGS, limits=limits)
+    guidance, needs = Guidance(settings, RATE_HZ), begin(Guidance(settings, RATE_HZ))
+    for tick in range(needs + 20):
+        known = tick < needs - 2
+        guidance.step(state([4.0 if known else ahead_m, 0.0, 0.0], **({} if known else changes)))
+    assert guidance.phase is Phase.PRE_CONTACT
+
+
+def test_it_goes_on_down_from_a_hose_that_whips_though_the_drogue_is_seen_ahead_again():
+    guidance = on_the_probe(Phase.HOLD)
+    guidance.step(state([-DEPTH_M, 0.4, 0.3]))
+    for _ in range(round(0.8 * SETTINGS.evade_s * RATE_HZ)):
+        command = guidance.step(state([1.5, 0.4, 0.3]))
+    assert guidance.phase is Phase.BREAKAWAY
+    assert command.velocity_m_s[2] < -0.8 * SETTINGS.evade_speed_m_s
+
+
+def test_who_stands_again_after_a_red_light_does_not_follow_a_drogue_near_by():
+    _, guidance, _ = on_its_way_to(1.2)
+    call_back(guidance, state([1.2, 0.0, 0.0], [-1.0, 0.0, 0.0]))
+    for ahead_m in np.append(np.linspace(1.2, 0.7, RATE_HZ), np.full(RATE_HZ, 0.7)):
+        command = guidance.step(state([ahead_m, 0.0, 0.0]))
+    assert command.velocity_m_s[0] < -0.2
+    for t in np.arange(RATE_HZ // 2) / RATE_HZ:
+        place, rate = [0.7, 0.3 * np.sin(np.pi * t), 0.0], [0.0, 0.3 * np.pi * np.cos(np.pi * t), 0.0]
+        command = guidance.step(state(place, rate))
+    assert guidance.phase is Phase.BACK_OFF and abs(command.velocity_m_s[1]) < 0.05
