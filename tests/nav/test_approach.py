@@ -1180,3 +1180,43 @@ def test_who_stands_again_after_a_red_light_does_not_follow_a_drogue_near_by():
         place, rate = [0.7, 0.3 * np.sin(np.pi * t), 0.0], [0.0, 0.3 * np.pi * np.cos(np.pi * t), 0.0]
         command = guidance.step(state(place, rate))
     assert guidance.phase is Phase.BACK_OFF and abs(command.velocity_m_s[1]) < 0.05
+
+
+@pytest.mark.parametrize("touched_before", [False, True])
+def test_who_comes_past_beside_the_basket_on_the_way_back_before_a_red_light_goes_straight_back(touched_before):
+    """It has not been on the probe in this attempt: it has not come off it either."""
+    guidance = on_the_probe(Phase.CONTACT if touched_before else Phase.APPROACH)
+    if touched_before:
+        guidance.step(state([0.2, 0.1, 0.0]))
+        assert guidance.phase is Phase.BACK_OFF
+    for _ in range(RATE_HZ):
+        guidance.phase = Phase.PRE_CONTACT
+        guidance.step(state([4.0, 0.0, 0.0]))
+    guidance.phase = Phase.BACK_OFF
+    guidance.signal(PodSignal(time_stamp_s=0.0, light=Light.RED))
+    assert min(guidance.step(state([-0.1, 0.4, 0.0])).velocity_m_s[2] for _ in range(RATE_HZ)) > -0.5
+
+
+@pytest.mark.parametrize(
+    ("seen_ahead", "unseen_s", "goes_down"), [(False, 0.3, True), (False, 0.06, False), (True, 0.3, False)]
+)
+def test_from_a_drogue_that_slipped_off_it_goes_down_if_it_is_out_of_view_before_it_is_seen_ahead(
+    seen_ahead, unseen_s, goes_down
+):
+    """Not for less than a frame may be late."""
+    guidance, at = on_the_probe(Phase.HOLD), [-0.05, 0.0, 0.0]
+    guidance.step(state(at, frame_age_s=0.0))
+    assert guidance.phase is Phase.BREAKAWAY
+    if seen_ahead:
+        at = [0.1, 0.0, 0.0]
+        guidance.step(state(at, frame_age_s=0.0))
+    up = [
+        guidance.step(state(at, usable=tick >= unseen_s * RATE_HZ, frame_age_s=0.0)).velocity_m_s[2]
+        for tick in range(2 * RATE_HZ)
+    ]
+    assert (min(up) < -0.9 * SETTINGS.evade_speed_m_s) == goes_down
+    assert goes_down or min(up) > -0.5
+
+
+def test_from_a_drogue_that_goes_out_of_view_well_ahead_on_the_way_back_it_goes_straight_back():
+    assert gone_down([0.5, 0.0, 0.0], usable=False, age_s=1.0, frame_age_s=0.0) > -0.5
