@@ -122,7 +122,7 @@ class Situation:
     lateral_m: float  #: ring centre off the probe's line
     entered_m: float  #: the same where the tip came past the ring's plane, 0 before it
     frame_age_s: float  #: since the newest frame, whatever it showed
-    frames_stopped: bool  #: for `frames_stop_s` or longer, and none that has come since was used
+    frames_stopped: bool  #: for longer than `frames_stop_s`, and none that has come since was used
     closing_m_s: float  #: rate at which `ring_ahead_m` shrinks
     committed: bool  #: too near to be called back, but by a red light
     pushed_in_m: float  #: way flown toward the tanker since the coupling was reached
