@@ -6,11 +6,22 @@ from hashlib import blake2b
 from pathlib import Path
 from typing import Any
 
+from dockair.errors import DockairError
 from dockair.scenarios.scenario_file import ScenarioFile
 from dockair.scenarios.schema import Scenario
 
 SHEETS = ("camera", "ring")  #: of the keys of [hardware]: paths
 SAYS_NOTHING_OF_THE_FLIGHT = {"seed", "claim", "accept"}  #: of a scenario's keys; the seed is told beside it
+
+
+def require_decisive(key: str, where: str, got: object) -> None:
+    """Refuse a key of a scenario that says nothing of the flight: it would be taken without a word.
+
+    Raises:
+        DockairError: it does not.
+    """
+    if key.partition(".")[0] in SAYS_NOTHING_OF_THE_FLIGHT:
+        raise DockairError(where, expected="a key that decides the flight", got=got)
 
 
 def scenario_hash(scenario: Scenario) -> str:

@@ -24,27 +24,19 @@ flight. The peers' hoses and research on hose-drogue dynamics give 0.2-0.5 Hz fo
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any, get_origin
 
 import numpy as np
 from scipy.linalg import expm, solve_continuous_lyapunov
 
-from dockair.errors import DockairError, check_numbers
+from dockair.errors import DockairError, check_numbers, keep_tuples
 from dockair.rotations import Array
 
 #: Of the states: m and d come before it, then place and rate of each mode, then g.
 FIRST_MODE = 2
 _FITTED_AT_PA = 10_690.0  # dynamic pressure at 180 m/s and 6000 m
 _STIFFENS = 0.4  # frequencies over dynamic pressure: at 120 m/s and 3000 m, 0.61 of it, 0.83 foretells best
-
-
-def _keep_tuples(settings: Any) -> None:
-    """Make tuples of a dataclass's lists and arrays: what `step_noise` and `any_moment` remember they find by them."""
-    for field in fields(settings):
-        if get_origin(field.type) is tuple:
-            object.__setattr__(settings, field.name, tuple(getattr(settings, field.name)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -58,7 +50,7 @@ class HoseMode:
 
     def __post_init__(self) -> None:
         check_numbers("guidance.predictive.swing.modes", self, signed=("gust_density", "felt_share"))
-        _keep_tuples(self)
+        keep_tuples(self)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -110,7 +102,7 @@ class SwingSettings:
         modes = given if isinstance(given, Sequence) else ()
         if not modes or not all(isinstance(mode, HoseMode) for mode in modes):
             raise DockairError("guidance.predictive.swing.modes", expected="one HoseMode or more", got=given)
-        _keep_tuples(self)
+        keep_tuples(self)
 
     def at(self, dynamic_pressure_pa: float) -> "SwingSettings":
         """Return the same for another dynamic pressure [Pa], which stretches the hose more or less across."""

@@ -19,7 +19,7 @@ from dockair.scenarios.campaign.draws import Point
 from dockair.scenarios.campaign.plan import Entry
 from dockair.scenarios.campaign.plan_file import PlanFile
 from dockair.scenarios.campaign.points import points_of, refuse_too_many, seeds_of
-from dockair.scenarios.scenario_hash import SAYS_NOTHING_OF_THE_FLIGHT, SHEETS, file_hash, scenario_hash
+from dockair.scenarios.scenario_hash import SHEETS, file_hash, require_decisive, scenario_hash
 from dockair.scenarios.schema import Scenario, load_scenario
 
 _STRENGTHS = ("turbulence.sigma_m_s", "turbulence.intensity")
@@ -175,8 +175,7 @@ def _require_decisive(layers: Layers) -> None:
     """Refuse a key that decides nothing: a plan has seeds of its own, and claims hold of scenarios as they are."""
     for place, layer in layers:
         for key in layer:
-            if key.partition(".")[0] in SAYS_NOTHING_OF_THE_FLIGHT:
-                raise DockairError(place.replace("{key}", key), expected="a key that decides the flight", got=key)
+            require_decisive(key, place.replace("{key}", key), key)
 
 
 def _require_as_drawn(source: PlanFile, scenario: Scenario, point: Point) -> None:

@@ -11,7 +11,7 @@ from gymnasium import spaces
 from dockair.errors import DockairError
 from dockair.messages import ReceiverCommand
 from dockair.scenarios.envs.tables import ACTION
-from dockair.scenarios.scenario_hash import SAYS_NOTHING_OF_THE_FLIGHT
+from dockair.scenarios.scenario_hash import require_decisive
 from dockair.scenarios.schema import Scenario, load_scenario
 
 _EXISTS = ("scenario", "seed", "set")
@@ -40,9 +40,7 @@ def scenario_from(options: Mapping[str, Any], source: str | Path | Scenario) -> 
         expected = 'the option "seed" in its place, or reset(seed=...)'
         raise DockairError("options.set: seed", expected=expected, got=_said(settings["seed"]))
     for key in settings:
-        if key.partition(".")[0] in SAYS_NOTHING_OF_THE_FLIGHT:  # it would be taken without a word
-            expected = "a key that decides the flight"
-            raise DockairError(f"options.set: {key}", expected=expected, got=_said(settings[key]))
+        require_decisive(key, f"options.set: {key}", _said(settings[key]))
     if not isinstance(source, (str, Path, Scenario)):
         raise DockairError("scenario", expected="a name, a path or a Scenario", got=_said(source))
     if not isinstance(source, Scenario):

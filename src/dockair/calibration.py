@@ -20,7 +20,7 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from dockair.errors import DockairError
+from dockair.errors import DockairError, keep_tuples
 from dockair.messages import Window
 from dockair.rotations import Array
 
@@ -105,9 +105,7 @@ class Camera:
         if self.distortion is not None:
             _check_vector(self.distortion, 5, 10.0, "camera.distortion", "5 numbers k1, k2, p1, p2, k3")
             self._check_rays()
-        for name in ("principal_point_px", "distortion"):  # a list or an array would make a sheet that can't be a key
-            value = getattr(self, name)
-            object.__setattr__(self, name, None if value is None else tuple(value))
+        keep_tuples(self)
 
     def _check_rays(self) -> None:
         """Each pixel's ray is found: a lens that distorts much folds the picture over, or the steps to it run away."""

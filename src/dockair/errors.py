@@ -117,6 +117,14 @@ def check_numbers(
                 raise DockairError(name, expected=f"{kind}s{text}" if is_vector else f"a {kind}{text}", got=value)
 
 
+def keep_tuples(settings: Any) -> None:
+    """Make tuples of a frozen dataclass's lists and arrays, once they are checked: a list is no key of a cache."""
+    for field in fields(settings):
+        value, kinds = getattr(settings, field.name), (field.type, *get_args(field.type))
+        if value is not None and any(get_origin(kind) is tuple for kind in kinds):
+            object.__setattr__(settings, field.name, tuple(value))
+
+
 def _is_number(value: Any) -> bool:
     return isinstance(value, Real) and not isinstance(value, bool)
 
