@@ -79,6 +79,9 @@ class PlanFile:
                 raise DockairError(self.place(f'draw."{key}".points'), expected=expected, got=draw.points)
             if key in self.settings:
                 raise DockairError(f"--set {key}", expected="a key that the plan does not draw", got=key)
+        if "sampler" in plan.model_fields_set and not plan.draw:
+            expected = "keys to draw, or no sampler"
+            raise DockairError(self.place("sampler"), expected=expected, got=plan.sampler)
         if plan.draws is not None and (not plan.draw or plan.sampler == "grid"):
             expected = "keys to draw at random or by Latin hypercube, or no number of draws"
             raise DockairError(self.place("draws"), expected=expected, got=plan.draws)

@@ -197,6 +197,7 @@ def test_every_packaged_plan_can_be_flown_and_says_what_for(name):
         ('scenarios = ["default"]\nseeds = true', "seeds: expected how many seeds"),
         ('scenarios = ["default"]\nseeds = [1, 1]', "expected every flight once, got 'default, seed 1, twice'"),
         ('scenarios = ["default"]\nsampler = "sobol"', "exists: grid, random, latin_hypercube"),
+        ('scenarios = ["default"]\nsampler = "random"', "sampler: expected keys to draw, or no sampler, got 'random'"),
         ('scenarios = ["default"]\ndraws = 3', "draws: expected keys to draw"),
         (
             'scenarios = ["default"]\n[set]\n"turbulence.sigma" = 1.0',
