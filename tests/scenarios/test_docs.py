@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from dockair.scenarios.envs import DockEnv
 from dockair.scenarios.statistics import wilson_interval
 
 ROOT = Path(__file__).parents[2]
@@ -30,6 +31,30 @@ def test_the_navigator_of_ones_own_flies_from_the_folder_one_stands_in_and_repla
     assert flown.stdout.startswith("timeout")
     replayed = run(tmp_path, "-m", "dockair", "replay", "flown")
     assert replayed.returncode == 0 and replayed.stdout.startswith("identical"), replayed.stderr
+
+
+@pytest.mark.slow
+def test_the_wrapper_that_draws_settings_does_so_at_every_reset_and_a_seed_determines_them():
+    shown = next(block for block in python_blocks("docs/environments.md") if "class Drawn" in block)
+    names: dict = {"__name__": "shown"}
+    exec(shown, names)  # noqa: S102 - the page's own lines
+    env = names["Drawn"](DockEnv("truth_navigation"))
+    seeds = (3, None, 3, None)
+    flown = []
+    for seed in seeds:
+        _, info = env.reset(seed=seed)
+        flown.append(env.unwrapped._flight.scenario)
+        assert info["set"]["turbulence.sigma_m_s"] == flown[-1].turbulence.sigma_m_s
+    env.close()
+    sigmas = [scenario.turbulence.sigma_m_s for scenario in flown]
+    assert sigmas[:2] == sigmas[2:] and sigmas[0] != sigmas[1]
+    assert flown[1].flight.duration_s == 12.0
+
+
+def test_an_id_that_names_the_package_is_found_where_nobody_has_imported_it(tmp_path):
+    script = 'import gymnasium; print(gymnasium.make("dockair:dockair/DockFast-v0").spec.id)'
+    found = run(tmp_path, "-c", script)
+    assert found.stdout.strip() == "dockair/DockFast-v0", found.stderr
 
 
 PAGES = [
