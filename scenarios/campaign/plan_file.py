@@ -82,9 +82,11 @@ class PlanFile:
         if "sampler" in plan.model_fields_set and not plan.draw:
             expected = "keys to draw, or no sampler"
             raise DockairError(self.place("sampler"), expected=expected, got=plan.sampler)
-        if plan.draws is not None and (not plan.draw or plan.sampler == "grid"):
-            expected = "keys to draw at random or by Latin hypercube, or no number of draws"
-            raise DockairError(self.place("draws"), expected=expected, got=plan.draws)
+        if not plan.draw or plan.sampler == "grid":
+            for key, what in (("draws", "number of draws"), ("draw_seed", "seed of the draws")):
+                if key in plan.model_fields_set:
+                    expected = f"keys to draw at random or by Latin hypercube, or no {what}"
+                    raise DockairError(self.place(key), expected=expected, got=getattr(plan, key))
 
     def _check_gate(self) -> None:
         for name, table in self.plan.gate.scenarios.items():

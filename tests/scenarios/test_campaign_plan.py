@@ -199,6 +199,11 @@ def test_every_packaged_plan_can_be_flown_and_says_what_for(name):
         ('scenarios = ["default"]\nsampler = "sobol"', "exists: grid, random, latin_hypercube"),
         ('scenarios = ["default"]\nsampler = "random"', "sampler: expected keys to draw, or no sampler, got 'random'"),
         ('scenarios = ["default"]\ndraws = 3', "draws: expected keys to draw"),
+        ('scenarios = ["default"]\ndraw_seed = 3', "draw_seed: expected keys to draw"),
+        (
+            'scenarios = ["default"]\nsampler = "grid"\ndraw_seed = 3\n[draw."start.aft_m"]\nvalues = [3.0, 4.0]',
+            "p.toml: draw_seed: expected keys to draw at random or by Latin hypercube, or no seed of the draws, got 3",
+        ),
         (
             'scenarios = ["default"]\n[set]\n"turbulence.sigma" = 1.0',
             "p.toml: set.turbulence.sigma: expected a known key",
