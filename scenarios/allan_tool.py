@@ -189,11 +189,11 @@ def in_words(found: AllanReport) -> str:
         f"  Q  quantisation       {n.quantisation_rad:.4g} rad",
         f"  N  angle random walk  {n.noise_density_rad_s_rthz:.4g} rad/s/sqrt(Hz)",
         f"  B  bias instability   {n.bias_instability_rad_s:.4g} rad/s ({in_deg_h:.3g} deg/h)",
-        f"     its correlation    {n.bias_correlation_s:.4g} s",
+        f"     its correlation    {n.bias_correlation_s:.4g} s" if n.bias_instability_rad_s else "",
         f"  K  rate random walk   {n.rate_random_walk_rad_s_rts:.4g} rad/s/sqrt(s)",
     ]
     lines += [f"  {found.caution}"] if found.caution else []
-    return "\n".join([*lines, "", scenario_text(found)])
+    return "\n".join([*filter(None, lines), "", scenario_text(found)])
 
 
 def _read_npy(path: Path) -> tuple[list[str], Array]:

@@ -117,6 +117,7 @@ def test_without_bias_instability_no_correlation_time_is_written(tmp_path):
     found = allan_tool.report(tmp_path / "gyro.npy", 100.0, "rad/s", terms="NK")
     assert "gyro_bias_correlation_s" not in found.parameters
     assert "nan" not in allan_tool.sheet_text(found)
+    assert "correlation" not in allan_tool.in_words(found)
 
 
 def test_a_record_too_short_to_tell_the_slow_terms_apart_says_so(tmp_path):
