@@ -13,7 +13,7 @@ def design_ring(
     inner: Annotated[str, typer.Option(help="Numbers of LEDs off the rim's plane.")] = "0,1,4",
     depth: Annotated[str, typer.Option(help="How far ahead of it, in metres; behind it when negative.")] = "0.1,0.2",
     diameter: Annotated[str, typer.Option(help="Diameters of the rim's circle, in metres.")] = "0.4,0.5,0.6",
-    spacing: Annotated[str, typer.Option(help="equal, coded (one LED off its place), or both.")] = "equal",
+    spacing: Annotated[str, typer.Option(help="equal, coded (one LED off its place), or equal,coded.")] = "equal",
     ranges: Annotated[str, typer.Option(help="Nearest and farthest of the approach, in metres.")] = "2,30",
     tilt: Annotated[float, typer.Option(help="Largest tilt of the drogue, in degrees.")] = 20.0,
     sigma_px: Annotated[float, typer.Option(help="Standard deviation of a pixel coordinate.")] = 0.1,
