@@ -360,3 +360,61 @@ def test_a_forecast_of_the_drogue_says_nothing_about_the_path():
         guidance.step(aside)
         learnt.append(guidance._formation.path.left_m_s - before)
     assert learnt[0] > 0.0 and learnt[1] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("phase", "committed", "learns"),
+    [
+        (Phase.JOIN_UP, False, True),
+        (Phase.PRE_CONTACT, False, True),
+        (Phase.APPROACH, False, True),
+        (Phase.APPROACH, True, False),
+        (Phase.HOLD, False, False),
+        (Phase.DISCONNECT, False, False),
+        (Phase.BACK_OFF, False, False),
+        (Phase.BREAKAWAY, False, False),
+        (Phase.CLEAR, False, True),
+    ],
+)
+def test_a_drogue_that_is_pushed_or_got_away_from_says_nothing_about_the_path(phase, committed, learns):
+    """Only one that is followed, and before it comes into the bow wave, tells how the tanker goes aside."""
+    guidance = Guidance(GuidanceSettings(), 100)
+    guidance.announce(_said())
+    guidance.step(_astern(0.0))
+    guidance.phase, guidance._closure.committed = phase, committed
+    guidance.step(replace(_astern(0.0), rate_PD_B=np.array([0.0, 0.2, 0.0])))
+    assert bool(guidance._formation.path.left_m_s > 0.0) is learns
+
+
+def test_in_a_turn_the_drogue_stays_on_the_probe_where_it_was_seen_whatever_is_reckoned_of_it():
+    """Out of view for a moment of a hold, while the receiver pushes it in; n x p of Eq. (1) of `formation`."""
+    guidance = Guidance(GuidanceSettings(), 100)
+    guidance.announce(_said(starts_s=0.0, entry_s=0.1))
+    place = np.array([-0.3, 0.05, 0.0])
+    seen = replace(_astern(0.0), p_PD_B=place, p_PK_B=place + [0.3, 0.0, 0.0])
+    moves = np.array([0.1, -0.2, 0.3])
+    for _ in range(20):
+        guidance.step(replace(seen, rate_PD_B=moves))
+    axes = guidance._axes
+    np.testing.assert_allclose(guidance._formation._turned[1], axes.turned(axes.R_NB @ moves), atol=1e-3)
+    guidance.step(seen)
+    guidance.phase = Phase.HOLD
+    for _ in range(40):
+        guidance.step(replace(seen, usable=False, rate_PD_B=np.array([0.5, 0.5, 0.5])))
+    assert guidance.phase is Phase.HOLD
+    assert np.linalg.norm(guidance._reckoning.place_m - place) > 0.05
+    np.testing.assert_allclose(guidance._formation._turned, [axes.turned(axes.R_NB @ place), np.zeros(3)], atol=1e-4)
+
+
+def test_how_far_the_drogue_was_pushed_in_leads_nobody_aside_once_it_is_off():
+    """In a turn, beside a drogue near by: to keep company with it is all."""
+    guidance = Guidance(GuidanceSettings(), 100)
+    guidance.announce(_said(starts_s=0.0, entry_s=0.1))
+    ahead = replace(_astern(0.0), p_PD_B=np.array([0.5, 0.0, 0.0]))
+    for _ in range(20):
+        guidance.step(ahead)
+    guidance.phase, guidance._take_in.pushed_in_m = Phase.BACK_OFF, 2.5
+    for _ in range(300):
+        guidance.step(ahead)
+    assert guidance.phase is Phase.BACK_OFF
+    np.testing.assert_allclose(guidance._u[1:], guidance._controller.drift_m_s[1:], atol=0.01)
