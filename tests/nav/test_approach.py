@@ -9,9 +9,13 @@ import pytest
 from dockair.calibration import Camera, Mounting
 from dockair.messages import Light, PodSignal, ReceiverCommand
 from dockair.nav.guidance.approach import Guidance, GuidanceSettings, PhaseLimits, RelativeState
+from dockair.nav.guidance.bow_wave_push import BowWavePush
 from dockair.nav.guidance.field_of_view import FieldOfView
 from dockair.nav.guidance.path_plan import PlanSettings
 from dockair.nav.guidance.phases import RED_LIGHT, REFUELLED, Phase
+from dockair.nav.guidance.pid import Pid
+from dockair.nav.guidance.predictive import Predictive
+from dockair.rotations import exp
 
 RATE_HZ = 50
 DEPTH_M = 0.3  # ring plane to coupling
@@ -1082,9 +1086,9 @@ def test_how_well_the_drogue_is_followed_is_known_until_it_has_been_out_of_view_
     assert begin(guidance) / RATE_HZ == pytest.approx(swing_s if anew else 0.1, abs=3.1 / RATE_HZ)
 
 
-def on_its_way_to(ahead_m):
+def on_its_way_to(ahead_m, **keys):
     """Plant, guidance and its newest state, so far from the ring in the first approach; from 1.5 m on committed."""
-    plant, guidance = Plant(), Guidance(SETTINGS, RATE_HZ)
+    plant, guidance = Plant(**keys), Guidance(SETTINGS, RATE_HZ)
     now = plant.step(ReceiverCommand())
     while now.p_PD_B[0] > ahead_m:
         now = plant.step(guidance.step(now))
@@ -1220,3 +1224,293 @@ def test_from_a_drogue_that_slipped_off_it_goes_down_if_it_is_out_of_view_before
 
 def test_from_a_drogue_that_goes_out_of_view_well_ahead_on_the_way_back_it_goes_straight_back():
     assert gone_down([0.5, 0.0, 0.0], usable=False, age_s=1.0, frame_age_s=0.0) > -0.5
+
+
+def told(part, method):
+    """What a part of guidance is told at each call of a method from now on, as a list that grows."""
+    calls, plain = [], getattr(part, method)
+    setattr(part, method, lambda *args, **keys: (calls.append((args, keys)), plain(*args, **keys))[1])
+    return calls
+
+
+LEVEL_FOR_LONG = dataclasses.replace(SETTINGS, levelling_s=1e9)
+ROLL_RAD_S = np.array([1.6, 0.0, 0.0])
+
+
+def rolling(guidance, ticks, w_WB_B=ROLL_RAD_S):
+    """(ticks, 3, 3) the stabilised axes in the body's, one that rolls as quickly as that from now on."""
+    begun_NB = guidance._axes.R_NB.copy()
+    return [(begun_NB @ exp(w_WB_B * k / RATE_HZ)).T for k in range(1, ticks + 1)]
+
+
+def test_what_the_controller_is_shown_does_not_turn_with_the_body():
+    """The drogue, the push on it and what the tip feels, by a receiver that banks by 46 degrees in half a second."""
+    place, rate, change = np.array([4.0, 0.5, -0.3]), np.array([0.2, 0.1, 0.05]), np.array([0.01, 0.02, -0.03])
+    bow_wave = BowWavePush(radius_m=0.9)
+    guidance = Guidance(dataclasses.replace(LEVEL_FOR_LONG, bow_wave=bow_wave), RATE_HZ)
+    shown, push = told(guidance._controller, "observe"), bow_wave.at(place)
+    for tick, R_BN in enumerate(rolling(guidance, RATE_HZ // 2)):
+        rate_B = R_BN @ rate - np.cross(ROLL_RAD_S, R_BN @ place)
+        turn = {"w_WB_B": ROLL_RAD_S, "dv_WP_B": R_BN @ change}
+        guidance.step(state(R_BN @ place, rate_B, usable=tick % 5 < 4, **turn))
+        sight, felt = shown[-1][0]
+        np.testing.assert_allclose(felt, change, atol=1e-9)
+        assert (sight is None) == (tick % 5 == 4)
+        if sight is not None:
+            np.testing.assert_allclose([sight.place_m, sight.rate_m_s], [place, rate], atol=1e-9)
+            np.testing.assert_allclose(sight.push_m_s2, np.tile(push, (len(sight.push_m_s2), 1)), atol=1e-9)
+
+
+def test_a_drogue_that_lies_still_on_the_probe_of_a_receiver_that_banks_is_taken_for_neither_slack_nor_aside():
+    """Its axis 20 degrees up, its coupling 4 cm beside the tip: in the body's axes they turn by far."""
+    guidance, ring = Guidance(LEVEL_FOR_LONG, RATE_HZ), -DEPTH_M * np.array([np.cos(0.35), 0.0, np.sin(0.35)])
+    coupling = np.array([0.0, 0.04, 0.0])
+    for _ in range(RATE_HZ):
+        guidance.step(state(ring + coupling, p_PK_B=coupling))
+        guidance.phase = Phase.APPROACH
+    guidance.phase = Phase.CONTACT
+    for R_BN in rolling(guidance, RATE_HZ // 2):
+        guidance.step(state(R_BN @ (ring + coupling), p_PK_B=R_BN @ coupling, w_WB_B=ROLL_RAD_S))
+    for _ in range(RATE_HZ // 2):
+        command = guidance.step(state(R_BN @ (ring + coupling), p_PK_B=R_BN @ coupling))
+    assert guidance.phase is Phase.CONTACT
+    np.testing.assert_allclose((R_BN.T @ command.velocity_m_s)[1:], 0.0, atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("ahead_m", "rate_m_s"), [(1.0, -1.2), (1.0, 0.5)], ids=["comes nearer, to the ring's plane", "goes away"]
+)
+def test_the_push_of_the_bow_wave_is_that_of_where_the_drogue_will_have_come_to_along_the_probe(ahead_m, rate_m_s):
+    """No farther than to its plane; of one that goes away nobody knows how long it will."""
+    settings = dataclasses.replace(SETTINGS, bow_wave=BowWavePush(radius_m=0.9))
+    guidance = Guidance(settings, RATE_HZ)
+    shown, across = told(guidance._controller, "observe"), [0.3, -0.2]
+    guidance.step(state([ahead_m, *across], [rate_m_s, 0.1, 0.2]))
+    times_s = guidance._controller.looks_ahead_s
+    assert len(times_s) > 2 and ahead_m + rate_m_s * times_s[-1] < 0.0 or rate_m_s > 0.0
+    for time_s, push in zip(times_s, shown[-1][0][0].push_m_s2, strict=True):
+        then_m = ahead_m if rate_m_s > 0.0 else max(ahead_m + rate_m_s * time_s, 0.0)
+        np.testing.assert_allclose(push, settings.bow_wave.at(np.array([then_m, *across])), atol=1e-12)
+    assert np.abs(shown[-1][0][0].push_m_s2).max() > 0.3
+
+
+@pytest.mark.parametrize(("later_s", "late"), [(1.0, None), (7.0, 1.5)])
+def test_a_moment_is_judged_by_the_miss_off_the_aim_and_the_swing_and_less_strictly_as_time_passes(
+    later_s, late, monkeypatch
+):
+    """Aimed off the drogue by what was learnt, it hops aside by 0.1 m: Eq. (1) of `closing` 0.5 m from the ring."""
+    monkeypatch.setattr(Pid, "unrest", 0.8)
+    limits = dataclasses.replace(TAKE_IN, stabilise_s=0.0, patience_s=10.0, late_radius=1.5)
+    settings = dataclasses.replace(PID, limits=limits)
+    guidance, aim, closing = Guidance(settings, RATE_HZ), np.array([0.1, -0.05]), settings.closing
+    waited = begin(guidance) - 1  # the first tick joins up
+    guidance._aim = aim
+    judged, swing = told(guidance._closure, "step"), round(closing.swing_s * RATE_HZ)
+    for tick in range(n := swing + round(later_s * RATE_HZ)):
+        hop_m = 0.1 if tick == n - 1 else 0.0
+        now = state([0.5, *(-aim + [hop_m, 0.0])], [-0.4, 0.0, 0.0])
+        guidance.step(now)
+    assert guidance.phase is Phase.APPROACH and not guidance._closure.committed
+    late = late or 1.0 + 0.5 * (waited + n) / RATE_HZ / limits.patience_s
+    to_come_m = 0.1 * np.exp(-0.5 / settings.closure_speed_m_s / closing.error_time_s)
+    miss_m = np.hypot(to_come_m, 0.1 / np.sqrt(swing))
+    args, keys = judged[-1]
+    np.testing.assert_allclose(args, [0.5, 0.5 + DEPTH_M, 0.4])
+    assert keys["miss"] == pytest.approx(miss_m / (late * limits.capture_radius_m), rel=1e-6)
+    assert keys["unrest"] == pytest.approx(0.8 / late, rel=1e-6)
+
+
+def test_beside_a_basket_that_would_be_met_it_keeps_as_far_off_the_axis_as_it_is_told_on_its_own_side():
+    guidance, aside = Guidance(SETTINGS, RATE_HZ), np.array([0.3, -0.2])
+    guidance.step(state([4.0, 0.0, 0.0]))
+    guidance.phase = Phase.APPROACH
+    asked = told(guidance._controller, "rate")
+    guidance.step(state([0.5, *aside]))
+    _, wanted = asked[-1][0]
+    np.testing.assert_allclose(wanted.aim_m, -SETTINGS.limits.beside_m * aside / np.hypot(*aside))
+
+
+def test_when_the_tip_will_be_at_the_ring_is_foretold_once_there_is_no_calling_back():
+    """From a run-up at 0.9 m/s to 1.2 m/s at the ring, slowly gained."""
+    settings = dataclasses.replace(SETTINGS, closure_acceleration_m_s2=0.3)
+    plant, guidance, foretold_s = Plant(), Guidance(settings, RATE_HZ), []
+    asked, now = told(guidance._controller, "rate"), plant.step(ReceiverCommand())
+    while not plant.crossings and plant.t < 60.0:
+        command = guidance.step(now)
+        to_contact_s = asked[-1][0][1].to_contact_s
+        assert (to_contact_s is not None) is guidance._closure.committed
+        if to_contact_s is not None:
+            foretold_s.append(plant.t + to_contact_s)
+        now = plant.step(command)
+    assert len(foretold_s) > RATE_HZ
+    np.testing.assert_allclose(foretold_s, plant.t, atol=0.06)
+
+
+@pytest.mark.parametrize(("committed", "bias_m_s"), [(True, 0.8), (False, 0.0)], ids=["committed", "in the basket"])
+def test_of_a_drogue_out_of_view_at_the_last_it_goes_on_as_fast_as_before(committed, bias_m_s):
+    """For less than it takes to lose it, neither on to the full speed nor back, and whatever drift may be believed."""
+    plant, guidance, now = on_its_way_to(2.5, bias=(bias_m_s, 0.0, 0.0))
+    while committed and not guidance._closure.committed:
+        now = plant.step(guidance.step(now))
+    assert guidance._closure.speed_m_s > 0.5
+    before, ahead_m = guidance._u[0], float(now.p_PD_B[0]) if committed else -0.1
+    lost = state([ahead_m, 0.0, 0.0], usable=False)
+    speeds = [guidance.step(lost).velocity_m_s[0] for _ in range(round(0.4 * RATE_HZ))]
+    assert guidance.phase is Phase.APPROACH and guidance._closure.committed is committed
+    let_go_m_s = SETTINGS.closure_acceleration_m_s2**2 / (2.0 * SETTINGS.jerk_limit_m_s3[0])
+    np.testing.assert_allclose(speeds, before, atol=1.5 * let_go_m_s)
+
+
+def test_after_a_disconnect_it_goes_straight_back_until_the_drogue_is_well_ahead():
+    """One that comes off aside, and is seen again there, is neither followed nor got astern of before that."""
+    guidance = Guidance(SETTINGS, RATE_HZ)
+    guidance.step(state([-DEPTH_M, 0.15, 0.0]))
+    guidance.phase = Phase.DISCONNECT
+    for ahead_m in np.linspace(-DEPTH_M, SETTINGS.limits.clear_m - 0.1, 4 * RATE_HZ):
+        command = guidance.step(state([ahead_m, 0.4, 0.2], [0.8, 0.0, 0.0]))
+        assert guidance.phase is Phase.DISCONNECT
+        assert np.abs(command.velocity_m_s[1:]).max() < 0.01
+    assert command.velocity_m_s[0] == pytest.approx(-SETTINGS.back_off_speed_m_s, abs=0.05)
+
+
+def test_that_the_light_called_it_back_once_is_forgotten_by_the_next_attempt():
+    """The next one is broken away from for speed: a drogue near by is not followed any more."""
+    plant, guidance, now = on_its_way_to(1.2)
+    guidance.signal(PodSignal(time_stamp_s=plant.t, light=Light.RED))
+    now = plant.step(guidance.step(now))
+    assert guidance.phase_reason == RED_LIGHT
+    guidance.signal(PodSignal(time_stamp_s=plant.t, light=Light.AMBER))
+    while plant.t < 60.0 and not (guidance.phase is Phase.APPROACH and now.p_PD_B[0] < 1.2):
+        now = plant.step(guidance.step(now))
+    guidance.step(state([1.1, 0.0, 0.0], [-2.7, 0.0, 0.0]))
+    assert guidance.phase_reason == "closing too fast"
+    for t in np.arange(RATE_HZ // 2) / RATE_HZ:
+        place, rate = [0.7, 0.3 * np.sin(np.pi * t), 0.0], [-0.5, 0.3 * np.pi * np.cos(np.pi * t), 0.0]
+        command = guidance.step(state(place, rate))
+    assert command.velocity_m_s[0] > 0.5 and abs(command.velocity_m_s[1]) < 0.05
+
+
+@pytest.mark.parametrize(
+    ("phase", "changes", "says"),
+    [
+        (Phase.BACK_OFF, {}, True),
+        (Phase.BACK_OFF, {"not_shown": False}, False),
+        (Phase.BACK_OFF, {"frame_age_s": 0.2}, False),
+        (Phase.HOLD, {}, False),
+        (Phase.DISCONNECT, {}, False),
+    ],
+)
+def test_frames_say_where_the_drogue_is_not_while_they_come_and_it_is_not_on_the_probe(phase, changes, says):
+    """By a receiver that banks meanwhile; it goes down, with its own way the drogue is reckoned."""
+    guidance = Guidance(LEVEL_FOR_LONG, RATE_HZ)
+    guidance.step(state([2.0, 0.0, 0.0]))
+    reckoned = told(guidance._reckoning, "miss")
+    turned_BN = rolling(guidance, RATE_HZ // 5)
+    for _ in turned_BN:
+        guidance.phase, before = phase, guidance._u.copy()
+        unseen = {"usable": False, "not_shown": True, "frame_age_s": 0.0, "w_WB_B": ROLL_RAD_S}
+        guidance.step(state([2.0, 0.0, 0.0], **(unseen | changes)))
+    (u, R_NB), keys = reckoned[-1]
+    assert keys == {"not_shown": says}
+    np.testing.assert_allclose(R_NB, turned_BN[-1].T, atol=1e-9)
+    np.testing.assert_array_equal(u, before)
+    assert u.any()
+
+
+def test_a_coupling_beside_the_probe_is_off_it_though_the_ring_is_about_the_tip():
+    guidance = on_the_probe(Phase.HOLD)
+    guidance.step(state([-DEPTH_M, 0.1, 0.0], p_PK_B=np.array([0.0, 0.3, 0.0])))
+    assert (guidance.phase, guidance.phase_reason) == (Phase.BREAKAWAY, "drogue has left the probe")
+
+
+def test_a_drift_that_is_faster_than_any_drogue_s_is_held_on_the_probe_where_nothing_is_seen():
+    """Of a receiver whose own velocity errs by 0.8 m/s to the left: what is reckoned of a lost one does not apply."""
+    plant, guidance = Plant(bias=(0.0, -0.8, 0.0)), Guidance(SETTINGS, RATE_HZ)
+    now = plant.step(ReceiverCommand())
+    while guidance.phase is not Phase.HOLD:
+        now = plant.step(guidance.step(now))
+    for _ in range(RATE_HZ // 3):
+        command = guidance.step(state(now.p_PD_B, usable=False))
+    assert guidance.phase is Phase.HOLD
+    assert command.velocity_m_s[1] == pytest.approx(0.8, abs=0.05)
+
+
+def test_what_is_pushed_in_is_what_was_commanded_beyond_the_drogue_s_steady_drift(monkeypatch):
+    """From contact on, with what was commanded in the response time before; also as it is pulled out again."""
+    drift = np.array([0.3, 0.0, 0.0])
+    monkeypatch.setattr(Predictive, "steady_drift_m_s", property(lambda self: drift))
+    guidance = on_the_probe(Phase.APPROACH)
+    guidance._u = np.array([1.2, 0.0, 0.0])
+    at = state([-DEPTH_M, 0.0, 0.0])
+    expected_m = (1.2 - drift[0]) * SETTINGS.response_s[0]
+    guidance.step(at)
+    assert guidance.phase is Phase.CONTACT and guidance._take_in.pushed_in_m == pytest.approx(expected_m)
+    for phase in (Phase.CONTACT, Phase.HOLD, Phase.DISCONNECT):
+        for _ in range(10):
+            guidance.phase = phase
+            expected_m += (guidance._u[0] - drift[0]) / RATE_HZ
+            guidance.step(at)
+        assert guidance._take_in.pushed_in_m == pytest.approx(expected_m)
+
+
+@pytest.mark.parametrize(("across", "following"), [([0.3, -0.3], Phase.PRE_CONTACT), ([0.3, -0.5], Phase.JOIN_UP)])
+def test_who_is_far_enough_behind_and_beside_the_drogue_s_line_has_not_joined_up(across, following):
+    guidance = Guidance(SETTINGS, RATE_HZ)
+    guidance.step(state([SETTINGS.stand_off_m, *across]))
+    assert guidance.phase is following
+
+
+def test_who_has_finished_stands_astern_of_the_drogue():
+    guidance = Guidance(SETTINGS, RATE_HZ)
+    guidance.phase = Phase.CLEAR
+    for _ in range(RATE_HZ):
+        command = guidance.step(state([SETTINGS.stand_off_m - 1.0, 0.5, -0.5]))
+    assert command.velocity_m_s[0] < -0.1
+    assert command.velocity_m_s[1] > 0.1 and command.velocity_m_s[2] < -0.1
+
+
+def test_while_no_frames_come_the_drogue_s_axis_leads_nobody_to_where_the_hose_trails():
+    """Though its place counts as known for longer."""
+    guidance = Guidance(SETTINGS, RATE_HZ)
+    for _ in range(RATE_HZ):
+        guidance.step(state([-DEPTH_M, 0.0, 0.0]))
+        guidance.phase = Phase.APPROACH
+    up = []
+    for age_s in (0.0, 0.2):
+        for _ in range(3 * RATE_HZ):
+            guidance.phase = Phase.HOLD
+            now = dataclasses.replace(turned([-DEPTH_M, 0.0, 0.0], -3.0), age_s=age_s, frame_age_s=age_s)
+            command = guidance.step(now)
+        up.append(command.velocity_m_s[2])
+    assert up[0] > 0.25 and abs(up[1]) < 0.1 * up[0]
+
+
+@pytest.mark.parametrize(("age_s", "following"), [(0.0, Phase.BREAKAWAY), (0.2, Phase.CONTACT)])
+def test_while_no_frames_come_no_hose_is_told_to_be_slack(age_s, following):
+    guidance = Guidance(SETTINGS, RATE_HZ)
+    for _ in range(RATE_HZ):
+        guidance.step(state([-DEPTH_M, 0.0, 0.0]))
+        guidance.phase = Phase.APPROACH
+    guidance.phase = Phase.CONTACT
+    now = dataclasses.replace(turned([-DEPTH_M, 0.0, 0.0], 8.0), age_s=age_s, frame_age_s=age_s)
+    for _ in range(round(SETTINGS.limits.slack_to_s * RATE_HZ)):
+        guidance.step(now)
+    assert guidance.phase is following
+
+
+@pytest.mark.parametrize("bearable", [True, False])
+def test_a_drogue_that_goes_out_of_view_is_reckoned_from_the_middle_of_its_swing_by_its_steady_drift(
+    bearable, monkeypatch
+):
+    """Where the gusts cannot be borne by no more of it than may be believed there."""
+    told_of = {"middle_m": [3.9, 0.2, 0.0], "steady_drift_m_s": [0.1, 0.4, 0.0], "bears_the_gusts": bearable}
+    for name, value in told_of.items():
+        monkeypatch.setattr(Predictive, name, np.array(value) if isinstance(value, list) else value)
+    guidance = Guidance(SETTINGS, RATE_HZ)
+    command = guidance.step(state([4.0, 0.0, 0.0]))
+    guidance.step(state([4.0, 0.0, 0.0], usable=False))
+    most_m_s = SETTINGS.unseen_drift_m_s if bearable else SETTINGS.unseen_drift_in_gusts_m_s
+    drift = np.minimum(told_of["steady_drift_m_s"], most_m_s)
+    np.testing.assert_allclose(guidance._reckoning.drift_m_s, drift)
+    way = (drift - command.velocity_m_s) / RATE_HZ
+    np.testing.assert_allclose(guidance._reckoning.place_m, told_of["middle_m"] + way)
