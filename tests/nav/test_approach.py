@@ -1514,3 +1514,11 @@ def test_a_drogue_that_goes_out_of_view_is_reckoned_from_the_middle_of_its_swing
     np.testing.assert_allclose(guidance._reckoning.drift_m_s, drift)
     way = (drift - command.velocity_m_s) / RATE_HZ
     np.testing.assert_allclose(guidance._reckoning.place_m, told_of["middle_m"] + way)
+
+
+def test_who_came_to_the_ring_s_plane_and_away_from_it_again_learns_nothing_from_where_the_drogue_was():
+    """As where a belief jumps, or the drogue is drawn ahead: no miss before it comes to the plane again."""
+    _, guidance, _ = on_its_way_to(0.5)
+    guidance.step(state([0.15, 0.1, 0.0], [-1.2, 0.0, 0.0]))
+    call_back(guidance, state([0.5, 0.1, 0.0], [-1.2, 0.0, 0.0]))
+    np.testing.assert_array_equal(guidance._aim, np.zeros(2))
