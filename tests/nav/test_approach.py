@@ -1522,3 +1522,15 @@ def test_who_came_to_the_ring_s_plane_and_away_from_it_again_learns_nothing_from
     guidance.step(state([0.15, 0.1, 0.0], [-1.2, 0.0, 0.0]))
     call_back(guidance, state([0.5, 0.1, 0.0], [-1.2, 0.0, 0.0]))
     np.testing.assert_array_equal(guidance._aim, np.zeros(2))
+
+
+def test_who_stuck_short_of_the_coupling_follows_the_drogue_again_once_it_is_astern():
+    """How long the tip was past the ring's plane says something of that approach alone."""
+    guidance = on_the_probe(Phase.APPROACH)
+    while guidance.phase is Phase.APPROACH:
+        guidance.step(state([-0.1, 0.0, 0.0]))
+    assert guidance.phase_reason == "coupling not reached"
+    guidance.phase = Phase.PRE_CONTACT
+    for _ in range(RATE_HZ):
+        command = guidance.step(state([SETTINGS.stand_off_m, 0.5, -0.5]))
+    assert command.velocity_m_s[1] > 0.1 and command.velocity_m_s[2] < -0.1
