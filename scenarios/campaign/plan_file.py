@@ -57,7 +57,7 @@ class PlanFile:
         if isinstance(table.get("scenarios"), list):
             table["scenarios"] = _expanded(table["scenarios"], own_seeds="seeds" not in (changes or {}))
         self.plan = self._checked(Plan, table | dict(changes or {}), "")
-        self._check_draws(own_sampler=table.get("sampler", self.plan.sampler))
+        self._check_draws(own_sampler=table.get("sampler", Plan.model_fields["sampler"].default))
         self._check_gate()
 
     def place(self, key: str) -> str:
@@ -68,7 +68,7 @@ class PlanFile:
         """Refuse draws that say nothing, or two things.
 
         Args:
-            own_sampler: the file's; the command line may have another for a plan that has points.
+            own_sampler: the file's; the command line may have another for a plan that has points, or a draw_seed.
         """
         plan = self.plan
         for key, table in plan.draw.items():
@@ -82,11 +82,15 @@ class PlanFile:
         if "sampler" in plan.model_fields_set and not plan.draw:
             expected = "keys to draw, or no sampler"
             raise DockairError(self.place("sampler"), expected=expected, got=plan.sampler)
-        if not plan.draw or plan.sampler == "grid":
-            for key, what in (("draws", "number of draws"), ("draw_seed", "seed of the draws")):
-                if key in plan.model_fields_set:
-                    expected = f"keys to draw at random or by Latin hypercube, or no {what}"
-                    raise DockairError(self.place(key), expected=expected, got=getattr(plan, key))
+        on_grid = plan.sampler == "grid"
+        decides_nothing = (
+            ("draws", "number of draws", on_grid),
+            ("draw_seed", "seed of the draws", on_grid and own_sampler == "grid"),
+        )
+        for key, what, in_vain in decides_nothing:
+            if key in plan.model_fields_set and (in_vain or not plan.draw):
+                expected = f"keys to draw at random or by Latin hypercube, or no {what}"
+                raise DockairError(self.place(key), expected=expected, got=getattr(plan, key))
 
     def _check_gate(self) -> None:
         for name, table in self.plan.gate.scenarios.items():

@@ -160,6 +160,11 @@ def test_scenarios_are_flown_with_the_same_points(plan):
     assert [job.drawn for job in jobs[:5]] == [job.drawn for job in jobs[5:]]
 
 
+def test_a_plan_with_a_seed_of_its_draws_is_flown_on_a_grid_where_the_command_line_says_so(plan):
+    text = 'scenarios = ["default"]\nseeds = 1\ndraw_seed = 3\n[draw."start.aft_m"]\nvalues = [3.0, 4.0]'
+    assert len(jobs_of(plan(text, {"sampler": "grid"}))) == 2
+
+
 def test_the_command_line_replaces_seeds_everywhere_and_the_sampler(plan):
     text = 'scenarios = [{ scenario = "default", seeds = 9 }]\nseeds = 7\n[draw."start.aft_m"]\nvalues = [3.0, 4.0]'
     assert len(jobs_of(plan(text, {"seeds": 2}))) == 2
