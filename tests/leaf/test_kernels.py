@@ -1,15 +1,18 @@
 """Kernels found again in numba's cache by what they are made of elsewhere too, compiled and loaded from a folder."""
 
+import os
+import subprocess
 import sys
 from importlib.util import module_from_spec, spec_from_file_location
 from types import ModuleType
 
 import numpy as np
 import pytest
+from numba.core.codegen import get_host_cpu_features
 
 from dockair import kernels
 from dockair.errors import MachineError
-from dockair.kernels import ingredients, njit
+from dockair.kernels import features_for, ingredients, njit
 
 SOURCE = """
 import numpy as np
@@ -85,6 +88,35 @@ def load(load_source, monkeypatch):
         return load_source("kernels_of_the_test", SOURCE)
 
     return load
+
+
+@pytest.mark.parametrize(
+    ("host", "asked"),
+    [
+        ("+avx2,-avx512f,-avx512bitalg", None),
+        ("+avx2,+avx512f,-avx512bitalg", None),  # Skylake, Cascade Lake: wide vectors slow the clock
+        ("+avx512bitalg,+avx512f", "+avx512bitalg,+avx512f,-prefer-256-bit"),
+    ],
+)
+def test_the_widest_vectors_are_asked_for_where_they_cost_no_clock_rate(host, asked):
+    assert features_for(host) == (asked or host)
+
+
+def test_kernels_are_compiled_for_the_features_asked_for_unless_the_user_names_others():
+    script = """
+from dockair.kernels import njit
+kernel = njit(cache=False)(lambda x: x + 1.0)
+kernel(1.0)
+print(next(iter(kernel.overloads.values())).library.codegen.magic_tuple()[2])
+"""
+    for environment, expected in (
+        ({}, features_for(get_host_cpu_features())),
+        ({"NUMBA_CPU_FEATURES": "+sse2"}, "+sse2"),
+    ):
+        found = subprocess.run(
+            [sys.executable, "-c", script], env=os.environ | environment, capture_output=True, text=True, check=True
+        )
+        assert found.stdout.strip() == expected
 
 
 @pytest.mark.parametrize("name, factor", [("code", 1), ("first", 1), ("sum_of_both", 2)])
