@@ -79,17 +79,14 @@ class PlanFile:
                 raise DockairError(self.place(f'draw."{key}".points'), expected=expected, got=draw.points)
             if key in self.settings:
                 raise DockairError(f"--set {key}", expected="a key that the plan does not draw", got=key)
-        if "sampler" in plan.model_fields_set and not plan.draw:
-            expected = "keys to draw, or no sampler"
-            raise DockairError(self.place("sampler"), expected=expected, got=plan.sampler)
-        on_grid = plan.sampler == "grid"
-        decides_nothing = (
-            ("draws", "number of draws", on_grid),
-            ("draw_seed", "seed of the draws", on_grid and own_sampler == "grid"),
+        on_grid, at_random = plan.sampler == "grid", "keys to draw at random or by Latin hypercube, or no"
+        may_decide_nothing = (
+            ("sampler", "keys to draw, or no sampler", False),
+            ("draws", f"{at_random} number of draws", on_grid),
+            ("draw_seed", f"{at_random} seed of the draws", on_grid and own_sampler == "grid"),
         )
-        for key, what, in_vain in decides_nothing:
+        for key, expected, in_vain in may_decide_nothing:
             if key in plan.model_fields_set and (in_vain or not plan.draw):
-                expected = f"keys to draw at random or by Latin hypercube, or no {what}"
                 raise DockairError(self.place(key), expected=expected, got=getattr(plan, key))
 
     def _check_gate(self) -> None:
