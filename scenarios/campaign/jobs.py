@@ -80,8 +80,8 @@ def jobs_of(source: PlanFile) -> list[Job]:
         _require_text(f"--set {key}", as_toml(value, f"--set {key}"))
     jobs: list[Job] = []
     for index, entry in enumerate(source.plan.scenarios):
-        content = ""
-        for point, seeds in points_of(source, seeds_of(source, entry)):
+        content, points = "", points_of(source, seeds_of(source, entry))
+        for point, seeds in points:
             layers = _layers(source, index, entry, point)
             _require_decisive(layers)
             settings = _merged(layers)
@@ -93,6 +93,7 @@ def jobs_of(source: PlanFile) -> list[Job]:
                 Job(len(jobs) + k, scenario, digest, seed, point, file, settings, content)
                 for k, seed in enumerate(seeds)
             ]
+        _require_listed(source, index, entry, [point for point, _ in points])
     _refuse_twins(source, jobs)
     _refuse_namesakes(source, jobs)
     for job in {job.scenario_hash: job for job in jobs}.values():
@@ -169,6 +170,16 @@ def _scenario(
     except DockairError as error:
         where = _blamed(error.where, layers, source.place(f"scenarios[{index}]"))
         raise error.at(where) from None
+
+
+def _require_listed(source: PlanFile, index: int, entry: Entry, points: Sequence[Point]) -> None:
+    """Refuse a listed value that no flight can have, though this time none has drawn it: more seeds would."""
+    for key, draw in source.plan.drawn.items():
+        drawn = {as_toml(point[key], key) for point in points}
+        for value in draw.values or ():
+            if as_toml(value, key) not in drawn:
+                layers = _layers(source, index, entry, points[0] | {key: value})
+                _scenario(source, index, entry, layers, _merged(layers))
 
 
 def _require_decisive(layers: Layers) -> None:

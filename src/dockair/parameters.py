@@ -72,7 +72,9 @@ def _parameter(where: str, entry: dict[str, Any]) -> Parameter:
 
 
 def _check_range(where: str, parameter: Parameter, value: Any) -> None:
-    expected = f"{np.asarray(parameter.value).size} number(s) in [{parameter.low}, {parameter.high}] {parameter.unit}"
+    shape = " x ".join(map(str, np.shape(parameter.value)))
+    numbers = f"{shape} numbers, each" if shape else "a number"
+    expected = f"{numbers} in [{parameter.low}, {parameter.high}] {parameter.unit}"
     if not all(isinstance(v, Real) and not isinstance(v, bool) for v in np.asarray(value, dtype=object).ravel()):
         raise DockairError(where, expected=expected, got=value)
     try:

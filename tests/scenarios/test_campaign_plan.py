@@ -526,6 +526,17 @@ def test_paths_of_sheets_in_a_plan_are_taken_from_its_folder_as_those_of_scenari
     assert job.scenario.hardware.ring == str(source.folder / "ring.toml")
 
 
+def test_a_listed_value_that_cannot_be_flown_is_refused_though_no_flight_drew_it(plan):
+    text = (
+        'scenarios = ["light_gusts", "moderate_gusts"]\nseeds = 1\nsampler = "random"\ndraw_seed = {seed}\n'
+        '[draw."turbulence.intensity"]\nvalues = ["light", "{last}"]'
+    )
+    for seed in range(4):  # some of them draw the first value, some the last
+        assert len(jobs_of(plan(text.format(seed=seed, last="moderate")))) == 2
+        said = refusal_of(plan, text.format(seed=seed, last="heavy"))
+        assert 'p.toml: draw."turbulence.intensity": expected' in said and "got 'heavy'; exists: light" in said
+
+
 def test_sheets_that_are_drawn_are_taken_from_the_plans_folder_too(plan, monkeypatch, tmp_path):
     source = plan('scenarios = ["default"]\nsampler = "grid"\n[draw."hardware.ring"]\nvalues = ["a.toml", "b.toml"]')
     for name in ("a.toml", "b.toml"):

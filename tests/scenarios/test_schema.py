@@ -63,8 +63,9 @@ SIGMAS = "three numbers, each 0 to 20"
         ("guidance.closure_speed_m_s = 1.6", "guidance.closure_speed_m_s", "a number from 0.5 to 1.5, got 1.6"),
         ("parameters.rope.mass = 1", "parameters", "a parameter sheet, got 'rope'; exists: "),
         ("parameters.mounting.x = 1", "parameters.mounting.x", "a parameter, got 'x'; exists: camera_position_m,"),
-        ("parameters.mounting.camera_yaw_rad = 1", "parameters.mounting.camera_yaw_rad", "1 number(s) in [-0.07,"),
-        ("parameters.mounting.probe_tip_m = 1", "parameters.mounting.probe_tip_m", "3 number(s) in [-10.0, 10.0] m,"),
+        ("parameters.mounting.camera_yaw_rad = 1", "parameters.mounting.camera_yaw_rad", "a number in [-0.07,"),
+        ("parameters.airframe.gust_points_m = [1]", "parameters.airframe.gust_points_m", "4 x 3 numbers, each in ["),
+        ("parameters.mounting.probe_tip_m = 1", "parameters.mounting.probe_tip_m", "3 numbers, each in [-10.0, 10.0]"),
         ('accept.outcome = "x"', "accept.outcome", "one of the names that exist, got 'x'; exists: contact, miss,"),
     ],
 )
