@@ -75,6 +75,12 @@ def test_motor_gives_no_pull_beyond_the_take_up_speed_and_brakes_beyond_the_pay_
     assert force == pytest.approx(reel.motor_force_n + REEL.brake_force_n - drag * too_fast_out)
 
 
+def test_brake_pulls_with_its_whole_force_and_no_more_however_fast_the_hose_runs_out():
+    reel, fast_out = _reel(), -REEL.pay_out_speed_m_s - 4.0 * REEL.speed_band_m_s
+    expected = reel.motor_force_n + REEL.brake_force_n - REEL.drum_damping_n_s_m * fast_out
+    assert reel.step(STATIC, FREE_M, fast_out) == pytest.approx(expected)
+
+
 @pytest.mark.parametrize("share", [0.25, 0.5, 0.75])
 def test_motor_fades_and_brake_comes_in_over_the_speed_band_in_a_straight_line(share):
     reel, drag = _reel(), REEL.drum_damping_n_s_m
@@ -121,6 +127,13 @@ def test_reel_that_comes_to_life_against_its_buffer_goes_on_with_the_lock_s_forc
     assert reel.step(STATIC, -0.01, 0.0) == pytest.approx(2500.0, rel=1e-2)
 
 
+def test_reel_that_comes_to_life_while_the_buffer_bears_more_than_the_lock_held_begins_without_a_pull():
+    reel = _reel()
+    reel.step(100.0, -0.01, 0.0, locked=True)
+    assert _buffer_n(-0.01, 0.0) > 200.0
+    assert reel.motor_force_n == 0.0
+
+
 @pytest.mark.parametrize(
     ("position_m", "locked", "light"),
     [
@@ -143,6 +156,10 @@ def test_refuelling_range_outside_the_reels_own_is_refused_with_the_keys_name(ke
     named = "inner_limit_m" if key == "refuelling_from_m" else key
     with pytest.raises(DockairError, match=rf"parameters\.reel\.{named}: expected"):
         _reel(**{key: value})
+
+
+def test_refuelling_range_may_reach_as_far_in_as_the_reels_own():
+    assert _reel(range_m=REEL.inner_limit_m).set_point_n == SET_POINT
 
 
 def test_hose_taken_in_by_five_metres_runs_out_again_unaided(make_world, wind_in):
@@ -274,6 +291,12 @@ def test_set_point_of_slow_flight_leaves_the_force_to_run_out_with_all_wound_in(
     pull = held + REEL.tension_gain * (held - tension)
     assert held < REEL.set_point_fraction * full.root_tension_n
     assert tension * cosine - pull == pytest.approx(REEL.run_out_force_n)
+
+
+def test_set_point_of_a_hose_that_would_not_run_out_even_without_it_is_none_and_no_push():
+    full, wound = _shapes(180.0)
+    unreachable = replace(REEL, run_out_force_n=2.0 * (1.0 + REEL.tension_gain) * wound.root_tension_n)
+    assert set_point_n(unreachable, full, wound) == 0.0
 
 
 def test_reel_that_would_wind_in_all_of_the_hose_is_refused(make_world):
@@ -410,6 +433,15 @@ def test_link_wholly_in_the_pod_is_turned_to_the_axis_as_stiffly_as_the_tube_hol
     angle, length = 1e-4, HOSE.link_length_m
     moment = _guide_on_one_link(np.array([1.0, 0.0, -angle]), 1.0)[4]
     assert moment == pytest.approx(-REEL.guide_stiffness_n_m2 * length**3 * angle, rel=1e-9)
+
+
+def test_link_is_turned_no_more_stiffly_than_by_the_tube_however_little_of_it_is_still_outside():
+    """Eq. (4) alone would make it infinitely stiff just before its rear joint passes the exit."""
+    angle, share = 1e-4, 1.0 - 1e-9
+    moment = _guide_on_one_link(np.array([1.0, 0.0, -angle]), share)[4]
+    stiffest = REEL.guide_stiffness_n_m2 * HOSE.link_length_m**3
+    assert STATIC * HOSE.link_length_m * share / (1.0 - share) > 1e3 * stiffest
+    assert moment == pytest.approx(-stiffest * angle, rel=1e-6)
 
 
 def test_link_that_turns_about_its_rear_joint_leaves_the_tube_there_alone():
