@@ -149,9 +149,15 @@ def test_of_two_stuck_exposures_the_one_that_began_last_holds() -> None:
         assert [faults.camera(t).exposure_s for t in (0.5, 1.5, 3.0, 4.5)] == [None, 9e-5, 1e-5, 9e-5]
 
 
+def test_of_two_exposures_that_are_stuck_from_the_same_moment_on_the_later_in_the_list_holds() -> None:
+    one, other = ExposureStuck(exposure_s=1e-5, start_s=1.0), ExposureStuck(exposure_s=9e-5, start_s=1.0)
+    assert _faults(one, other).camera(1.0).exposure_s == 9e-5
+    assert _faults(other, one).camera(1.0).exposure_s == 1e-5
+
+
 def test_the_stuck_exposures_to_come_are_known_from_the_start() -> None:
     faults = _faults(ExposureStuck(exposure_s=9e-5, start_s=70.0), StuckFrame(), ExposureStuck(exposure_s=1e-5))
-    assert list(faults.exposures_s.values()) == [9e-5, 1e-5]
+    assert faults.exposures_s == {0: 9e-5, 2: 1e-5}  # by their places in the list, by which a refusal names them
 
 
 def test_gyro_biases_add_and_the_smallest_range_holds() -> None:
@@ -166,7 +172,25 @@ def test_gyro_biases_add_and_the_smallest_range_holds() -> None:
     assert fault.range_rad_s == 0.2
 
 
+def test_most_hot_pixels_at_any_time_are_those_of_all_faults_that_overlap() -> None:
+    """7 and 5 together from 2 s to 4 s; the 9 that come later, and the 4 that begin as the 9 end, do not add up."""
+    apart = HotPixels(count=9, start_s=6.0, stop_s=8.0), HotPixels(count=4, start_s=8.0)
+    overlapping = HotPixels(count=7, stop_s=4.0), HotPixels(count=5, start_s=2.0, stop_s=6.0)
+    assert _faults(*apart).most_hot_pixels == 9
+    assert _faults(*apart, StuckFrame(), *overlapping).most_hot_pixels == 12
+    assert _faults(StuckFrame()).most_hot_pixels == 0
+
+
 # Hot pixels
+
+
+def test_hot_pixels_follow_the_published_sequence_of_splitmix64() -> None:
+    """Its first five numbers from 1234567 [Rosetta Code, Pseudo-random numbers/Splitmix64], of 2^32 pixels."""
+    published = [
+        6457827717110365317, 3203168211198807973, 9817491932198370423, 4593380528125082431, 16408922859458223821
+    ]  # fmt: skip
+    expected = [divmod(number % 2**32, 2**16) for number in published]
+    assert hot_pixel_places(1234567, 5, 2**16, 2**16).tolist() == [list(place) for place in expected]
 
 
 def test_hot_pixels_are_different_places_on_the_sensor() -> None:
@@ -215,6 +239,7 @@ def test_hot_pixels_lie_evenly_over_the_sensor() -> None:
         (LedDim(factor=1.1), "factor"),
         (LedDim(factor=-0.1), "factor"),
         (LedFlicker(frequency_hz=0.0, duty=0.5), "frequency_hz"),
+        (LedFlicker(frequency_hz=math.inf, duty=0.5), "frequency_hz"),
         (LedFlicker(frequency_hz=1.0, duty=1.5), "duty"),
         (LedFlicker(frequency_hz=1.0, duty=0.5, depth=2.0), "depth"),
         (HotPixels(count=-1), "count"),
