@@ -206,6 +206,31 @@ def test_bias_instability_forgets_itself_within_its_correlation_time_and_keeps_i
     assert first.var() == pytest.approx(sigma**2, rel=WITHIN)
 
 
+@pytest.mark.parametrize("sensors", SENSORS)
+def test_the_first_drift_is_another_draw_than_the_turn_on_bias(sensors: str) -> None:
+    unit = "rad_s" if sensors == "gyro" else "m_s2"
+    biased = replace(QUIET, **{f"{sensors}_turn_on_bias_sigma_{unit}": 0.01})
+    drifting = replace(QUIET, **{f"{sensors}_bias_instability_{unit}": 0.01})
+    first = [
+        np.concatenate([still(sheet, 1, seed=seed)[1 if sensors == "gyro" else 2][0] for seed in range(UNITS)])
+        for sheet in (biased, drifting)
+    ]
+    assert abs(np.corrcoef(*first)[0, 1]) < 4.5 / np.sqrt(3 * UNITS)
+
+
+def test_the_walk_that_stands_for_the_gyro_bias_is_as_quick_as_its_drift_and_its_walk_together() -> None:
+    """Variance of the change from sample to sample, 1e-5 of the drift's correlation time apart, over that time."""
+    drifting = replace(
+        QUIET,
+        gyro_bias_instability_rad_s=1e-3,
+        gyro_bias_correlation_s=200.0,
+        gyro_rate_random_walk_rad_s_rts=2e-4,
+    )
+    change = np.diff(still(drifting, 60000).angular_rate_rad_s, axis=0)
+    walk = drifting.gyro_bias_walk_rad_s_rts
+    assert change.var() * RATE == pytest.approx(walk**2, rel=4.5 * np.sqrt(2.0 / change.size))
+
+
 def test_random_walk_starts_at_zero_and_its_variance_grows_by_k_squared_a_second() -> None:
     walking = replace(QUIET, gyro_rate_random_walk_rad_s_rts=1e-3, accelerometer_random_walk_m_s2_rts=2e-3)
     n, lag = 60000, 250  # 0.5 s: 240 steps a record and axis that do not overlap
