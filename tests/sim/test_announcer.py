@@ -42,6 +42,12 @@ def test_change_that_comes_sooner_than_is_agreed_is_announced_at_once():
     assert _heard(announcer, 1.0)[0].time_stamp_s == 0.0
 
 
+def test_change_with_which_the_flight_begins_is_announced_too():
+    first, second = _heard(_announcer(replace(RACETRACK, starts_s=0.0), start_sigma_s=0.0)[0], 140.0)[:2]
+    assert (first.time_stamp_s, first.starts_s) == (0.0, 0.0) and first.turn_rate_rad_s != 0.0
+    assert second.starts_s > 0.0 and second.turn_rate_rad_s == 0.0
+
+
 def test_errors_have_the_spread_of_the_sheet_and_none_where_the_tanker_goes_straight():
     """400 draws: each standard deviation within 15 per cent, wrong once in 1e5."""
     starts, turns = [], []

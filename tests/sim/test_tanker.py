@@ -173,6 +173,21 @@ def test_racetrack_that_cannot_be_flown_is_refused_by_its_key(changed, where):
         TankerPath(TankerPathParameters(**parameters), V)
 
 
+@pytest.mark.parametrize(
+    ("changed", "where"),
+    [
+        ({"descent_rad": 0.0}, "tanker.descent_rad"),
+        ({"descent_rad": float("nan")}, "tanker.descent_rad"),
+        ({"pull_over_rate_rad_s": 0.0}, "tanker.pull_over_rate_rad_s"),
+        ({"starts_s": float("inf")}, "tanker.starts_s"),
+    ],
+)
+def test_toboggan_that_cannot_be_flown_is_refused_by_its_key(changed, where):
+    parameters = {"manoeuvre": "toboggan", "descent_rad": np.radians(3.0)} | changed
+    with pytest.raises(DockairError, match=where):
+        TankerPath(TankerPathParameters(**parameters), V)
+
+
 def test_speed_and_time_must_be_numbers():
     with pytest.raises(DockairError, match="airspeed_m_s"):
         TankerPath(RACETRACK, 0.0)
