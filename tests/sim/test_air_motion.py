@@ -116,6 +116,13 @@ def test_what_was_told_stays_when_the_air_is_asked_again_with_another_number_of_
     np.testing.assert_array_equal(before.tow_W, kept)
 
 
+def test_discrete_gusts_alone_are_the_same_however_often_they_are_asked_for():
+    air = motion(discrete=single())
+    before = now(air).tow_W
+    np.testing.assert_array_equal(now(air).tow_W, before)
+    assert np.abs(before).max() > 0.1
+
+
 def test_gusts_alone_reach_the_tow_as_the_field_gives_them_to_the_bit():
     np.testing.assert_array_equal(now(motion(gusts=dryden())).tow_W, dryden().velocity(TOW[:, 0]))
     np.testing.assert_array_equal(now(motion(discrete=single())).tow_W, single().velocity(TOW[:, 0]))
