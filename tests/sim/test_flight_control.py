@@ -2,6 +2,7 @@
 
 import copy
 from dataclasses import fields, replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -117,6 +118,28 @@ def test_state_has_the_tips_velocity_however_far_the_body_is_turned_from_trim() 
     commands(design, velocity_W, turn=np.array([0.5, 0.0, 0.0]), w_WB_B=w)
     tip_W = velocity_W + design._memory["R_now"] @ np.cross(w, PROBE_B)
     np.testing.assert_allclose(design.schedule.at(0.0).C @ design._memory["x"], tip_W - AHEAD, atol=1e-9)
+
+
+def test_attitude_in_the_state_is_the_rotation_from_trim_however_large_it_is() -> None:
+    design, turn = control(), np.array([1.2, -0.5, 0.8])
+    commands(design, AHEAD, turn=turn)
+    np.testing.assert_allclose(design._memory["x"][3:6], turn, atol=1e-9)
+
+
+def test_states_of_aircraft_and_model_are_beyond_the_turn_and_the_slope_that_the_path_flies() -> None:
+    """Rates, surfaces and thrust per mass; the slope adds its part of the weight to the thrust of the level turn."""
+    design, w, level = control(1e-2), np.array([0.1, -0.2, 0.3]), level_trim(AIRFRAME, 180.0, AIR)
+    flown: dict[str, Any] = {"turn_rate_rad_s": 0.03, "climb_rad": 0.05, "w_WB_B": w}
+    for _ in range(150):
+        commands(design, AHEAD, **flown)
+    model = np.concatenate([design.model.w_WB_B, design.model.actuators])
+    commands(design, AHEAD, **flown)
+    row, slope = design.schedule.at(design.path.turn_rate_rad_s), design.path.climb_rad
+    assert np.abs(row.trim[4:6]).min() > 1e-3 and slope > 0.02
+    trim = row.trim[3:] + [*np.zeros(6), 9.80665 * np.sin(slope)]
+    aircraft = np.concatenate([w, level.surfaces_rad, [level.thrust_n / AIRFRAME.mass_kg]])
+    np.testing.assert_allclose(design._memory["x"][6:], aircraft - trim, rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(design._memory["x_m"][6:13], model - trim, rtol=0.0, atol=1e-12)
 
 
 def test_models_rates_are_as_late_as_the_measured_ones() -> None:
