@@ -20,7 +20,7 @@ from dockair.sim.aircraft.engine import rotor_moment
 from dockair.sim.aircraft.flight_control import FlightControl, FlightControlParameters
 from dockair.sim.aircraft.linear_model import linear_model
 from dockair.sim.aircraft.receiver import Receiver
-from dockair.sim.aircraft.trim import level_trim
+from dockair.sim.aircraft.trim import level_trim, steady_trim
 
 FLIGHTS = [(180.0, 6000.0), (120.0, 3000.0)]
 STEP_S = 2e-3
@@ -437,6 +437,20 @@ def test_what_it_measures_of_the_air_is_reported_after_the_step() -> None:
     size = np.linalg.norm(v_W)
     ours = (receiver.airspeed_m_s, receiver.angle_of_attack_rad, receiver.sideslip_rad)
     assert ours == pytest.approx((size, np.arctan2(8.0, 190.0), np.arcsin(6.0 / size)))
+
+
+def test_trimmed_anew_in_sinking_air_it_begins_in_that_trim_and_reports_it_before_the_first_step() -> None:
+    receiver = make()
+    receiver.trim_in(3.0, 0.02)
+    air = standard_atmosphere(6000.0)
+    trim = steady_trim(AIRFRAME, 180.0, air, downwash_m_s=3.0, pitching_air_rad_s=0.02)
+    assert receiver.throttle == receiver.actuators.throttle == trim.thrust_range.throttle(trim.thrust_n)
+    assert receiver.angle_of_attack_rad == trim.alpha_rad and receiver.actuators.thrust_n == trim.thrust_n
+    np.testing.assert_array_equal(receiver.actuators.surfaces_rad, trim.surfaces_rad)
+    np.testing.assert_array_equal(receiver.trim_R_WB, trim.R_WB)
+    still = make()
+    assert abs(still.throttle - receiver.throttle) > 0.01
+    assert abs(still.angle_of_attack_rad - receiver.angle_of_attack_rad) > 1e-3
 
 
 def test_force_and_torque_are_those_of_air_engine_and_rotor_along_the_axes_of_the_world() -> None:

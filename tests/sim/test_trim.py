@@ -1,5 +1,6 @@
 """Steady flight of the receiver."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -171,6 +172,18 @@ def test_descent_that_needs_less_than_idle_thrust_is_refused_and_one_that_needs_
     assert steady_trim(unmanned, 120.0, air, climb_rad=slopes[0]).thrust_n == pytest.approx(1.5 * idle_n, rel=0.1)
     with pytest.raises(DockairError, match="airspeed_m_s"):
         steady_trim(unmanned, 120.0, air, climb_rad=slopes[1])
+
+
+@pytest.mark.parametrize(("last_mach", "flies"), [(0.58, True), (0.56, False)])
+def test_trim_beyond_the_last_mach_number_of_the_engines_tables_is_refused(last_mach: float, flies: bool) -> None:
+    """180 m/s at 6000 m are Mach 0.569; beyond their ends the tables would hold their last thrust."""
+    mach = AIRFRAME.thrust_mach * last_mach / AIRFRAME.thrust_mach[-1]
+    airframe, air = replace(AIRFRAME, thrust_mach=mach), standard_atmosphere(6000.0)
+    if flies:
+        assert level_trim(airframe, 180.0, air).airspeed_m_s == 180.0
+        return
+    with pytest.raises(DockairError, match="airspeed_m_s"):
+        level_trim(airframe, 180.0, air)
 
 
 def test_trim_beyond_the_derivatives_range_is_refused() -> None:
