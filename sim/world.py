@@ -51,7 +51,7 @@ from dockair.sim.truth import Seen, Truth, observe, truth_of
 __all__ = ["World", "DivergedError", "WorldParameters", "WorldStart", "WorldState"]
 
 _WAITING_PLACE_M = (-300.0, 0.0, -20.0)  # of the receiver while the hose settles: out of everybody's way
-_TRIMS = 3  # attitude changes the place, the place the wake, the wake the attitude: a tenth as much each time
+_TRIMS = 3  # attitude changes the place, the place the wake, the wake the attitude: a fortieth as much each time
 _STATE = mujoco.mjtState.mjSTATE_INTEGRATION
 _DIVERGED = 1e10  # acceleration at which MuJoCo calls a step unstable [m/s^2 or rad/s^2]
 

@@ -74,10 +74,19 @@ def test_a_reel_that_dies_in_the_refuelling_range_stops_the_fuel_where_the_unit_
     for _ in range(2000):
         truth = world.step(ReceiverCommand(velocity_m_s=np.array([1.2, 0.0, 0.0])))
     assert truth.latched and truth.fuel_flow_kg_s > 0.0
-    before = truth.fuel_flow_kg_s
+    before, flows = truth.fuel_flow_kg_s, []
     for tick in range(100):  # a probe that stopped at once would be torn off
         truth = world.step(ReceiverCommand(velocity_m_s=np.array([1.2 - 1e-3 * tick, 0.0, 0.0])))
+        flows.append(truth.fuel_flow_kg_s)
+    assert before < flows[0] and (flows[1] < flows[0]) is known  # the tick that begins at 2 s knows of nothing yet
     assert truth.latched and (truth.fuel_flow_kg_s < before) is known
+
+
+def test_nothing_flows_any_more_in_the_tick_after_the_coupling_has_let_go(make_world):
+    world = make_world(p_PD_B=(60.0, 0.0, 0.0))
+    world._fuel.flow_kg_s = 5.0  # as if the probe had been held until now
+    truth = world.step(ReceiverCommand())
+    assert truth.fuel_flow_kg_s == 0.0 and truth.fuel_kg == 0.0
 
 
 def test_a_restored_world_gives_the_same_fuel_to_the_bit(make_world):

@@ -81,6 +81,18 @@ def test_receiver_starts_where_it_was_asked_to_from_the_mean_drogue(make_world):
     np.testing.assert_array_equal(settled.v_WB, 0.0)
 
 
+def test_the_engines_clock_is_the_flights_whatever_went_before(make_world):
+    """The camera's clouds pass by that clock; the settling is no part of the flight."""
+    world = make_world(p_PD_B=FAR, settle_s=0.05)
+    state = world.save()
+    for _ in range(2):
+        assert world.data.time == world.truth.time_s == 0.0
+        for _ in range(20):
+            truth = world.step(ReceiverCommand())
+        assert world.data.time == pytest.approx(truth.time_s, abs=1e-12) and truth.time_s == 0.02
+        world.restore(state)
+
+
 def test_every_velocity_of_the_truth_is_the_rate_of_its_place(make_world):
     """A difference over two ticks is the mean of the rates at the ends of its halves, to order (jerk dt^2)."""
     world = make_world(gusts=_gusts(3))
@@ -137,6 +149,13 @@ def test_receiver_is_told_the_air_with_its_gust_and_its_specific_force_at_trim(m
     np.testing.assert_allclose(world.truth.gust_D_m_s, [2.0, -1.0, 0.5], atol=1e-12)
 
 
+def test_truth_says_of_airspeed_flow_angles_and_throttle_what_the_receiver_says(make_world, receiver_on_rails):
+    said = {"airspeed_m_s": 171.0, "angle_of_attack_rad": 0.1, "sideslip_rad": -0.02, "throttle": 0.7}
+    world = make_world(receiver=receiver_on_rails(**said), p_PD_B=FAR)
+    for truth in (world.truth, world.step(ReceiverCommand())):
+        assert {name: getattr(truth, name) for name in said} == said
+
+
 def test_each_body_is_told_the_gust_of_its_own_place(make_world, receiver_on_rails):
     class Shear:
         def step(self):
@@ -157,6 +176,19 @@ def test_each_body_is_told_the_gust_of_its_own_place(make_world, receiver_on_rai
     np.testing.assert_allclose(before.gust_D_m_s, [0.01 * drogue_x, 0.0, 0.0], atol=1e-12)
     world.step(ReceiverCommand())
     assert receiver.air_velocity_W[0] == pytest.approx(-180.0 + 0.01 * before.p_WB[0], abs=1e-9)
+
+
+def test_air_acts_on_the_links_in_their_middles_and_on_the_drogue_at_its_canopy(make_world):
+    """In a swing, so that no component is 0; these are the places whose air is asked for."""
+    world = make_world(p_PD_B=FAR)
+    _swing(world, 0.3)
+    for _ in range(150):
+        truth = world.step(ReceiverCommand())
+    places = truth._seen.hose[1]
+    assert np.abs(truth.R_WD[1:, 0]).min() > 1e-3
+    np.testing.assert_allclose(places[:-1], 0.5 * (truth.p_WH[:-1] + truth.p_WH[1:]), atol=1e-12)
+    canopy_D = [world.parameters.drogue.drag_centre_x_m, 0.0, 0.0]
+    np.testing.assert_allclose(places[-1], truth.p_WD + truth.R_WD @ canopy_D, atol=1e-12)
 
 
 def test_turning_receiver_moves_its_probe_and_feels_its_weight_in_its_own_axes(make_world, receiver_on_rails):

@@ -15,7 +15,7 @@ from dockair.sim.air.wake import WakeParameters, wake_coefficients
 from dockair.sim.aircraft.aerodynamics import AirframeParameters
 from dockair.sim.aircraft.flight_control import FlightControlParameters
 from dockair.sim.aircraft.receiver import Receiver
-from dockair.sim.aircraft.trim import level_trim
+from dockair.sim.aircraft.trim import level_trim, steady_trim
 from dockair.sim.hose.chain import DrogueParameters, HoseParameters
 from dockair.sim.hose.coupling import CouplingParameters
 from dockair.sim.hose.fuel import FuelParameters
@@ -99,6 +99,17 @@ def test_receiver_starts_nose_up_by_the_angle_of_the_wakes_downwash() -> None:
     assert 0.85 < raised / np.arctan2(downwash, V) < 1.0
     np.testing.assert_allclose(truth.p_PD_B, [15.0, 0.0, 0.0], atol=1e-9)
     np.testing.assert_array_equal(truth.v_WB, 0.0)
+
+
+def test_receiver_is_trimmed_in_the_air_of_the_very_place_where_that_trim_puts_it() -> None:
+    """The place goes by the attitude and the air by the place: after three rounds to a ten-thousandth."""
+    started = world(True)
+    trim, air = started._receiver.trim, started._air_state  # type: ignore[attr-defined]
+    assert trim.downwash_m_s == pytest.approx(-air.receiver_W[2], rel=1e-4)
+    there = steady_trim(
+        AIRFRAME, V, AIR, downwash_m_s=-air.receiver_W[2], pitching_air_rad_s=air.receiver_rotation_B[1]
+    )
+    np.testing.assert_allclose(started.truth.R_WB, there.R_WB, atol=1e-6)
 
 
 def test_first_commands_in_the_wake_are_where_the_actuators_stand() -> None:
