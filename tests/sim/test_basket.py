@@ -7,7 +7,7 @@ import pytest
 from dockair.calibration import LedRing
 from dockair.errors import DockairError
 from dockair.parameters import load_parameters
-from dockair.rotations import quaternion_from_matrix
+from dockair.rotations import matrix_from_quaternion, quaternion_from_matrix
 from dockair.sim.basket import place_leds
 from dockair.sim.camera.obstacles import Obstacles
 from dockair.sim.camera.occlusion import hidden
@@ -94,6 +94,60 @@ def test_pieces_stand_evenly_round_the_axis(make_world, name):
     np.testing.assert_allclose(np.ptp(np.hypot(middle[:, 1], middle[:, 2])), 0.0, atol=1e-12)
     angle = np.sort(np.arctan2(middle[:, 2], middle[:, 1]))
     np.testing.assert_allclose(np.diff(angle), 2.0 * np.pi / len(pieces), atol=1e-9)
+
+
+def _along(geom):
+    """Middle (3,), half of the way from end to end (3,) whichever way round, and size of a geom, in the drogue's axes.
+
+    Of a capsule or a cylinder along its z, of a panel along its x.
+    """
+    R, panel = matrix_from_quaternion(geom.quat), geom.type[0] == mujoco.mjtGeom.mjGEOM_BOX
+    return geom.pos, (geom.size[0] * R[:, 0] if panel else geom.size[1] * R[:, 2]), geom.size
+
+
+def _runs(geom, begin, end, radius):
+    """Check that a capsule or cylinder of a radius runs between two places."""
+    middle, half, size = _along(geom)
+    np.testing.assert_allclose(middle, 0.5 * (begin + end), atol=1e-9)
+    np.testing.assert_allclose(np.outer(half, half), 0.25 * np.outer(end - begin, end - begin), atol=1e-9)
+    assert size[0] == pytest.approx(radius)
+
+
+def test_ribs_run_from_the_rim_to_the_bore_and_the_rim_from_rib_to_rib_all_round(make_world):
+    model, n = make_world().model, DROGUE.ribs
+    angle = 2.0 * np.pi * np.arange(n) / n
+    round_axis = np.column_stack([np.zeros(n), np.cos(angle), np.sin(angle)])
+    rim = [DROGUE.rim_x_m, 0.0, 0.0] + 0.5 * DROGUE.ring_diameter_m * round_axis
+    bore = [DROGUE.throat_x_m, 0.0, 0.0] + (COUPLING.socket_radius_m + DROGUE.rib_radius_m) * round_axis
+    for k in range(n):
+        _runs(model.geom(f"basket_rib_{k}"), rim[k], bore[k], DROGUE.rib_radius_m)
+        _runs(model.geom(f"basket_rim_{k}"), rim[k], rim[(k + 1) % n], DROGUE.rim_tube_radius_m)
+
+
+def test_bore_reaches_from_the_throat_to_its_bottom_and_the_solid_body_from_there_to_the_hose(make_world):
+    model, ahead = make_world().model, np.array([1.0, 0.0, 0.0])
+    bottom, wall = (COUPLING.depth_m + COUPLING.stop_gap_m) * ahead, COUPLING.socket_wall_m
+    aside = np.array([0.0, COUPLING.socket_radius_m + 0.5 * wall, 0.0])
+    _runs(model.geom("coupling_stave_0"), DROGUE.throat_x_m * ahead + aside, bottom + aside, 0.5 * wall)
+    _runs(model.geom("coupling_body"), bottom, DROGUE.hose_joint_x_m * ahead, COUPLING.socket_radius_m + wall)
+
+
+def test_leds_housings_reach_from_their_gap_behind_the_lens_to_the_rim(make_world):
+    model, aside = make_world().model, np.array([0.0, 0.5 * DROGUE.ring_diameter_m, 0.0])
+    gap, rim = (np.array([x, 0.0, 0.0]) + aside for x in (DROGUE.led_housing_gap_m, DROGUE.rim_x_m))
+    _runs(model.geom("led_housing_0"), gap, rim, DROGUE.led_housing_radius_m)
+
+
+@pytest.mark.parametrize("k", [0, 5, 18])
+def test_canopys_panels_reach_from_the_rims_front_to_its_own_rim_and_meet_their_neighbours_there(make_world, k):
+    model, angle = make_world().model, 2.0 * np.pi * k / 24
+    out = np.array([0.0, np.cos(angle), np.sin(angle)])
+    begin = np.array([DROGUE.rim_x_m + DROGUE.rim_tube_radius_m, 0.0, 0.0]) + 0.5 * DROGUE.ring_diameter_m * out
+    end = begin + [DROGUE.canopy_length_m, 0.0, 0.0] + 0.5 * (DROGUE.canopy_diameter_m - DROGUE.ring_diameter_m) * out
+    middle, half, size = _along(model.geom(f"canopy_{k}"))
+    np.testing.assert_allclose(middle, 0.5 * (begin + end), atol=1e-9)
+    np.testing.assert_allclose(np.outer(half, half), 0.25 * np.outer(end - begin, end - begin), atol=1e-9)
+    assert 24 * 2.0 * size[1] == pytest.approx(np.pi * DROGUE.canopy_diameter_m)
 
 
 def test_staves_leave_the_bore_free_and_the_canopy_opens_aft_of_its_rim_outward(make_world):
