@@ -49,8 +49,10 @@ def test_no_channels_noise_tells_of_anothers_or_of_its_own_next_sample() -> None
 
 
 def test_noise_is_drawn_anew_every_ten_milliseconds_and_held() -> None:
+    """290 ticks of 1 ms, too, of which the 29 samples are 28.999... by rounding."""
+    assert 290 * 1e-3 / SAMPLE_S < 29.0
     sensors = OwnSensors(PARAMETERS, 1e-3, np.random.default_rng(6))
-    rates = np.array([sensors.step(*STILL, 180.0)[1].copy() for _ in range(50)]).reshape(5, 10, 3)
+    rates = np.array([sensors.step(*STILL, 180.0)[1].copy() for _ in range(600)]).reshape(60, 10, 3)
     np.testing.assert_array_equal(rates, rates[:, :1].repeat(10, axis=1))
     assert np.all(np.diff(rates[:, 0], axis=0) != 0.0)
 
