@@ -142,7 +142,12 @@ def test_between_nodes_the_tables_are_bilinear() -> None:
 
 
 def test_beyond_the_tables_angles_hold_and_the_elevators_last_cell_goes_on() -> None:
-    for inside, outside in (((-10.0, 0.0), (-25.0, 0.0)), ((45.0, 0.0), (80.0, 0.0)), ((5.0, 30.0), (5.0, 50.0))):
+    for inside, outside in (
+        ((-10.0, 0.0), (-25.0, 0.0)),
+        ((45.0, 0.0), (80.0, 0.0)),
+        ((5.0, 30.0), (5.0, 50.0)),
+        ((5.0, -30.0), (5.0, -50.0)),
+    ):
         np.testing.assert_allclose(coefficients(*inside), coefficients(*outside), atol=1e-9)
     slope = coefficients(5.0, 0.0, (24.0, 0.0, 0.0)) - coefficients(5.0, 0.0, (23.0, 0.0, 0.0))
     beyond = coefficients(5.0, 0.0, (25.0, 0.0, 0.0)) - coefficients(5.0, 0.0, (24.0, 0.0, 0.0))
@@ -226,6 +231,7 @@ def test_uneven_nodes_are_refused_by_their_key() -> None:
         ("inertia_kg_m2", [0.0, 75674.0, 75674.0, 0.0]),
         ("inertia_kg_m2", [12875.0, 75674.0, 85552.0, 50000.0]),
         ("thrust_mach", [0.0, 0.2, 0.4, 0.4, 0.8, 1.0]),
+        ("thrust_altitude_m", [0.0, 3048.0, 3048.0, 9144.0, 12192.0, 15240.0]),
     ],
 )
 def test_values_that_no_aircraft_can_have_together_are_refused_by_their_key(key: str, value: list[float]) -> None:

@@ -111,6 +111,12 @@ def test_beyond_its_range_the_flow_angles_hold() -> None:
         np.testing.assert_allclose(held[[1, 3, 5]], at_end[[1, 3, 5]])
 
 
+def test_at_rest_there_is_no_force_to_speak_of_and_no_division_by_the_airspeed() -> None:
+    """What is left is that of 1 mm/s."""
+    still = np.zeros(3)
+    np.testing.assert_allclose(MODEL.force_and_moment(still, still, still), 0.0, atol=1e-3)
+
+
 def test_it_is_the_smaller_the_lighter_and_the_slower_one() -> None:
     fighter = load_parameters("airframe", AirframeParameters)
     assert AIRFRAME.mass_kg < 0.5 * fighter.mass_kg

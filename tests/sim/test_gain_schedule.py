@@ -1,5 +1,7 @@
 """Trims and gains between straight flight and turns."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -17,7 +19,7 @@ PARAMETERS = load_parameters("flight_control", FlightControlParameters)
 AIR = standard_atmosphere(6000.0)
 
 
-def _schedule(airspeed_m_s: float, air: Air) -> GainSchedule:
+def _schedule(airspeed_m_s: float, air: Air, airframe: AirframeParameters = AIRFRAME) -> GainSchedule:
     wanted = Design(
         point_B=np.array([6.0, -0.9, 0.6]),
         feedback=PARAMETERS.tolerances,
@@ -26,7 +28,7 @@ def _schedule(airspeed_m_s: float, air: Air) -> GainSchedule:
         gust_1_s=0.34,
         swing=PARAMETERS.swing,
     )
-    return GainSchedule(AIRFRAME, air, level_trim(AIRFRAME, airspeed_m_s, air), wanted)
+    return GainSchedule(airframe, air, level_trim(airframe, airspeed_m_s, air), wanted)
 
 
 @pytest.fixture(scope="module")
@@ -82,6 +84,18 @@ def test_a_turn_that_can_be_flown_has_a_trim_though_the_next_node_has_none(bank_
     assert row.trim[9] * AIRFRAME.mass_kg == pytest.approx(turn.thrust_n, rel=0.015)
     with pytest.raises(DockairError, match="turning at"):
         schedule.at(1.3 * rate)
+
+
+@pytest.mark.parametrize("sense", [1.0, -1.0])
+def test_a_turn_is_refused_where_the_airframe_flies_straight_and_not_even_the_first_node(sense: float) -> None:
+    """Military thrust a hundred-thousandth above that of level flight: no line leads on, for there is but one node."""
+    level = level_trim(AIRFRAME, 180.0, AIR)
+    share = 1.00001 * level.thrust_n / level.thrust_range.military_n
+    weak = replace(AIRFRAME, military_thrust_n=share * AIRFRAME.military_thrust_n)
+    schedule = _schedule(180.0, AIR, weak)
+    with pytest.raises(DockairError, match="turning at"):
+        schedule.at(sense * STANDARD_GRAVITY_M_S2 * np.tan(0.5 * NODE_RAD) / 180.0)
+    assert schedule.at(0.0).trim[9] == pytest.approx(level.thrust_n / AIRFRAME.mass_kg)
 
 
 def test_turn_without_a_trim_is_refused(schedule: GainSchedule) -> None:
