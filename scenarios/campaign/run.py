@@ -1,6 +1,7 @@
 """Runs a campaign: what is not done yet is flown, what is done is written down at once, the table comes last."""
 
 import time
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -146,13 +147,20 @@ def _begun_once(journal: Journal, out: Path, now: dict[str, Any], jobs: Sequence
 
 
 def _seed_by_seed(jobs: list[Job]) -> list[Job]:
-    """Return the jobs so that scenarios take turns: what is shown meanwhile is of all of them."""
-    nth: dict[str, int] = {}
-    order = []
+    """Return the jobs so that scenarios take turns, drawn ones too: what is shown meanwhile is of all of them.
+
+    A scenario of which keys are drawn is another at every point, each with its own first seed.
+    """
+    seeds: Counter[str] = Counter()
+    points: Counter[tuple[int, str, str]] = Counter()
+    turns: dict[int, tuple[int, int]] = {}
     for job in jobs:
-        nth[job.scenario_hash] = nth.get(job.scenario_hash, -1) + 1
-        order.append((nth[job.scenario_hash], job.number, job))
-    return [job for _, _, job in sorted(order, key=lambda entry: entry[:2])]
+        seed, set_for_all = seeds[job.scenario_hash], {k: v for k, v in job.settings.items() if k not in job.drawn}
+        alike = seed, job.scenario.name, repr(set_for_all)
+        turns[job.number] = seed, points[alike]
+        seeds[job.scenario_hash] += 1
+        points[alike] += 1
+    return sorted(jobs, key=lambda job: (turns[job.number], job.number))
 
 
 def _entry(done: Done) -> dict[str, Any]:

@@ -155,6 +155,22 @@ def test_a_campaign_that_is_over_is_not_flown_again(here, tmp_path):
     assert (tmp_path / "out/flights.parquet").read_bytes() == table
 
 
+@pytest.mark.parametrize(
+    ("more", "seeds"),
+    [("", [0, 1, 2]), ("[draw]", [0, 1, 2]), ("draws = 2\n[draw]", [0, 0, 1, 1, 2, 2])],
+    ids=["as written", "a point a seed", "every point with every seed"],
+)
+def test_scenarios_take_turns_seed_by_seed_whether_keys_are_drawn_or_not(here, tmp_path, more, seeds):
+    drawn = f'{more}\n"start.aft_m" = {{ low = 3.0, high = 5.0 }}\n' if more else ""
+    two, told = '"truth_navigation", "dead_reel"', []
+
+    def watch(jobs, entries):
+        return lambda row, wall_time_s: told.append((row["scenario"], row["seed"]))
+
+    fly(plan(tmp_path, 3, drawn, two), tmp_path / "out", watch=watch)
+    assert told == [(scenario, seed) for seed in seeds for scenario in ("truth_navigation", "dead_reel")]
+
+
 def test_a_line_that_was_torn_is_flown_again_and_no_other(here, tmp_path):
     undisturbed = fly(plan(tmp_path), tmp_path / "whole")
     fly(plan(tmp_path), tmp_path / "out")
