@@ -182,7 +182,7 @@ class Referee:
         if truth.latched:
             return
         attempt, now = self._attempt(truth), passing(truth)
-        attempt.touched = attempt.touched or attempt.latched is None  # one that was held is no rim strike afterwards
+        attempt.touched = True  # one that was held is no rim strike afterwards: that is looked at first
         self._fastest_m_s = max(self._fastest_m_s, now.closure_speed_m_s)
         if now.radial_offset_m > self.limits.basket_radius_m(float(now.p_DP[0])):
             self._outside_m = max(self._outside_m, now.radial_offset_m)

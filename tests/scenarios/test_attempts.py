@@ -85,8 +85,9 @@ def test_an_attempt_that_nobody_announced_begins_with_the_first_touch_or_in_the_
 
 def test_the_offset_of_a_miss_is_the_smallest_of_its_crossings_and_that_of_one_called_off_where_it_came_nearest(pilot):
     missed = pilot().fly(
-        "approach", (-0.1, 0.5, 0.0), (0.1, 0.5, 0.0), (-0.1, 0.3, 0.4), (0.1, 0.24, -0.32), (0.5, 0.0, 0.0)
-    )
+        "approach", (-0.1, 0.5, 0.0), (0.1, 0.5, 0.0), (-0.1, 0.3, 0.4), (0.1, 0.24, -0.32), (0.5, 0.0, 0.0),
+        (-0.1, 0.0, 0.0), (0.1, 0.45, 0.0),
+    )  # fmt: skip
     (attempt,) = missed.fly("back_off", AFT).log()
     assert attempt.outcome == "miss"
     assert (attempt.left_m, attempt.up_m) == (0.24, -0.32) and attempt.radial_offset_m == pytest.approx(0.4)
@@ -106,6 +107,30 @@ def test_of_a_contact_offset_and_speed_are_those_of_the_last_crossing_and_the_an
     assert attempt.radial_offset_m == pytest.approx(0.09)
     assert attempt.closure_speed_m_s == pytest.approx(1.1)
     assert attempt.angle_deg == pytest.approx(3.0)
+    contact = one.referee.contact
+    assert (contact.radial_offset_m, contact.closure_speed_m_s) == (attempt.radial_offset_m, attempt.closure_speed_m_s)
+
+
+@pytest.mark.parametrize(
+    ("phase", "expected"), [("breakaway", "breakaway"), ("back_off", "given_up"), ("clear", "given_up")]
+)
+def test_only_who_breaks_away_has_broken_away_and_who_goes_back_or_clear_has_given_up(pilot, phase, expected):
+    assert outcomes(pilot().fly("approach", AFT).fly(phase, AFT)) == [(1, expected)]
+
+
+def test_a_probe_that_is_held_after_it_was_called_back_has_docked_when_it_is_held(pilot):
+    late = (
+        pilot().fly("approach", (-0.1, 0.0, 0.0), (0.2, 0.0, 0.0)).fly("back_off", (0.25, 0.0, 0.0), reason="too far")
+    )
+    (attempt,) = late.fly("back_off", (0.3, 0.0, 0.0), latched=True).log()
+    assert (attempt.outcome, attempt.ended_s, attempt.reason) == ("contact", 0.04, "too far")
+
+
+def test_the_number_of_the_attempt_is_that_which_goes_on_or_was_the_last(pilot):
+    one, numbers = pilot(), []
+    for phase in ("join_up", "approach", "back_off", "pre_contact", "approach", "contact", "hold", "clear"):
+        numbers.append(one.fly(phase, AFT).referee.attempt)
+    assert numbers == [1, 1, 1, 1, 2, 2, 2, 2]
 
 
 @pytest.mark.parametrize(

@@ -9,18 +9,19 @@ from dockair.scenarios.loop import Flight
 from dockair.scenarios.schema import load_scenario
 
 STEP_S = 0.01
+DROGUE = np.array([-300.0, -40.0, 30.0])  # the world's origin is nobody's place
 
 
 @pytest.fixture
 def departed_s(make_truth):
     """Time at which a flight of 10 s departs; angle [rad] and the tip's place (y, z) across are functions of time."""
 
-    def watch(angle=lambda t: 0.05, across=lambda t: (0.0, 0.0), R_WT=None, limits=None):
+    def watch(angle=lambda t: 0.05, across=lambda t: (0.0, 0.0), behind=lambda t: 400.0, R_WT=None, limits=None):
         departure = Departure(limits)
         for t in np.arange(0.0, 10.0, STEP_S):
             R = np.eye(3) if R_WT is None else R_WT
-            p_WP = R @ np.array([-400.0, *across(t)])
-            departure.watch(make_truth(t, angle_of_attack_rad=angle(t), p_WP=p_WP, R_WT=R))
+            p_WP = DROGUE + R @ np.array([-behind(t), *across(t)])
+            departure.watch(make_truth(t, angle_of_attack_rad=angle(t), p_WP=p_WP, p_WD=DROGUE, R_WT=R))
         return departure.time_s
 
     return watch
@@ -70,9 +71,12 @@ def test_a_start_some_metres_aside_changes_nothing(departed_s):
 
 
 def test_far_behind_is_not_off_the_line_whichever_way_the_tanker_flies(departed_s):
-    """Behind by 400 m, after a turn by 60 degrees: the line is the tanker's, not the world's."""
-    R_WT = exp(np.array([0.0, 0.0, np.pi / 3]))
-    assert departed_s(R_WT=R_WT) is None
+    """To 404 m, after a turn by 60 degrees and in a climb: the line is the tanker's, not the world's."""
+    R_WT = exp(np.array([0.0, 0.0, np.pi / 3])) @ exp(np.array([0.0, -0.1, 0.0]))
+    behind = lambda t: 4.0 + 40.0 * t  # noqa: E731
+    assert departed_s(behind=behind, R_WT=R_WT) is None
+    aside = departed_s(behind=behind, across=lambda t: (21.0 * (t > 3.0), 0.0), R_WT=R_WT)
+    assert aside == pytest.approx(3.0, abs=2 * STEP_S)
 
 
 def test_limits_are_settings(departed_s):

@@ -13,7 +13,7 @@ SMALL = Window(500, 532, 900, 964)
 class Noting:
     """Stands where the camera stands; what it was asked for."""
 
-    def __init__(self, latency_s=lambda frame: 0.005):
+    def __init__(self, latency_s=lambda frame: 0.005 + 0.0 * frame.time_stamp_s):
         self.asked, self.latency_s = [], latency_s
 
     def expose(self, data, time_s, number, window, **how):
@@ -29,6 +29,16 @@ def test_only_what_was_asked_for_is_passed_on():
     exposures.begin(None, 0.02, 1, SMALL, 500e-6)
     assert camera.asked == [(0, {}), (1, {"exposure_s": 500e-6})]
     assert exposures.delivered(0.004) is None and exposures.delivered(0.005).time_stamp_s == 0.0
+
+
+def test_an_exposure_of_which_no_frame_comes_delays_nothing_and_delivers_nothing():
+    camera = Noting()
+    exposures, whole = ExposuresInTurn(camera), camera.expose
+    camera.expose = lambda data, time_s, number, window: None if number == 0 else whole(data, time_s, number, window)
+    exposures.begin(None, 0.0, 0, SMALL)
+    assert exposures.delivered(0.01) is None
+    exposures.begin(None, 0.02, 1, SMALL)
+    assert exposures.delivered(0.03).time_stamp_s == 0.02
 
 
 def test_a_late_transfer_delays_no_later_frame_for_good_where_camera_and_control_have_one_rate():

@@ -75,7 +75,9 @@ def test_without_a_valid_solution_there_is_no_bin(make_hand_made):
 
 def test_phases_are_listed_once_each_time_they_begin(make_hand_made):
     solutions, _ = _flown(make_hand_made(), 30)
-    flown = [replace(s, phase=name) for s, name in zip(solutions, 10 * ["a"] + 10 * ["b"] + 10 * ["a"], strict=True)]
+    says = [("a", "first")] + 9 * [("a", "later")] + 10 * [("b", "")] + 10 * [("a", "again")]
+    flown = [replace(s, phase=name, phase_reason=why) for s, (name, why) in zip(solutions, says, strict=True)]
     entries = timeline(flown)
     assert [entry.phase for entry in entries] == ["a", "b", "a"]
+    assert [entry.reason for entry in entries] == ["first", "", "again"]
     assert [entry.begun_s for entry in entries] == [flown[k].time_stamp_s for k in (0, 10, 20)]

@@ -1,9 +1,13 @@
 """What is read back from a message log is what was delivered, to the last bit."""
 
 import os
+import threading
+import time
+from contextlib import suppress
 from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 
 from dockair.errors import DockairError, MachineError
@@ -47,10 +51,29 @@ def test_messages_are_read_back_as_they_were_delivered(hand_made, tmp_path):
         for imu, frame, solution in ticks:
             log.append(imu, frame, solution)
     read = list(read_messages(tmp_path))
-    assert len(read) == 230  # more than two row groups
+    assert len(read) == len(list(read_estimates(tmp_path))) == 230  # more than two row groups
     for (imu, frame, _), messages in zip(ticks, read, strict=True):
         assert [_bits(sample) for sample in messages.imu] == [_bits(sample) for sample in imu]
         assert _bits(messages.frame) == _bits(frame)
+
+
+def test_without_pixels_a_frame_is_what_came_with_it_and_its_png(hand_made, tmp_path):
+    _, imu, frame, solution = hand_made.tick(2)
+    with MessageLog(tmp_path, NavigatorRecipe(class_name="a:B", sheets=hand_made.sheets)) as log:
+        log.append(imu, frame, solution)
+    (read,) = read_messages(tmp_path, pixels=False)
+    assert read.frame.pixels.size == 0
+    assert _bits(replace(read.frame, pixels=frame.pixels)) == _bits(frame)
+    np.testing.assert_array_equal(pixels_from_png(read.png), frame.pixels)
+
+
+def test_a_recording_of_before_there_were_announcements_and_lights_is_read(hand_made, tmp_path):
+    with MessageLog(tmp_path, NavigatorRecipe(class_name="a:B", sheets=hand_made.sheets)) as log:
+        for _, imu, frame, solution in hand_made.ticks(3):
+            log.append(imu, frame, solution)
+    path = tmp_path / message_log.MESSAGES
+    pq.write_table(pq.read_table(path).drop_columns(["announcement", "pod_signal"]), path)
+    assert [(tick.announcement, tick.signal) for tick in read_messages(tmp_path)] == 3 * [(None, None)]
 
 
 def test_a_folder_whose_name_is_no_utf8_takes_messages_and_gives_them_back(hand_made, tmp_path):
@@ -172,6 +195,34 @@ def test_a_full_disk_reaches_the_flight(hand_made, tmp_path, monkeypatch):
     _, imu, frame, solution = hand_made.tick(1)
     log.append(imu, frame, solution)
     with pytest.raises(MachineError, match="a disk that takes the recording; no space left on device"):
+        log.close()
+
+
+def test_a_flight_that_waits_for_the_encoder_goes_on_when_the_disk_refuses(hand_made, tmp_path, monkeypatch):
+    """The first tick is refused while the flight waits with its third: it is told, and not left waiting."""
+    waits = threading.Event()
+
+    def refuse(*_):
+        waits.wait(60.0)
+        raise OSError("no space left on device")
+
+    def fly():
+        with suppress(MachineError):
+            for _ in range(3):
+                log.append(imu, frame, solution)
+
+    monkeypatch.setattr(message_log, "_message_row", refuse)
+    monkeypatch.setattr(message_log, "QUEUE_TICKS", 1)
+    log = MessageLog(tmp_path, NavigatorRecipe(class_name="a:B", sheets=hand_made.sheets))
+    _, imu, frame, solution = hand_made.tick(1)
+    flight = threading.Thread(target=fly, daemon=True)
+    flight.start()
+    while not log._queue.full():
+        time.sleep(0.01)
+    waits.set()
+    flight.join(30.0)
+    assert not flight.is_alive()
+    with pytest.raises(MachineError, match="no space left on device"):
         log.close()
 
 

@@ -51,6 +51,8 @@ def test_errors_of_a_flight_are_those_put_in(make_hand_made):
     assert nav.attitude_rmse_deg == pytest.approx(np.degrees(0.01), rel=1e-9)
     assert nav.velocity_rmse_m_s == pytest.approx(0.0, abs=1e-15)
     assert nav.frames_used == 50
+    off = [replace(s, v_PD_B=s.v_PD_B + [0.1, -0.2, 0.2]) for s in log.solutions]
+    assert metrics.navigation_figures(off, log.truths, flight.sheets.mounting).velocity_rmse_m_s == pytest.approx(0.3)
 
 
 def test_nees_counts_errors_in_standard_deviations(make_hand_made):
@@ -58,6 +60,9 @@ def test_nees_counts_errors_in_standard_deviations(make_hand_made):
     flight = make_hand_made(sigma_m=0.01)
     log = _log(flight, 20)
     nav = metrics.navigation_figures(log.solutions, log.truths, flight.sheets.mounting)
+    assert nav.nees_mean == pytest.approx(1.29, rel=1e-9)
+    unknown = replace(log.solutions[-1], covariance=np.diag([1.0] * 8 + [-1.0]))  # no covariance: it says nothing
+    nav = metrics.navigation_figures([*log.solutions[:-1], unknown], log.truths, flight.sheets.mounting)
     assert nav.nees_mean == pytest.approx(1.29, rel=1e-9)
 
 
@@ -93,6 +98,18 @@ def test_the_attitude_error_is_the_rotation_that_mends_the_estimate(hand_made, a
     np.testing.assert_allclose(error[:3], angle * axis, atol=1e-9)
 
 
+def test_errors_of_place_and_velocity_are_true_less_believed_in_body_axes(make_truth, hand_made):
+    """The receiver heads along W's y: what lies along the world's y is ahead of it, what lies along -x to its left."""
+    R_WB = exp(np.array([0.0, 0.0, np.pi / 2]))
+    truth = make_truth(
+        1.0, R_WB=R_WB, p_WP=np.array([1.0, 2.0, 3.0]), p_WD=np.array([0.0, 6.0, 3.5]), v_WP=np.array([0.0, 1.2, 0.0]),
+        v_WD=np.array([-0.4, 0.3, 0.1]),
+    )  # fmt: skip
+    believed = replace(hand_made.tick(2)[3], R_BD=R_WB.T, p_PD_B=np.array([4.0, 1.1, 0.3]), v_PD_B=np.zeros(3))
+    error = metrics.state_error(believed, truth)
+    np.testing.assert_allclose(error, [0.0, 0.0, 0.0, 0.0, -0.1, 0.2, -0.9, 0.4, 0.1], atol=1e-12)
+
+
 def test_ticks_without_a_new_frame_or_a_valid_solution_do_not_count(hand_made):
     log = _log(hand_made, 10)
     solutions = [replace(s, valid=k != 5) for k, s in enumerate(log.solutions)]
@@ -121,6 +138,14 @@ def test_hold_and_disconnect_are_read_from_the_latch(hand_made):
     assert hold.take_in_max_m == pytest.approx(1.2)
     assert hold.coupling_force_max_n == 700.0
     assert disconnect.time_s == 8.5
+
+
+def test_the_take_in_of_a_hold_is_the_most_that_was_wound_in_from_full_trail_while_it_lasted(make_truth):
+    """0.3 m were wound in before the contact already, and 2 m are after it."""
+    wound = ((False, 0.2), (True, 0.3), (True, 1.1), (True, 0.7), (False, 2.0))
+    truths = [make_truth(0.01 * k, latched=held, reel_position_m=m) for k, (held, m) in enumerate(wound)]
+    hold, _ = hold_of(truths, 700.0)
+    assert hold is not None and hold.take_in_max_m == 1.1
 
 
 def test_the_pull_that_opened_the_coupling_is_the_largest(hand_made):
@@ -198,7 +223,23 @@ def test_attempts_contact_and_fuel_of_a_flight_come_from_the_referee_and_the_tru
     assert result.first_attempt and result.success and result.unsafe == () and result.cause == ""
     assert result.fuel_kg == log.truths[-1].fuel_kg
     assert not result.truth_navigation and result.sensing == "camera"
-    assert _summary(hand_made, log, sensing="truth").truth_navigation
+    perfect = _summary(hand_made, log, sensing="truth")
+    assert perfect.truth_navigation and perfect.nav_by_range == () and result.nav_by_range != ()
+
+
+def test_a_contact_in_the_second_attempt_is_a_success_and_none_of_the_first(hand_made):
+    """A first attempt of half a second, that was called back, before the one in which the probe is held until 8.5 s."""
+    hand_made.frame = lambda truth: None
+    log, referee = _log(hand_made, 900), Referee()
+    for k, (truth, solution) in enumerate(zip(log.truths, log.solutions, strict=True)):
+        log.solutions[k] = replace(solution, phase="approach") if k < 50 else solution
+        referee.watch(truth)
+        referee.judge(truth, log.solutions[k].phase, 60.0)
+    result = _summary(hand_made, log, referee=referee, outcome="contact")
+    assert [attempt.outcome for attempt in result.attempt_log] == ["given_up", "contact"]
+    assert (result.attempts, result.success, result.first_attempt) == (2, True, False)
+    assert result.cause == result.attempt_log[0].cause != ""
+    assert result.disconnect is not None and result.disconnect.time_s == 8.5
 
 
 def test_a_flight_that_never_approached_has_a_cause_without_an_attempt(hand_made):
@@ -212,6 +253,7 @@ def test_what_could_not_be_measured_is_null_and_not_nan(hand_made):
     assert "NaN" not in text
     assert json.loads(text)["nav"]["range_rmse_m"] is None
     assert json.loads(text)["contact"] is None
+    assert replace(_summary(hand_made, blind), wall_time_s=float("inf")).to_dict()["wall_time_s"] is None
 
 
 def test_a_heading_is_judged_by_how_far_the_receiver_turned_since_the_start(hand_made):
@@ -222,13 +264,14 @@ def test_a_heading_is_judged_by_how_far_the_receiver_turned_since_the_start(hand
     truths = [replace(t, R_WB=exp(np.array([0.0, 0.0, h])) @ t.R_WB) for t, h in headings]
     believed = zip(log.solutions, 1.01 * turned, strict=True)
     solutions = [replace(s, heading_rad=h, heading_sigma_rad=np.radians(1.0)) for s, h in believed]
-    solutions[0] = replace(solutions[0], heading_rad=float("nan"), heading_sigma_rad=float("nan"))
+    for k in range(21):  # none yet
+        solutions[k] = replace(solutions[k], heading_rad=float("nan"), heading_sigma_rad=float("nan"))
     figures = metrics.heading_figures(solutions, truths)
     assert figures.turned_deg == pytest.approx(400.0)
     assert figures.error_deg == figures.error_max_deg == pytest.approx(4.0)
     assert figures.sigma_deg == pytest.approx(1.0)
-    assert figures.error_rms_deg == pytest.approx(np.sqrt(np.mean((0.04 * np.arange(1, 101)) ** 2)))
-    assert figures.beyond_3_sigma == pytest.approx(0.25, abs=0.011)
+    assert figures.error_rms_deg == pytest.approx(np.sqrt(np.mean((0.04 * np.arange(21, 101)) ** 2)))
+    assert figures.beyond_3_sigma == pytest.approx(25 / 80, abs=1.01 / 80)  # at the 75th step it is 3 sigma
     assert metrics.heading_figures(log.solutions, log.truths) is None
 
 

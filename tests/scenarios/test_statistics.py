@@ -34,8 +34,9 @@ def test_at_both_limits_the_count_is_as_far_off_as_the_confidence_says(confidenc
 
 
 def test_none_and_all_leave_no_room_on_their_side_and_no_trial_says_nothing():
-    assert wilson_interval(0, 9)[0] == 0.0
-    assert wilson_interval(9, 9)[1] == 1.0
+    for trials in range(1, 100):  # exactly, where rounding would leave some 1e-17
+        assert wilson_interval(0, trials)[0] == 0.0
+        assert wilson_interval(trials, trials)[1] == 1.0
     assert wilson_interval(0, 0) == (0.0, 1.0)
 
 
