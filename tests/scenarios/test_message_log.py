@@ -215,9 +215,10 @@ def test_a_flight_that_waits_for_the_encoder_goes_on_when_the_disk_refuses(hand_
     monkeypatch.setattr(message_log, "QUEUE_TICKS", 1)
     log = MessageLog(tmp_path, NavigatorRecipe(class_name="a:B", sheets=hand_made.sheets))
     _, imu, frame, solution = hand_made.tick(1)
-    flight = threading.Thread(target=fly, daemon=True)
+    flight, puts, put = threading.Thread(target=fly, daemon=True), [], log._queue.put
+    monkeypatch.setattr(log._queue, "put", lambda entry: (puts.append(entry), put(entry)))
     flight.start()
-    while not log._queue.full():
+    while len(puts) < 3:
         time.sleep(0.01)
     waits.set()
     flight.join(30.0)

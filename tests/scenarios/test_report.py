@@ -394,11 +394,41 @@ def test_only_the_librarys_scenarios_as_they_are_written_are_held_to_their_claim
 
 def test_what_is_outside_a_pictures_axes_is_counted_and_shown_at_its_edge():
     far = [_attempt(1, "miss", 0.9, "gust"), _attempt(2, "given_up", 2.0, "gust"), _attempt(3)]
-    rows = [_row(0, attempts=far), _row(1, closure_speed_m_s=3.4)]
+    rows = [_row(0, attempts=far), _row(1, closure_speed_m_s=3.4), _row(2, closure_speed_m_s=-0.1)]
     text = panels(groups_of(rows)[0])
     assert "seen from behind; 2 beyond, on the frame" in text
-    assert "limit; 1 beyond, in the end bins" in text
+    assert "limit; 2 beyond, in the end bins" in text
     assert "beyond" not in panels(groups_of([_row(0)])[0])
+
+
+def _axes_of(group, monkeypatch):
+    """The panels of a group by their titles, not yet drawn."""
+    with monkeypatch.context() as patch:
+        patch.setattr(figures, "as_svg", lambda figure, name: figure)
+        return {ax.get_title(loc="left"): ax for ax in panels(group).axes}
+
+
+def test_panels_show_places_from_behind_and_errors_in_the_middle_of_their_bins(monkeypatch):
+    """A tip 0.1 m to the left of the axis stands left of it in the picture too, as for who flies behind."""
+    sizes = {"range_rmse_m": 2e-3, "range_sigma_m": 3e-3, "lateral_rmse_m": 4e-3, "lateral_sigma_m": 5e-3}
+    others = {"range_bias_m": 0.0, "attitude_rmse_deg": 0.1, "attitude_sigma_deg": 0.1}
+    bins = json.dumps([{"low_m": 2.0, "high_m": 3.0, "count": 4} | sizes | others])
+    heading = {"heading_sigma_deg": 1.0, "heading_error_rms_deg": 1.0, "heading_error_max_deg": 3.0}
+    rows = [
+        _row(0, attempts=[_attempt(1, offset_m=0.1) | {"up_m": 0.05}], nav_by_range=bins, heading_error_deg=-2.0),
+        _row(1, attempts=[_attempt(1, "miss", 0.3, "gust"), _attempt(2)], heading_error_deg=0.5),
+    ]
+    axes = _axes_of(groups_of([row | heading for row in rows])[0], monkeypatch)
+    contacts = axes["the tip in the ring's plane, or where it came nearest"].collections[0]
+    np.testing.assert_allclose(contacts.get_offsets()[0], [-0.1, 0.05])
+    known = axes["navigation error (lines), expected (dashed)"].lines
+    drawn = [(line.get_linestyle(), *line.get_xdata(), *line.get_ydata()) for line in known]
+    assert drawn == [("-", 2.5, 2.0), ("--", 2.5, 3.0), ("-", 2.5, 4.0), ("--", 2.5, 5.0)]
+    tries = axes["contact inside the limits within n attempts"].lines
+    points = [(*line.get_xdata(), *line.get_ydata()) for line in tries if line.get_marker() == "o"]
+    assert points == [(1, 50.0), (2, 100.0)]
+    at_end = axes["own heading against the truth, 2 flights"].lines[0].get_xdata()
+    assert [size for size in at_end if np.isfinite(size)][-2:] == [0.5, 2.0]
 
 
 def test_errors_by_range_are_pooled_by_their_squares():
@@ -458,6 +488,28 @@ def test_evidence_is_plain_json_with_counts_of_every_group():
     assert camera["first_attempt"]["count"] == 1 and camera["failed_seeds"] == [1]
     assert camera["causes_of_failed_attempts"] == {"gust": 1}
     assert truth["shortfalls"] is None
+
+
+def test_evidence_counts_contacts_at_their_limits_and_every_flight_that_was_asked_for():
+    """Four contacts, of which the second and the third lie on limits; a touch that was unsafe; one that docked late."""
+    late = [_attempt(1, "breakaway", 0.4, "gust"), _attempt(2)]
+    fuel = {"fuel_kg": 900.0, "timeline": json.dumps([{"phase": "disconnect", "begun_s": 40.0, "reason": "refuelled"}])}
+    rows = [
+        _row(0, radial_offset_m=0.05, closure_speed_m_s=0.99, attempts=late, **fuel),
+        _row(1, radial_offset_m=0.15, closure_speed_m_s=1.0),
+        _row(2, radial_offset_m=0.1, closure_speed_m_s=1.5, **fuel),
+        _row(3, attempts=[_attempt(1, "contact", 0.16, "control_limit")], closure_speed_m_s=1.51),
+        _row(4, attempts=[_attempt(1, "rim_strike", 0.3, "gust")], unsafe="touch at 2.70 m/s"),
+        _row(5, error="ValueError: x", outcome="error", success=False, first_attempt=False, **fuel),
+    ]
+    (group,) = evidence_of([_campaign(rows)])["groups"]
+    shares = ("first_attempt", "success", "refuelled", "inside_capture_radius", "closing_1_0_to_1_5_m_s")
+    assert [(group[name]["count"], group[name]["of"]) for name in shares] == [(2, 6), (3, 6), (2, 6), (3, 4), (2, 4)]
+    assert group["radial_offset_median_m"] == 0.125
+    assert group["radial_offset_90_m"] == pytest.approx(0.15 + 0.7 * 0.01)  # between the third and the fourth
+    assert group["closure_speed_max_m_s"] == 1.51
+    assert (group["unsafe_seeds"], group["failed_seeds"], group["errors"]) == ([4], [0, 3, 4], 1)
+    assert (group["flights"], group["seeds"], group["independent"]) == (6, 6, True)
 
 
 def test_evidence_says_what_each_flight_had_drawn():
