@@ -211,12 +211,14 @@ def fly(
     flight = Flight(scenario, seed, full_frames=record == "full", overlap=overlap)
     try:
         with Recorder(flight, out, record) as recorder:
-            while (tick := flight.step()).outcome is None:
+            outcome = None
+            while outcome is None:
+                tick = flight.step()
                 recorder.append(tick)
                 if progress is not None:
                     progress(tick.truth, tick.solution)
-            recorder.append(tick)
+                outcome = tick.outcome
             recorder.settle()
-            return recorder.finish(flight, tick.outcome, seed, time.perf_counter() - begun)
+            return recorder.finish(flight, outcome, seed, time.perf_counter() - begun)
     finally:
         flight.close()

@@ -40,3 +40,11 @@ def test_a_scenario_is_loaded_by_name_with_a_mapping(arguments, where):
 def test_rows_are_read_from_a_folder_named_by_text(tmp_path):
     with pytest.raises(DockairError, match="expected the folder of a campaign"):
         rows_of(str(tmp_path))
+
+
+def test_progress_is_told_of_every_control_tick_and_of_the_last_one_too():
+    told = []
+    short = load_scenario("truth_navigation", {"flight.duration_s": 0.05})
+    result = fly(short, progress=lambda truth, solution: told.append((truth.time_s, solution.time_stamp_s)))
+    assert told == pytest.approx(np.tile(0.01 * np.arange(1, 6), (2, 1)).T)
+    assert (result.outcome, result.duration_s) == ("timeout", told[-1][0])
