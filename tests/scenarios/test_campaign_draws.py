@@ -56,6 +56,9 @@ def test_a_grid_is_every_combination_and_meets_both_ends():
         (pytest.approx(0.5), True), (pytest.approx(0.5), False), (0.7, True), (0.7, False),
     ]  # fmt: skip
     assert grid({}, 1) == [{}]
+    for low, high, log in ((0.3, 0.9, False), (-0.7, 0.1, False), (0.3, 0.9, True), (0.01, 7.0, True)):
+        ends = grid({"a": draw(low=low, high=high, log=log, points=2)}, 2)
+        assert ends == [{"a": low}, {"a": high}]  # to the bit: else the upper one may lie outside a key's range
 
 
 def test_a_logarithmic_grid_has_equal_ratios():

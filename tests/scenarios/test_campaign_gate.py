@@ -84,6 +84,8 @@ def test_one_unsafe_flight_fails_the_gate_and_so_does_one_error():
     broken = judge(gate, rows(5, 5) + rows(0, 1, error="ValueError: no", outcome="error"))
     assert broken.reasons == ("1 flight ended in an error, allowed 0",)
     assert judge(Gate(errors_max=1), rows(0, 1, error="x", outcome="error")).passed
+    assert judge(Gate(unsafe_max=1), rows(1, 1, unsafe="3.1 m/s")).passed
+    assert judge(Gate(unsafe_max=1), rows(2, 2, unsafe="3.1 m/s")).reasons == ("2 unsafe flights, allowed 1",)
 
 
 def test_a_flight_that_ends_in_an_error_has_not_docked():
@@ -96,6 +98,15 @@ def test_a_gate_that_could_never_fail_is_refused_with_the_flights_it_needs():
     with pytest.raises(DockairError, match="gate.success_rate: expected 4 flights or more"):
         require_power(gate, rows(0, 3), "gate")
     require_power(gate, rows(0, 4), "gate")
+
+
+def test_of_two_rates_each_needs_the_flights_of_half_the_false_alarm():
+    """0.3^4 = 0.0081 is below 0.01 and not below 0.005, 0.3^5 = 0.0024 is."""
+    require_power(Gate(success_rate=0.7, false_alarm=0.01), rows(0, 4), "gate")
+    both = Gate(success_rate=0.7, first_attempt_rate=0.7, false_alarm=0.01)
+    with pytest.raises(DockairError, match="gate.success_rate: expected 5 flights or more"):
+        require_power(both, rows(0, 4), "gate")
+    require_power(both, rows(0, 5), "gate")
 
 
 def test_a_gate_that_no_number_of_flights_could_fail_is_refused_without_a_number():

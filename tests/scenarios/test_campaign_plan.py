@@ -10,6 +10,7 @@ import pytest
 from dockair.errors import DockairError
 from dockair.scenarios.campaign.jobs import as_toml, jobs_of
 from dockair.scenarios.campaign.plan_file import PlanFile, plan_names
+from dockair.scenarios.campaign.points import refuse_too_many
 from dockair.scenarios.scenario_file import scenario_names
 from dockair.scenarios.schema import load_scenario
 from dockair.scenarios.toml_files import toml_value
@@ -158,6 +159,19 @@ high = 0.3
 def test_scenarios_are_flown_with_the_same_points(plan):
     jobs = jobs_of(plan('scenarios = ["default", "racetrack"]\nseeds = 5\n[draw."start.aft_m"]\nlow = 3.0\nhigh = 5.0'))
     assert [job.drawn for job in jobs[:5]] == [job.drawn for job in jobs[5:]]
+
+
+@pytest.mark.parametrize("points", ["", "draws = 3\n"])
+@pytest.mark.parametrize("sampler", ["random", "latin_hypercube"])
+def test_another_seed_of_the_draws_draws_other_points_for_the_same_flights(plan, sampler, points):
+    def drawn(seed):
+        head = f'scenarios = ["default"]\nseeds = 2\nsampler = "{sampler}"\ndraw_seed = {seed}\n{points}'
+        jobs = jobs_of(plan(f'{head}[draw."start.aft_m"]\nlow = 3.0\nhigh = 5.0'))
+        return [(job.seed, job.drawn["start.aft_m"]) for job in jobs]
+
+    assert drawn(0) == drawn(0)
+    assert [seed for seed, _ in drawn(0)] == [seed for seed, _ in drawn(1)]
+    assert not {place for _, place in drawn(0)} & {place for _, place in drawn(1)}
 
 
 def test_a_plan_with_a_seed_of_its_draws_is_flown_on_a_grid_where_the_command_line_says_so(plan):
@@ -502,6 +516,10 @@ def test_one_scenario_in_two_files_or_under_two_names_is_a_plan(plan, two_files)
         ("seeds = 100000\ndraws = 100000", "p.toml: draws: expected up to 200000 flights, got 10000000000"),
         ('seeds = 9\nsampler = "grid"', "p.toml: draw: expected up to 200000 flights, got 900000000"),
         ('scenarios = ["*"]\nseeds = 100000', "p.toml: seeds: expected up to 200000 flights, got "),
+        (
+            'scenarios = ["default", { scenario = "racetrack", seeds = 100000 }]\nseeds = 1\ndraws = 2',
+            "p.toml: draws: expected up to 200000 flights, got 200002",
+        ),
     ],
 )
 def test_too_many_flights_are_refused_before_any_is_made(plan, monkeypatch, text, said):
@@ -514,6 +532,11 @@ def test_too_many_flights_are_refused_before_any_is_made(plan, monkeypatch, text
     if "grid" not in text:
         ranges = ranges.replace("points = 10000", "")
     assert said in refusal_of(plan, f"{scenarios}{text}\n{ranges}")
+
+
+def test_as_many_flights_as_are_allowed_are_not_too_many(plan):
+    half = '{{ scenario = "{}", seeds = 100000 }}'
+    refuse_too_many(plan(f"scenarios = [{half.format('default')}, {half.format('racetrack')}]"))
 
 
 def test_paths_of_sheets_in_a_plan_are_taken_from_its_folder_as_those_of_scenarios(plan, monkeypatch, tmp_path):
