@@ -12,9 +12,9 @@ attitude) for one unit of what it shows is at most, over all directions b,
 
     slope_i = largest singular value of rows(K_i) C_i^-T,     S_i = C_i C_i'              (3)
 
-An LED that is taken to be d (3,) off its place moves the pose as the same error of its ray would,
+An LED that stands d (3,) from the place that it is taken to have moves the pose as the same error of its ray would,
 
-    sum_i P A_i' A_i [0 R]' d_i                                                                           (4)
+    sum_i P A_i' A_i [0 R']' d_i                                                                          (4)
 
 Source: R. G. Brown, A baseline GPS RAIM scheme, 1992 (slope), W. Baarda, A testing procedure for use in geodetic
 networks, 1968 (local test); a GPS satellite has one axis, an LED two.

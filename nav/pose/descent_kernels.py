@@ -26,7 +26,7 @@ def descend(
 
     Args:
         measured: (n, 3) unit vectors b_i in camera axes, or (n, 2) pixels.
-        weights: (n, 3, 3) or (n, 2, 2) W_i.
+        weights: (n, 3, 3) W_i, of pixels with a third row and column of zeros.
         points: (n, 3) LEDs in drogue axes [m].
         lens: (8,) focal length, centre u, v [px], k1, k2, p1, p2, k3; used with pixels.
         R_CD: (3, 3) start.

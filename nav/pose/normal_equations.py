@@ -30,7 +30,7 @@ class Problem(NamedTuple):
     """What is minimised."""
 
     measured: Array  # (n, 3) rays b, or (n, 2) pixels
-    weights: Array  # (n, m, m)
+    weights: Array  # (n, 3, 3), of pixels with a third row and column of zeros
     points: Array  # (n, 3)
     lens: Array  # (8,) focal length, centre (2), k1, k2, p1, p2, k3 [px, 1]
     prior_p: Array  # (3,) MRP

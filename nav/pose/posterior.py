@@ -1,8 +1,8 @@
 """Prior belief about the pose and one frame, brought together.
 
-A frame is taken whole: the cost of its lines of sight plus that of the prior is minimised (`model`, Eq. (3)); no
-average of two Gaussians is formed. Far away or nearly frontal the lines of sight are a bent valley with two floors
-(`planar`): a ring that noise makes look tilted looks nearer too, by a square law that no covariance of one floor
+A frame is taken whole: the cost of its lines of sight plus that of the prior is minimised (`normal_equations`, Eq.
+(1)); no average of two Gaussians is formed. Far away or nearly frontal the lines of sight are a bent valley with two
+floors (`planar`): a ring that noise makes look tilted looks nearer too, by a square law that no covariance of one floor
 describes. The prior chooses the floor and the place along the valley, which also keeps the range free of bias: frontal
 ring, 20 m, 0.1 px, 1 degree of prior: 2 mm; the average of two Gaussians 11 mm, the frame alone -23 mm.
 Where the prior cannot choose, each floor k with cost J_k and covariance P_k is returned with its evidence (Laplace)

@@ -117,6 +117,16 @@ def test_what_was_measured_fades_also_while_nothing_is():
     assert coasting.sigma_m(HORIZON_S) == pytest.approx(0.1, rel=0.01)
 
 
+def test_an_answer_after_a_pause_weighs_no_more_than_one_of_the_horizon():
+    """The answer before it, and the assumption, have faded to 1/e of two horizons: the prior is as long as one."""
+    settings, coasting = CoastingSettings(), CoastingError()
+    coasting.take(np.zeros(3), HORIZON_S, 10.0)
+    coasting.take(np.full(3, 0.1), HORIZON_S, 10.0 + settings.memory_s)
+    kept_s = (settings.prior_s + HORIZON_S) / np.e
+    squares = settings.prior_s / np.e * settings.sigma_m**2 + HORIZON_S * 0.1**2
+    assert coasting.sigma_m(HORIZON_S) ** 2 == pytest.approx(squares / (kept_s + HORIZON_S))
+
+
 def test_what_was_not_foretold_says_nothing():
     coasting = asked(np.full(3, 0.02))
     before = coasting.sigma_m(HORIZON_S)

@@ -566,7 +566,7 @@ def test_contact_is_usable_at_2_m_and_not_at_30_m():
 def test_a_frame_of_another_age_than_recent_is_a_doubt(age_s):
     near = checked(pixels_at(*pose_at(2.0, 5.0), seed=9))
     for in_basket in (False, True):
-        assert usable_for_contact(near, 0.39, in_basket=in_basket).usable
+        assert usable_for_contact(near, ContactLimits().age_s, in_basket=in_basket).usable
         assert usable_for_contact(near, age_s, in_basket=in_basket).doubts == (Doubt.AGE,)
 
 
@@ -591,6 +591,17 @@ def test_the_basket_holds_the_tip_sideways_but_not_along():
         (ProtectionLevels(range_m=1.0, lateral_m=0.01), ((Doubt.RANGE,), (Doubt.RANGE,))),
     ):
         assert tuple(usable_for_contact(near, 0.1, levels=levels, in_basket=i).doubts for i in (False, True)) == doubts
+
+
+def test_a_level_that_is_no_number_is_a_doubt_and_one_at_its_limit_is_none():
+    near, limits = checked(pixels_at(*pose_at(2.0, 5.0), seed=9)), ContactLimits()
+    for range_m, lateral_m, doubts in (
+        (np.nan, limits.lateral_m, (Doubt.RANGE,)),
+        (limits.range_m, np.nan, (Doubt.LATERAL,)),
+        (limits.range_m, limits.lateral_m, ()),
+    ):
+        levels = ProtectionLevels(range_m=range_m, lateral_m=lateral_m)
+        assert usable_for_contact(near, 0.1, levels=levels).doubts == doubts
 
 
 def test_a_newer_frame_that_contradicts_is_a_doubt_but_in_the_basket():
