@@ -118,16 +118,16 @@ class RingFinder:
         if not is_late:
             self._tracker.update(found)
         self.status = f"ring {found.status.value}"
+        members, numbers, few = found.members, found.led_numbers, False
         if found.status is not IdentificationStatus.FOUND:
             if not is_late and not self._shown(expected_px, frame.window):
                 self._tracker.lose()
             members, numbers = _NONE, _NONE
             if followed and (found.status is IdentificationStatus.NOT_FOUND or not self._code.says_something):
                 members, numbers = self._named_singly(blobs, frame.time_stamp_s)
-            self._few = len(members) > 0
-            return _named(blobs, members, numbers, frame.time_stamp_s)
-        self._few = False
-        return _named(blobs, found.members, found.led_numbers, frame.time_stamp_s)
+            few = len(members) > 0
+        self._few = self._few if is_late else few
+        return _named(blobs, members, numbers, frame.time_stamp_s)
 
     def window(self, time_s: float) -> Window | None:
         """What the camera should read at its next exposure, the first after a time; None for the full frame."""
