@@ -11,7 +11,9 @@ from scipy.stats import chi2
 from dockair.calibration import Camera, LedRing
 from dockair.errors import DockairError
 from dockair.nav.pose import model
+from dockair.nav.pose.difference import pose_difference
 from dockair.nav.pose.estimate import PoseEstimate, PoseOptions, PoseStatus, solve_pose
+from dockair.nav.pose.levenberg_marquardt import levenberg_marquardt
 from dockair.nav.pose.measurement import lens_of
 from dockair.nav.pose.prior import AttitudePrior, DirectionPrior, PosePrior
 from dockair.rotations import Array, exp, log, matrix_from_yaw_pitch_roll, mrp_from_matrix
@@ -176,6 +178,15 @@ def test_the_other_minimum_is_found_from_either_start():
     assert both > 180
 
 
+def test_a_second_minimum_within_a_sigma_of_the_first_is_one():
+    R, p = tilted(2.5, 20.0)
+    pose = solve_pose(pixels_of(R, p), RING, CAMERA, sigma_px=0.3)
+    other = pose.alternative
+    assert other is not None
+    d = pose_difference(other.R_CD, other.p_CD, pose.R_CD, pose.p_CD)
+    assert 0.1 < d @ np.linalg.solve(pose.covariance, d) < 1.0
+
+
 def test_minima_are_the_same_two_however_large_the_noise_is_said_to_be():
     """20 m, 4 degrees: with 0.4 px they are two sigma apart, and still two."""
     R, p = tilted(4.0, 20.0)
@@ -315,6 +326,21 @@ def test_reprojection_ratio_and_ambiguity_follow_the_two_minima():
         assert pose.ambiguous == (pose.alternative.chi2 - pose.chi2 < 25.0)
         ratios.append(pose.reprojection_ratio)
     assert ratios[0] > 0.9 > 0.2 > ratios[1] > 0.0
+
+
+def test_two_minima_without_residuals_look_alike():
+    pose = solve_pose(pixels_of(*tilted(5.0, 20.0)), RING, CAMERA)
+    assert pose.alternative is not None
+    exact, other = (replace(end, led_chi2=np.zeros(8)) for end in (pose, pose.alternative))
+    assert replace(exact, alternative=other).reprojection_ratio == 1.0
+    assert replace(exact, alternative=pose.alternative).reprojection_ratio == 0.0
+
+
+def test_the_iterations_are_those_of_the_descent_that_led_to_the_pose():
+    R, p = tilted(15.0, 6.0)
+    for start in ((R, p), (exp(np.array([0.3, -0.2, 0.4])) @ R, 1.5 * p)):
+        pose = solve_pose(pixels_of(R, p), RING, CAMERA, initial=start)
+        assert pose.iterations == levenberg_marquardt(pose.measurement, *start).iterations > 0
 
 
 @pytest.mark.parametrize(("more", "ambiguous"), [(24.9, True), (25.1, False), (-1000.0, True)])

@@ -38,6 +38,16 @@ def test_where_one_minimum_is_far_better_it_is_that_one():
     np.testing.assert_allclose(mean.covariance, pose.covariance, rtol=1e-9)
 
 
+def test_it_is_that_one_too_where_noise_is_far_larger_than_it_is_said_to_be():
+    """Costs of thousands: the weights exp(-J/2) are below the least number that there is."""
+    _, _, pose = frame(20.0, 10.0, np.random.default_rng(3))
+    pixels = CAMERA.pixels_from_points(pose.measurement.rays)
+    pose = solve_pose(pixels, RING, CAMERA, sigma_px=1e-3)
+    assert pose.alternative is not None and pose.cost > 3000.0
+    mean = expectation(pose)
+    np.testing.assert_allclose(pose_difference(mean.R_CD, mean.p_CD, pose.R_CD, pose.p_CD), 0.0, atol=1e-9)
+
+
 def test_two_equal_minima_give_the_middle_and_their_distance_as_its_uncertainty():
     """20 m, 10 degrees, costs set alike: tilt 0 with a sigma of 10 degrees; the pass costs hundreds, has no say."""
     _, _, pose = frame(20.0, 10.0)

@@ -21,6 +21,7 @@ from dockair.nav.integrity.sensitivity import ATTITUDE, LATERAL, RANGE, moved_by
 from dockair.nav.pose.difference import pose_difference
 from dockair.nav.pose.estimate import PoseOptions, PoseStatus, solve_pose
 from dockair.nav.pose.measurement import lines_of_sight_from_pixels
+from dockair.nav.pose.planar import mirrored
 from dockair.nav.pose.prior import AttitudePrior, DirectionPrior, PosePrior
 from dockair.rotations import Array, exp, log, skew
 
@@ -163,6 +164,16 @@ def test_a_fault_that_no_other_led_would_show_has_no_end_of_a_slope_and_no_local
     covariance[known:, known:] = np.linalg.inv(information[known:, known:])
     found = sensitivity(sight, R, p, covariance)
     assert np.isinf(found.slopes).all() and not found.local_chi2.any()
+
+
+def test_of_three_leds_none_shows_a_fault_whatever_rounding_leaves():
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        (R, p), leds = pose_at(rng.uniform(2.0, 25.0), rng.uniform(2.0, 30.0)), rng.choice(8, 3, replace=False)
+        pixels = pixels_at(R, p, seed, RING[leds])
+        pose = solve_pose(pixels, RING[leds], CAMERA, sigma_px=SIGMA_PX, initial=(R, p))
+        found = sensitivity(pose.measurement, pose.R_CD, pose.p_CD, pose.covariance)
+        assert np.isinf(found.slopes).all() and not found.local_chi2.any()
 
 
 @pytest.mark.parametrize(("range_m", "seen"), [(3.0, 8), (7.0, 8), (7.0, 5)])
@@ -485,6 +496,39 @@ def test_with_a_prior_the_pose_is_solved_with_it_and_three_leds_are_tested():
     assert good.status is IntegrityStatus.CONSISTENT and good.threshold == pytest.approx(chi2.isf(1e-4, 6))
     assert good.levels.lateral_m < 0.05 and np.linalg.norm(log(R @ good.pose.R_CD.T)) < np.deg2rad(4.0)
     assert (bad.status, bad.led) == (IntegrityStatus.EXCLUDED, 2)
+
+
+def test_three_leds_are_believed_where_the_prior_has_them_whichever_of_their_poses_was_solved():
+    """Three LEDs have up to four poses. The frame has no noise: at the true one neither it nor the prior costs."""
+    elsewhere = 0
+    for seed in (44, 75, 83, 142):
+        rng = np.random.default_rng(seed)
+        tilt = rng.uniform(1.3, 8.0), rng.uniform(0.0, 35.0)
+        R, p = pose_at(*tilt, (0.1 * rng.normal(), 0.05 * rng.normal()))
+        points = RING[np.sort(rng.choice(8, 3, replace=False))]
+        start = exp(rng.normal(0.0, 1.0, 3)) @ R, p
+        pose = solve_pose(pixels_at(R, p, points=points), points, CAMERA, sigma_px=SIGMA_PX, initial=start)
+        elsewhere += np.linalg.norm(log(pose.R_CD @ R.T)) > 0.2
+        prior = AttitudePrior(R_CD=R, information=np.eye(3) / np.deg2rad(3.0) ** 2)
+        result = check_integrity(pose, prior)
+        assert result.status is IntegrityStatus.CONSISTENT and result.chi2 < 1e-6
+        np.testing.assert_allclose(result.pose.R_CD, R, atol=1e-6)
+    assert elsewhere == 4
+
+
+def test_of_two_minima_that_pass_the_start_decides_or_with_a_prior_their_cost():
+    """20 m, 12 degrees: pixels of the mirror image, a start or a prior at the pose."""
+    R, p = pose_at(20.0, 12.0)
+    mirror = mirrored(R, p, RING)
+    pixels = pixels_at(*mirror)
+    started = check_integrity(solve_pose(pixels, RING, CAMERA, sigma_px=SIGMA_PX, initial=(R, p)))
+    helped = checked(pixels, prior=AttitudePrior(R_CD=R, information=np.eye(3) / np.deg2rad(6.0) ** 2))
+    for result in (started, helped):
+        pose, other = result.pose, result.pose.alternative
+        assert result.status is IntegrityStatus.CONSISTENT and other.cost < result.threshold
+        assert np.linalg.norm(log(pose.R_CD @ R.T)) < 0.01 < np.linalg.norm(log(other.R_CD @ R.T))
+    assert started.chi2 > started.pose.alternative.cost + 5.0
+    assert helped.chi2 < helped.pose.alternative.cost - 5.0
 
 
 def test_a_start_that_led_to_the_higher_minimum_does_not_make_a_good_frame_bad():

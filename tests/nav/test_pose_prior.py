@@ -138,10 +138,15 @@ def test_a_covariance_that_is_turned_into_other_axes_is_symmetric_but_for_roundi
         (lambda: DirectionPrior(axis_C=2.0 * X, axis_D=X, sigma_rad=0.1), "prior.axis_C"),
         (lambda: DirectionPrior(axis_C=X, axis_D=np.eye(3), sigma_rad=0.1), "prior.axis_D"),
         (lambda: DirectionPrior(axis_C=X, axis_D=X, sigma_rad=0.0), "prior.sigma_rad"),
+        (lambda: DirectionPrior(axis_C=X, axis_D=X, sigma_rad=np.inf), "prior.sigma_rad"),
         (lambda: PosePrior(R_CD=np.eye(3), p_CD=8.0 * X, covariance=np.zeros((6, 6))).terms, "prior.covariance"),
         (lambda: PosePrior(R_CD=np.eye(3), p_CD=8.0 * X, covariance=-np.eye(6)).terms, "prior.covariance"),
         (
             lambda: PosePrior(R_CD=np.eye(3), p_CD=X, covariance=np.eye(6) + 0.1 * np.eye(6, k=1)).terms,
+            "prior.covariance",
+        ),
+        (
+            lambda: PosePrior(R_CD=np.eye(3), p_CD=X, covariance=1e-9 * (np.eye(6) + 0.1 * np.eye(6, k=1))).terms,
             "prior.covariance",
         ),
         (lambda: PosePrior(R_CD=np.eye(3), p_CD=X, covariance=np.full((6, 6), np.nan)).terms, "prior.covariance"),

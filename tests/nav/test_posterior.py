@@ -103,6 +103,14 @@ def test_side_that_the_prior_dislikes_stays_possible_when_its_floor_is_filled_up
     assert min(distances) < 2.5
 
 
+def test_an_average_within_three_sigma_of_a_floor_is_no_hypothesis_beside_it():
+    """20 m, frontal, 1 degree of prior: floor and average are apart by what no Gaussian describes, and are one."""
+    R, p = np.eye(3), np.array([20.0, 0.0, 0.0])
+    prior = PosePrior(R_CD=R, p_CD=p, covariance=np.diag([np.deg2rad(1.0) ** 2] * 3 + [1.0] * 3))
+    for seed in range(5):
+        assert len(posteriors(prior, frame(R, p, np.random.default_rng(seed), 0.1))) == 1
+
+
 def test_pose_without_lines_of_sight_is_averaged_as_a_gaussian():
     rng = np.random.default_rng(4)
     R, p = matrix_from_yaw_pitch_roll(0.0, 0.35, 0.1), np.array([5.0, 0.2, -0.1])
