@@ -109,7 +109,7 @@ def _by_place(points: Array, fit: RingFit, code: Code, density: float) -> NDArra
     free = [j for j in every if (fit.candidate[(j + displaced) % SLOTS] < 0).all()]
     hits = np.array([len(displaced_leds(points, fit, code, int(j))) for j in free])
     chance = density * np.pi * (code.settings.reach * fit.tolerance_px) ** 2 * SLOTS * len(displaced)
-    if not len(hits) or hits.max() == 0 or chance > code.settings.max_chance_hits:
+    if not len(hits) or chance > code.settings.max_chance_hits:
         return np.array(free, np.int64)
     return np.asarray(np.array(free, np.int64)[hits == hits.max()])
 

@@ -35,6 +35,29 @@ def test_the_ratio_is_the_integral_of_the_formula(members):
     assert ratios(np.exp(x), range(members))[0][0] == pytest.approx(expected, rel=2e-3)
 
 
+def test_the_integral_holds_also_where_no_candidate_is_brighter_or_fainter_than_the_ring():
+    """Eight LEDs alike and nothing else: q is that of the prior, and the integrand ends a sigma from them."""
+    s = SETTINGS
+
+    def integrand(mu):
+        r = s.outliers + (1.0 - s.outliers) * norm.pdf(mu, 0.0, s.sigma) * s.prior_range
+        return r**8 / s.mean_range
+
+    expected = quad(integrand, -6.0 * s.sigma, 6.0 * s.sigma, epsrel=1e-9)[0]
+    assert ratios(np.full(8, 50.0), range(8))[0][0] == pytest.approx(expected, rel=2e-3)
+
+
+@pytest.mark.parametrize("ends", [(-7.0, 7.0), (-30.0, 7.0), (-7.0, 30.0)])
+def test_a_blob_farther_off_than_the_range_of_means_counts_as_at_its_end(ends):
+    """About the median; so the ring's own ratio does not depend on how far off it is."""
+    ring = np.random.default_rng(7).normal(0.0, 0.3, 9)
+    ring -= np.median(ring)
+    L, L_i = ratios(np.exp([*ring, *ends]), range(9)[:8])
+    expected, expected_i = ratios(np.exp([*ring, -7.0, 7.0]), range(9)[:8])
+    assert L[0] == pytest.approx(expected[0]) and L[0] > 10.0
+    np.testing.assert_allclose(L_i, expected_i)
+
+
 def test_the_ratio_of_one_member_is_that_of_the_ring_with_and_without_it_at_the_same_clutter():
     """Eq. (2). A blob whose flux is unknown is in no q, so that it can be taken out without another effect."""
     flux = np.array([1.0, 1.1, 0.9, 1.2, 4.0, 0.1, 20.0, 0.5])

@@ -33,6 +33,40 @@ def test_false_rings_are_hypotheses_times_ways_times_chance(count, ways):
     assert log10_false_rings_of_one(1000, count, 1e-3) == pytest.approx(float(log10_false_rings(1000, count, 1e-3)))
 
 
+@pytest.mark.parametrize("tested", [0, 1, 1000])
+@pytest.mark.parametrize("p", [0.0, 1e-13, 2.0])
+def test_false_rings_are_finite_without_hypotheses_and_without_clutter(tested, p):
+    """At least one hypothesis and a chance of 1e-12, at most of 1."""
+    expected = np.log10(max(tested, 1) * 10 * min(max(p, 1e-12), 1.0) ** 2)
+    assert log10_false_rings(tested, 5, p) == pytest.approx(expected)
+    assert log10_false_rings_of_one(tested, 5, p) == pytest.approx(expected)
+
+
+def test_a_box_that_the_ring_overfills_counts_as_the_ring_and_members_are_clutter_to_an_accident_alone(ring_scene):
+    """Five LEDs on one side; then all eight, and forty blobs far away."""
+    scene = ring_scene(np.random.default_rng(5), visible=8, clutter=0, tilt_deg=0.0, range_m=(8.0, 9.0))
+    order = np.argsort(scene.numbers)
+    points = scene.points[order]
+    candidate = np.where(np.arange(8) < 5, np.arange(8), -1)
+    part = fit_ring(points, candidate, CAMERA.focal_length_px, CAMERA.principal_point_px, **TILT)
+    area = np.pi * part.radius_px**2
+    assert densities_px2(points[:5], part)[0] == pytest.approx(2.0 / area)
+    far = points.mean(axis=0) + np.random.default_rng(6).uniform(3.0, 5.0, (40, 2)) * part.radius_px
+    blobs = np.vstack([points, far])
+    whole = fit_ring(blobs, np.arange(8), CAMERA.focal_length_px, CAMERA.principal_point_px, **TILT)
+    assert whole.count == 8
+    area = box_area_px2(blobs)
+    assert densities_px2(blobs, whole) == pytest.approx((45.0 / area, 40.0 / area))
+
+
+def test_the_odds_of_a_member_far_off_are_finite():
+    scene_px = np.array([900.0, 500.0]) - 100.0 * np.exp(1j * np.pi / 4 * np.arange(8)).view(float).reshape(8, 2)
+    fit = fit_ring(scene_px, np.arange(8), CAMERA.focal_length_px, CAMERA.principal_point_px, **TILT)
+    scene_px[3] += 50.0
+    odds = member_odds(scene_px, fit, 1e-6, 4.0)
+    assert odds[3] == odds.max() > 1e6 and np.isfinite(odds).all()
+
+
 def test_a_box_has_its_area_and_no_box_one_pixel():
     assert box_area_px2(np.array([[1.0, 2.0], [4.0, 9.0]])) == 21.0
     assert box_area_px2(np.zeros((5, 2))) == 1.0

@@ -5,6 +5,9 @@ import pytest
 
 from dockair.calibration import Camera, LedRing
 from dockair.errors import DockairError
+from dockair.nav.identify import numbering
+from dockair.nav.identify.code import CodeSettings, code_of, possible_slots
+from dockair.nav.identify.perspective import fit_ring
 from dockair.nav.identify.ring import IdentificationStatus, identify
 from dockair.rotations import matrix_from_yaw_pitch_roll
 
@@ -104,6 +107,79 @@ def test_an_even_ring_says_whether_its_numbers_are_absolute():
     scene = Coded(np.random.default_rng(67), LedRing())
     assert not identify(scene.points).absolute
     assert identify(scene.points, expected_led_px=scene.led_px, expected_sigma_px=2.0).absolute
+
+
+def seen(ring, hidden=(), range_m=6.0):
+    """Points (n, 2) of a frontal ring's LEDs, LED 0 in slot 0, and the fit of those in their places."""
+    numbers = np.setdiff1d(np.arange(8), hidden)
+    points = CAMERA.pixels_from_points(ring.positions_D + [range_m, 0.0, 0.0])[numbers]
+    candidate = np.full(8, -1)
+    for index, number in enumerate(numbers):
+        if ring.angles_deg is None or ring.angles_deg[number] == 45.0 * number:
+            candidate[number] = index
+    limits = {"tolerance_px": 0.4, "tolerance_per_radius": 0.0}
+    return points, fit_ring(points, candidate, CAMERA.focal_length_px, CAMERA.principal_point_px, **limits)
+
+
+def test_leds_driven_all_alike_are_no_code_and_one_degree_off_is_one():
+    assert not code_of(LedRing(brightness=(3.0,) * 8), CodeSettings()).says_something
+    for off_deg, displaced in ((0.95, []), (-1.05, [2])):
+        angles_deg = tuple(45.0 * k + off_deg * (k == 2) for k in range(8))
+        np.testing.assert_array_equal(code_of(LedRing(angles_deg=angles_deg), CodeSettings()).displaced, displaced)
+
+
+@pytest.mark.parametrize("turn", range(1, 8))
+def test_a_code_is_the_same_turned_when_some_turn_of_the_ring_is(turn):
+    """Marks every `turn` LEDs; by an odd turn they come to be everywhere."""
+    marked = (turn * np.arange(8)) % 8
+    brightness = tuple(2.0 if k in marked else 1.0 for k in range(8))
+    code = code_of(LedRing(brightness=brightness), CodeSettings())
+    assert code.is_the_same_turned or not code.says_something
+    assert not code_of(BRIGHT, CodeSettings()).is_the_same_turned
+    both = LedRing(brightness=brightness, angles_deg=UNEVEN.angles_deg)
+    assert not code_of(both, CodeSettings()).is_the_same_turned
+
+
+@pytest.mark.parametrize("factor", [1e-6, 1.0, 1e6])
+@pytest.mark.parametrize("hidden", [(), (3,), (2, 3, 6)])
+def test_range_and_exposure_do_not_count_in_what_brightness_says(factor, hidden):
+    ring = LedRing(brightness=(4.0, 1.0, 1.0, 2.0, 1.0, 1.0, 1.0, 1.0))
+    points, fit = seen(ring, hidden)
+    flux = factor * np.delete(ring.brightness, hidden)
+    np.testing.assert_array_equal(possible_slots(points, flux, fit, code_of(ring, CodeSettings()), 1e-6), [0])
+
+
+@pytest.mark.parametrize("unknown", [0.0, -1.0, np.nan, np.inf])
+def test_an_led_of_no_brightness_says_nothing_of_the_code(unknown):
+    points, fit = seen(BRIGHT)
+    flux = np.array(BRIGHT.brightness)
+    flux[5] = unknown
+    np.testing.assert_array_equal(possible_slots(points, flux, fit, code_of(BRIGHT, CodeSettings()), 1e-6), [0])
+    flux[1:] = unknown
+    np.testing.assert_array_equal(possible_slots(points, flux, fit, code_of(BRIGHT, CodeSettings()), 1e-6), range(8))
+
+
+def test_a_displaced_led_settles_nothing_where_clutter_may_feign_one():
+    """LED 2 is hidden and 7 displaced, so that two places are empty; eight numberings look for one LED each."""
+    points, fit = seen(UNEVEN, (2,))
+    settings = CodeSettings()
+    most_px2 = settings.max_chance_hits / (8.0 * np.pi * (settings.reach * fit.tolerance_px) ** 2)
+    for share, slots in ((0.97, [0]), (1.03, [0, 3])):
+        found = possible_slots(points, None, fit, code_of(UNEVEN, settings), share * most_px2)
+        np.testing.assert_array_equal(found, slots)
+
+
+def test_a_whole_even_ring_is_none_of_a_sheet_with_a_displaced_led():
+    scene = Coded(np.random.default_rng(68), LedRing(), clutter=0)
+    assert identify(scene.points, ring=UNEVEN).status is AMBIGUOUS
+
+
+def test_a_ring_whose_leds_lie_on_no_ellipse_is_ambiguous_whatever_says_its_numbers(monkeypatch):
+    scene = Coded(np.random.default_rng(69), UNEVEN)
+    assert identify(scene.points, ring=UNEVEN).absolute
+    monkeypatch.setattr(numbering, "fit_ellipse", lambda points: None)
+    result = identify(scene.points, ring=UNEVEN)
+    assert result.status is AMBIGUOUS and not result.absolute and (result.led_numbers == -1).all()
 
 
 def test_a_ring_of_another_number_of_leds_is_refused():

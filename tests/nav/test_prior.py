@@ -103,3 +103,18 @@ def test_a_ring_is_allowed_where_and_as_large_as_the_gates_have_it():
 @pytest.mark.parametrize(("radius", "roll", "prefers"), [(None, None, False), (90.0, None, True), (None, 0.1, True)])
 def test_one_of_several_rings_is_preferred_for_its_size_or_its_roll(radius, roll, prefers):
     assert make_prior((10.0, 500.0), 1.0, 0.25, np.zeros(2), radius, roll, None, None).prefers is prefers
+
+
+def test_what_is_expected_by_itself_counts_before_the_leds_prediction():
+    led_px = ring(roll=0.2)
+    alone = prior(led_px=led_px)
+    np.testing.assert_allclose(alone.centre_px, [900.0, 500.0])
+    assert (alone.expected_radius_px, alone.roll_rad) == (pytest.approx(100.0), pytest.approx(0.2))
+    told = prior(led_px=led_px, centre_px=np.array([910.0, 490.0]), radius_px=80.0, roll_rad=-0.1)
+    np.testing.assert_array_equal(told.centre_px, [910.0, 490.0])
+    assert (told.expected_radius_px, told.roll_rad) == (80.0, -0.1)
+
+
+def test_only_leds_expected_with_a_sigma_are_a_prediction():
+    assert prior(led_px=ring()).prediction_px is None
+    np.testing.assert_array_equal(prior(led_px=ring(), sigma_px=1.0).prediction_px, ring())

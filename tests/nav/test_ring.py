@@ -1,9 +1,20 @@
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from dockair.calibration import Camera, LedRing
 from dockair.errors import DockairError
-from dockair.nav.identify.ring import METHODS, IdentificationStatus, IdentifySettings, identify
+from dockair.nav.identify.hypotheses import ScoredFit
+from dockair.nav.identify.prior import make_prior
+from dockair.nav.identify.ring import (
+    METHODS,
+    IdentificationStatus,
+    IdentifySettings,
+    _candidates,
+    _decide,
+    identify,
+)
 
 FOUND, AMBIGUOUS, NOT_FOUND = (
     IdentificationStatus.FOUND,
@@ -270,3 +281,48 @@ def test_wrong_names_stay_below_one_in_two_thousand(method, prior, ring_scene):
             expected = {"expected_led_px": scene.led_px + rng.normal(0.0, 4.0, 2), "expected_sigma_px": 4.0}
         wrong += wrong_names(scene, identify(scene.points, method, **expected), absolute=prior) > 0
     assert wrong <= (0 if prior else 2)
+
+
+def scored(candidate, centre_px=(900.0, 500.0)):
+    fit = SimpleNamespace(
+        candidate=np.array(candidate), centre_px=np.array(centre_px), radius_px=100.0, slots_px=leds()
+    )
+    return ScoredFit(log10_false_rings=-9.0, odds=np.zeros(8), fit=fit)
+
+
+@pytest.mark.parametrize(
+    ("rival", "status"),
+    [
+        ([0, 1, 2, 8, 9, -1, -1, -1], FOUND),  # five LEDs, three of them the same: the ring seen less well
+        ([0, 1, 7, 8, 9, -1, -1, -1], AMBIGUOUS),  # two of them
+        ([0, 1, 2, 8, 9, 10, -1, -1], AMBIGUOUS),  # as many LEDs as the best
+    ],
+)
+def test_a_rival_is_the_same_ring_when_it_has_fewer_leds_and_three_of_them_in_common(rival, status):
+    anywhere = make_prior((12.0, 560.0), 1.0, 0.25, None, None, None, None, None)
+    fits = [scored([0, 1, 2, 3, 4, 5, -1, -1]), scored(rival)]
+    assert _decide(fits, anywhere, 1e-3, IdentifySettings())[0] is status
+
+
+def test_candidates_are_those_within_reach_and_of_too_many_those_nearest_to_the_expected_circle():
+    """Centre within one radius of 100 px, a quarter more of it, a tenth of slack; 1.15 radii of 125 px about it."""
+    expected = make_prior((12.0, 560.0), 1.0, 0.25, np.array([900.0, 500.0]), 100.0, None, None, None)
+    reach = 1.0 * 125.0 + 0.1 * 125.0 + 1.15 * 125.0
+    away = np.array([0.0, 60.0, 99.0, 102.0, 0.99 * reach, 1.01 * reach])
+    points, nothing = np.column_stack([900.0 + away, np.full(6, 500.0)]), np.full(6, np.nan)
+    np.testing.assert_array_equal(_candidates(points, expected, nothing, 10), range(5))
+    np.testing.assert_array_equal(_candidates(points, expected, nothing, 2), [2, 3])
+
+
+def test_five_leds_on_one_side_make_the_ellipse_of_the_whole_ring():
+    """Through five points alone with 0.1 px of noise its centre may be tens of pixels off."""
+    tried = 0
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        points = leds()
+        seen = points[1:6] + rng.normal(0.0, 0.1, (5, 2))
+        result = identify(seen, expected_led_px=points)
+        if result.status is FOUND:
+            tried += 1
+            np.testing.assert_allclose(result.ellipse.centre_px, [900.0, 500.0], atol=2.0)
+    assert tried >= 6

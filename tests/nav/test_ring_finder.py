@@ -180,6 +180,18 @@ def test_the_roll_of_the_track_counts_before_the_beliefs_also_for_a_while_after_
     np.testing.assert_allclose(belief.turned_rad, [-np.deg2rad(30.0)], atol=1e-3)
 
 
+def test_rolls_to_both_sides_of_half_a_turn_are_near_each_other(monkeypatch):
+    """The track remembers 3.1 rad, the belief has -3.1 rad."""
+    belief, seen_px = Belief(leds_px(roll_rad=3.1)), leds_px(roll_rad=3.1)
+    finder = finder_of(belief)
+    look(monkeypatch, finder, seen_px, time_s=1.0)
+    look(monkeypatch, finder, NO_BLOBS, time_s=1.02, window=Window(0, 100, 0, 100))
+    belief.led_px = leds_px(roll_rad=-3.1)
+    found = look(monkeypatch, finder, seen_px, time_s=1.04)
+    np.testing.assert_array_equal(found.led_numbers, np.arange(8))
+    assert not belief.turned_rad
+
+
 def test_a_ring_farther_off_than_the_beliefs_sigma_is_found_within_a_radius_and_beyond_it_only_where_it_is_lost(
     monkeypatch,
 ):
