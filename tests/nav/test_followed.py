@@ -103,6 +103,8 @@ def test_nothing_is_said_where_the_prediction_is_poor_or_the_roll_another():
     assert followed(leds(), roll_rad=np.deg2rad(7.0)) is not None
     assert followed(leds(), roll_rad=np.deg2rad(45.0)) is None
     assert followed(leds(), roll_rad=np.nan) is not None
+    turned = leds(turn_rad=3.13)
+    assert followed(turned, turned, roll_rad=-3.13) is not None  # to both sides of half a turn, 1.3 degrees apart
 
 
 def test_a_prediction_off_as_a_whole_is_moved_to_the_ring_as_far_as_its_sigma_lets_it():

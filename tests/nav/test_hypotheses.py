@@ -1,6 +1,8 @@
 """Rings that candidates may form, and how likely each is by accident."""
 
+from dataclasses import replace
 from math import comb
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,6 +17,7 @@ from dockair.nav.identify.hypotheses import (
     _contained,
     _keys,
     _octagons,
+    _tested,
     _triples_of,
     ring_fits,
     without_impostors,
@@ -133,6 +136,34 @@ def test_a_doubtful_member_is_left_out_and_two_are_too_many(ring_scene):
     fewer = without_impostors(best, most - 0.5 * best.odds[worst])
     assert fewer.count == 7 and fewer.candidate[worst] == -1
     assert without_impostors(best, 0.1 * most) is None
+
+
+def test_no_impostor_is_taken_out_of_four_leds_or_where_the_rest_is_doubtful_too(ring_scene):
+    best = fits_of(ring_scene(np.random.default_rng(46)).points)[0]
+    odds = np.zeros(8)
+    odds[2] = 1.0
+    for seen, taken in ((range(5), True), (range(4), False)):
+        candidate = np.where(np.isin(np.arange(8), seen), best.fit.candidate, -1)
+        few = replace(best, fit=replace(best.fit, candidate=candidate), odds=odds)
+        assert (without_impostors(few, 0.5) is not None) == taken
+    alike = replace(best, odds=np.full(8, 0.4))  # 2.8 less the worst
+    assert without_impostors(alike, 2.79) is None and without_impostors(alike, 2.81).count == 7
+
+
+def test_every_ring_of_five_leds_is_found_by_right_angles_and_one_of_four_by_all_patterns():
+    tested = SimpleNamespace(tested_right_angles=30, tested=210)
+    np.testing.assert_array_equal(_tested(tested, np.array([4, 5, 8])), [210, 30, 30])
+
+
+@pytest.mark.parametrize(("sigma_px", "tolerance_px"), [(0.02, 1.0), (0.1, 1.0), (0.3, 3.0)])
+def test_octagons_are_looked_up_within_two_and_a_half_tolerances_and_at_least_a_pixel(
+    sigma_px, tolerance_px, monkeypatch
+):
+    told = {}
+    monkeypatch.setattr(hypotheses, "find_octagons", lambda *_, **keys: told.update(keys))
+    candidates = Candidates(points=np.random.default_rng(9).uniform(0.0, 1000.0, (6, 2)), sigma_px=sigma_px)
+    _octagons(candidates, "three_point", OPEN, Camera(), SETTINGS)
+    assert told["tolerance_px"] == pytest.approx(tolerance_px)
 
 
 def test_a_hypothesis_lies_in_another_up_to_the_rings_symmetry():

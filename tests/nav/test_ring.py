@@ -5,7 +5,8 @@ import pytest
 
 from dockair.calibration import Camera, LedRing
 from dockair.errors import DockairError
-from dockair.nav.identify.hypotheses import ScoredFit
+from dockair.nav.identify import ring
+from dockair.nav.identify.hypotheses import Candidates, ScoredFit
 from dockair.nav.identify.prior import make_prior
 from dockair.nav.identify.ring import (
     METHODS,
@@ -13,6 +14,7 @@ from dockair.nav.identify.ring import (
     IdentifySettings,
     _candidates,
     _decide,
+    _found,
     identify,
 )
 
@@ -283,11 +285,12 @@ def test_wrong_names_stay_below_one_in_two_thousand(method, prior, ring_scene):
     assert wrong <= (0 if prior else 2)
 
 
-def scored(candidate, centre_px=(900.0, 500.0)):
+def scored(candidate, *, log10_false_rings=-9.0, radius_px=100.0, roll=0.0, odds=0.0, squeeze=1.0):
+    slots_px = (leds(radius=radius_px, roll=roll) - [900.0, 500.0]) * [squeeze, 1.0] + [900.0, 500.0]
     fit = SimpleNamespace(
-        candidate=np.array(candidate), centre_px=np.array(centre_px), radius_px=100.0, slots_px=leds()
+        candidate=np.array(candidate), centre_px=np.array([900.0, 500.0]), radius_px=radius_px, slots_px=slots_px
     )
-    return ScoredFit(log10_false_rings=-9.0, odds=np.zeros(8), fit=fit)
+    return ScoredFit(log10_false_rings=log10_false_rings, odds=np.full(8, odds), fit=fit)
 
 
 @pytest.mark.parametrize(
@@ -326,3 +329,54 @@ def test_five_leds_on_one_side_make_the_ellipse_of_the_whole_ring():
             tried += 1
             np.testing.assert_allclose(result.ellipse.centre_px, [900.0, 500.0], atol=2.0)
     assert tried >= 6
+
+
+def test_of_credible_rings_size_counts_before_roll():
+    expected = make_prior((12.0, 560.0), 1.0, 0.25, None, 100.0, 0.0, None, None)
+    as_large = scored([0, 1, 2, 3, 4, 5, 6, 7], roll=np.pi / 8)
+    as_turned = scored([8, 9, 10, 11, 12, 13, 14, 15], radius_px=120.0)
+    neither = scored([16, 17, 18, 19, 20, 21, 22, 23], radius_px=80.0, roll=np.pi / 8)
+    for fits, best in (([as_turned, as_large], as_large), ([neither, as_turned], as_turned)):
+        status, fit = _decide(fits, expected, 1e-3, IdentifySettings())
+        assert status is FOUND and fit is best.fit
+
+
+def test_a_ring_that_is_expected_somewhere_may_hold_more_impostors():
+    """1.6 in a thousand: 0.8 are allowed of one that may be anywhere, 2 of one that is expected."""
+    anywhere = make_prior((12.0, 560.0), 1.0, 0.25, None, None, None, None, None)
+    expected = make_prior((12.0, 560.0), 1.0, 0.25, np.array([900.0, 500.0]), None, None, None, None)
+    one = scored(range(8), odds=2e-4)
+    one.fit.count = 4  # none may be taken out
+    assert _decide([one], anywhere, 1e-3, IdentifySettings())[0] is AMBIGUOUS
+    assert _decide([one], expected, 1e-3, IdentifySettings())[0] is FOUND
+
+
+@pytest.mark.parametrize(
+    ("expected", "limits"),
+    [
+        ({}, [3e-4]),
+        ({"centre_px": np.array([900.0, 500.0])}, [1e-2]),
+        ({"led_px": leds()}, [1e-2]),
+        ({"led_px": leds(), "sigma_px": 1.0}, [5e-2, 3e-4]),
+    ],
+)
+def test_a_ring_that_contradicts_a_prediction_needs_as_good_a_case_as_one_of_which_nothing_was_known(
+    expected, limits, monkeypatch
+):
+    told = dict.fromkeys(("centre_px", "radius_px", "roll_rad", "led_px", "sigma_px")) | expected
+    tried = []
+    monkeypatch.setattr(ring, "ring_fits", lambda *arguments: tried.append(arguments[-1]) or [])
+    candidates = Candidates(points=leds(), sigma_px=0.1)
+    prior = make_prior((12.0, 560.0), 1.0, 0.25, **told)
+    assert _found(candidates, "three_point", prior, Camera(), IdentifySettings())[0] is NOT_FOUND
+    assert tried == limits
+
+
+@pytest.mark.parametrize(("squeeze", "status"), [(1.0, FOUND), (0.9, AMBIGUOUS)])
+def test_the_lower_demands_on_a_predicted_ring_are_for_one_of_the_predicted_shape(squeeze, status, monkeypatch):
+    """One accident in a hundred frames is allowed with the prediction alone; 5 % of the radius is out of shape."""
+    fits = [scored(range(8), log10_false_rings=-2.0, squeeze=squeeze)]
+    monkeypatch.setattr(ring, "ring_fits", lambda *_: fits)
+    candidates = Candidates(points=fits[0].fit.slots_px, sigma_px=0.1)
+    prior = make_prior((12.0, 560.0), 1.0, 0.25, None, None, None, leds(), 1.0)
+    assert _found(candidates, "three_point", prior, Camera(), IdentifySettings())[0] is status
