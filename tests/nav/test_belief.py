@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import chi2 as chi2_law
 
 from dockair.calibration import Camera, LedRing, Mounting
-from dockair.nav.belief import Taking, _gained, begun_again, corrected, felt_first, mixture, rolled, widened
+from dockair.nav.belief import Taking, _gained, _kept, begun_again, corrected, felt_first, mixture, rolled, widened
 from dockair.nav.belief_motion import (
     BIAS,
     CALIBRATION,
@@ -185,6 +185,7 @@ def test_an_update_is_the_kalman_filter_s_where_the_problem_is_linear():
     np.testing.assert_allclose(after.P, A @ b.P @ A.T + K @ pose.covariance @ K.T, atol=1e-9)
     moved = np.concatenate([log(after.R_BD @ b.R_BD.T), (after.x - b.x).ravel()])
     np.testing.assert_allclose(moved, (K @ y)[: CALIBRATION.start], atol=1e-6)
+    np.testing.assert_array_equal(after.ring, b.ring)
     assert found.chi2 == pytest.approx(float(y @ np.linalg.solve(S, y)), rel=1e-3)
 
 
@@ -321,6 +322,19 @@ def test_leds_are_expected_as_uncertainly_as_all_that_is_believed_makes_them():
     np.testing.assert_allclose(SIGHT.led_pixels(b, SIGHT.apparent(b), CAMERA)[1], np.sqrt(worst), rtol=1e-6)
 
 
+def test_leds_behind_the_camera_are_expected_nowhere():
+    """The ring stands across the camera, 0.1 m ahead of its lens."""
+    p_CD = np.array([0.1, 0.0, 0.0])
+    b = belief(1e-6 * np.eye(ERRORS), MOUNTING.R_BC @ matrix_from_yaw_pitch_roll(0.5 * np.pi, 0.0, 0.0))
+    b.x[0] = MOUNTING.p_BC - MOUNTING.p_BI + MOUNTING.R_BC @ p_CD
+    seen = SIGHT.apparent(b)
+    ahead = (LEDS @ seen.R_CD.T + seen.p_CD)[:, 0] > 0.0
+    assert 0 < ahead.sum() < 8
+    pixels, sigma_px = SIGHT.led_pixels(b, seen, CAMERA)
+    np.testing.assert_array_equal(np.isfinite(pixels), np.column_stack([ahead, ahead]))
+    np.testing.assert_array_equal(np.isfinite(sigma_px), ahead)
+
+
 @pytest.mark.parametrize("count", [1, 2, 3])
 def test_a_few_leds_correct_what_they_see(count):
     """Their own places agree with the truth within 3 sigma of a pixel afterwards; chi2 has two degrees each."""
@@ -356,6 +370,62 @@ def test_gate_refuses_and_leaves_nothing():
     assert len(corrected([b], pose, SIGHT, OPEN, Taking()).beliefs) == 1
 
 
+@pytest.mark.parametrize(("tight", "freedom"), [(True, 16), (False, 6)], ids=["tight", "loose"])
+def test_the_gate_is_that_of_the_frame_s_degrees_of_freedom(tight, freedom):
+    b, _ = start(np.deg2rad(2.0), 0.0, 6.0)
+    seen = SIGHT.apparent(b)
+    pose = solve_pose(pixels_of(seen.R_CD, seen.p_CD + [0.0, 0.5, 0.0]), LEDS, CAMERA)
+    found = corrected([b], pose, SIGHT, OPEN, Taking(tight=tight))
+    assert found.degrees_of_freedom == freedom
+    narrow, wide = [np.inf] * 17, [0.0] * 17
+    narrow[freedom], wide[freedom] = 0.999 * found.chi2, 1.001 * found.chi2
+    assert corrected([b], pose, SIGHT, narrow, Taking(tight=tight)).beliefs == []
+    assert len(corrected([b], pose, SIGHT, wide, Taking(tight=tight)).beliefs) == 1
+
+
+def test_a_frame_that_all_hypotheses_refuse_is_said_to_disagree_by_the_least_of_them():
+    near, _ = start(np.deg2rad(2.0), 0.0, 6.0)
+    far = replace(near, x=near.x + 0.3 * np.eye(8, 3, k=1))
+    seen = SIGHT.apparent(near)
+    pose = solve_pose(pixels_of(seen.R_CD, seen.p_CD + [0.0, -0.4, 0.0]), LEDS, CAMERA)
+    alone = [corrected([b], pose, SIGHT, [0.0] * 17, Taking()).chi2 for b in (near, far)]
+    assert min(alone) < 0.9 * max(alone)
+    for both in ([near, far], [far, near]):
+        assert corrected(both, pose, SIGHT, [0.0] * 17, Taking()).chi2 == min(alone)
+
+
+def apart(sigmas: float, log_weight: float = 0.0) -> Belief:
+    """A belief so many of its sigmas off from another one to the left."""
+    b = belief(0.01 * np.eye(ERRORS), log_weight=log_weight)
+    b.x[0, 1] += 0.1 * sigmas
+    return b
+
+
+def test_two_hypotheses_within_three_sigma_are_told_as_one():
+    (one,) = _kept([apart(0.0), apart(2.9)])
+    assert one.p_ID[1] == pytest.approx(mixture([apart(0.0), apart(2.9)]).p_ID[1], abs=1e-12)
+    assert [b.p_ID[1] for b in _kept([apart(0.0), apart(3.1)])] == [b.p_ID[1] for b in (apart(0.0), apart(3.1))]
+
+
+def test_a_hypothesis_dies_at_a_millionth_of_the_most_likely_one_s_weight():
+    for relative, left in ((-13.9, 2), (-14.1, 1)):
+        kept = _kept([apart(9.0, 5.0 + relative), apart(0.0, 5.0)])
+        assert len(kept) == left and kept[0].log_weight == 0.0
+        assert [b.log_weight for b in kept[1:]] == pytest.approx([relative] * (left - 1))
+
+
+def test_of_three_hypotheses_the_two_most_likely_stay():
+    kept = _kept([apart(9.0, -2.0), apart(0.0, -1.0), apart(-9.0, -3.0)])
+    assert [b.p_ID[1] for b in kept] == [apart(0.0).p_ID[1], apart(9.0).p_ID[1]]
+
+
+def test_two_that_are_told_as_one_may_be_the_most_likely_together():
+    """Of weights 1, and twice 0.6 close together, that comes first whose weight is 1.2."""
+    first, second = _kept([apart(0.0), apart(20.0, np.log(0.6)), apart(20.5, np.log(0.6))])
+    assert first.p_ID[1] == pytest.approx(apart(20.25).p_ID[1]) and second.p_ID[1] == apart(0.0).p_ID[1]
+    assert (first.log_weight, second.log_weight) == pytest.approx((0.0, -np.log(1.2)))
+
+
 def test_mixture_has_the_mean_and_covariance_of_both():
     """3 : 1 of two Gaussians far apart, against the closed form on scalars along one axis."""
     first = belief(0.01 * np.eye(ERRORS))
@@ -385,6 +455,7 @@ def test_a_rolled_belief_forgets_how_its_attitude_and_its_leds_went_with_the_res
     np.testing.assert_array_equal(after.P[:3, REST], before.P[:3, REST])
     assert np.diag(after.P)[:3].min() >= np.diag(before.P)[:3].max()
     np.testing.assert_array_equal(after.P[RING, : RING.start], 0.0)
+    np.testing.assert_array_equal(after.P[: RING.start, RING], 0.0)
     np.testing.assert_array_equal(after.P[RING, RING], 9e-8 * np.eye(16))
     assert np.linalg.eigvalsh(after.P).min() > -1e-9
 

@@ -10,12 +10,12 @@ from dockair.calibration import Camera, GyroSheet, LedRing, Mounting, Navigation
 from dockair.errors import DockairError
 from dockair.messages import ImuSample
 from dockair.nav import belief_buffer
-from dockair.nav.belief_motion import CALIBRATION, ERRORS, GUST, SWING, SWING_RATE, VELOCITY, propagated
+from dockair.nav.belief_motion import BIAS, CALIBRATION, ERRORS, GUST, SWING, SWING_RATE, VELOCITY, propagated
 from dockair.nav.fusion import FusionSettings, RelativeFilter
 from dockair.nav.fusion_settings import motion_of, refusals_until_doubt, start_of, swing_covariance, taking_of
 from dockair.nav.pose.estimate import PoseEstimate, solve_pose
 from dockair.nav.pose.planar import mirrored
-from dockair.rotations import Array, exp, log, matrix_from_yaw_pitch_roll
+from dockair.rotations import Array, exp, log, matrix_from_yaw_pitch_roll, skew
 
 RING, CAMERA = LedRing().positions_D, Camera()
 MOUNTING = Mounting(
@@ -864,3 +864,191 @@ def test_a_slow_imus_samples_are_no_gaps_and_one_left_out_is(rate_hz, seconds):
             )
             relative.propagate([sample])
         assert relative.felt(relative.imu_time_s - 0.3, relative.imu_time_s) == whole
+
+
+def seen_from(filter_: RelativeFilter, time_s: float, moved_C: tuple[float, float, float]) -> PoseEstimate:
+    """A frame's pose that is off by so much from what is believed, in camera axes [m]."""
+    R, p, _ = filter_.predicted_pose(time_s)
+    return solve_pose(CAMERA.pixels_from_points(RING @ R.T + p + moved_C), RING, CAMERA, initial=(R, p))
+
+
+@pytest.mark.parametrize("leds", [0, 3, -2])
+def test_a_drogue_that_was_lost_begins_again_where_it_is_seen_with_the_attitude_it_had(leds):
+    """Its LEDs are numbered so many places on: the attitude is turned by as many and else stays."""
+    world = World(sheets(6.0), SETTINGS, np.random.default_rng(71))
+    filter_ = RelativeFilter(world.sheets, SETTINGS)
+    assert all(fly(world, filter_, 0.3))
+    before, now_s = filter_.state(), world.time_s
+    roll = exp(np.array([leds * np.pi / 4, 0.0, 0.0]))
+    R_CD, p_CD = MOUNTING.R_BC.T @ before.R_BD @ roll @ exp(np.array([0.1, 0.05, -0.1])), np.array([9.0, 1.0, -0.5])
+    seen = solve_pose(CAMERA.pixels_from_points(RING @ R_CD.T + p_CD), RING, CAMERA, initial=(R_CD, p_CD))
+    filter_.begin_again(seen, now_s)
+    after = filter_.state(now_s)
+    np.testing.assert_allclose(after.R_BD, before.R_BD @ roll, atol=1e-12)
+    np.testing.assert_allclose(after.p_PD_B, MOUNTING.R_BC @ p_CD + MOUNTING.p_BC - MOUNTING.p_BP, atol=1e-6)
+    assert filter_.update(seen, now_s)
+
+
+def test_refusals_before_the_drogue_was_lost_do_not_count_once_it_is_found_again():
+    """A frame off by a little more than a belief takes, and a widened one would."""
+    filter_ = RelativeFilter(sheets(6.0, sigma_p_m=0.2), SETTINGS)
+    for k in range(SETTINGS.refusals_until_doubt - 1):
+        assert not filter_.update(seen_from(filter_, 0.02 * k, (0.0, 2.0, 0.0)), 0.02 * k)
+    filter_.begin_again(seen_from(filter_, 0.05, (0.0, 0.0, 0.0)), 0.05)
+    off_m = 0.2 * np.sqrt(1.05 * chi2.ppf(SETTINGS.gate_probability, 16))
+    assert not filter_.update(seen_from(filter_, 0.05, (0.0, off_m, 0.0)), 0.05)
+    assert filter_.doubted_s == -np.inf
+
+
+def test_without_a_force_ever_the_receiver_is_felt_by_its_gyro_and_with_one_by_both():
+    filter_ = RelativeFilter(sheets(6.0), SETTINGS)
+    still = [ImuSample(time_stamp_s=k / 250.0, angular_rate_rad_s=np.zeros(3)) for k in range(51)]
+    filter_.propagate(still[:26])
+    assert filter_.felt(0.04, 0.1)
+    filter_.propagate([replace(still[26], specific_force_m_s2=-GRAVITY_N), *still[27:]])
+    assert not filter_.felt(0.11, 0.2)
+
+
+def test_the_slowest_imu_s_stamps_are_no_leaps():
+    """Samples and control at 5 Hz, every sample taken though a stamp may leap by 0.1 s."""
+    slow = replace(sheets(6.0), control_rate_hz=5, gyro=replace(GYRO, rate_hz=5))
+    samples = [ImuSample(time_stamp_s=0.2 * k, angular_rate_rad_s=np.zeros(3)) for k in range(10)]
+    assert RelativeFilter(slow, SETTINGS).propagate(samples) == samples
+
+
+def test_only_what_the_gate_refuses_contradicts_the_belief():
+    """Not a second frame of one stamp, none that is too old, and no LED without numbers."""
+    filter_ = RelativeFilter(sheets(6.0), SETTINGS)
+    good, false = seen_from(filter_, 1.0, (0.0, 0.01, 0.0)), seen_from(filter_, 1.0, (0.0, 3.0, 0.0))
+    one, none, sigma_px = RING[:1], np.full((1, 2), np.nan), np.array([0.1])
+    for harmless in (
+        lambda: filter_.update(good, 1.0),  # taken the first time
+        lambda: filter_.update(good, 1.0),
+        lambda: filter_.update(good, 0.2),
+        lambda: filter_.update_leds(none, one, sigma_px, 1.01),
+    ):
+        assert not filter_.update(false, 1.01)
+        assert filter_.was_contradicted
+        harmless()
+        assert not filter_.was_contradicted
+
+
+def begun(sigma_p_m: float) -> RelativeFilter:
+    filter_ = RelativeFilter(sheets(6.0, sigma_p_m=sigma_p_m), SETTINGS)
+    filter_.propagate([ImuSample(time_stamp_s=0.0, angular_rate_rad_s=np.zeros(3))])
+    return filter_
+
+
+def struck_filter() -> tuple[RelativeFilter, list[tuple[PoseEstimate, float]]]:
+    """A filter that took a frame, then refused two that show the drogue 0.1 m aside, doubts, and takes the third."""
+    filter_, frames = begun(0.005), []
+    for k, aside_m in enumerate((0.0, 0.1, 0.1, 0.1)):
+        time_s = 0.04 + 0.002 * k
+        frames.append((seen_from(filter_, time_s, (0.0, aside_m, 0.0)), time_s))
+        assert filter_.update(*frames[-1]) == (k in (0, 3))
+    assert filter_.doubted_s == frames[-1][1]
+    return filter_, frames
+
+
+def test_the_innovation_is_that_of_the_belief_before_it_was_widened():
+    filter_, _ = struck_filter()
+    value, freedom = filter_.innovation
+    assert freedom == 16 and value > chi2.ppf(SETTINGS.gate_probability, 16)
+
+
+def test_a_late_frame_leaves_a_doubt_after_it_as_it_was():
+    """To the last bit as if it had come in time, before the blow."""
+    late, frames = struck_filter()
+    in_time = begun(0.005)
+    early = seen_from(in_time, 0.02, (0.0, 1e-3, 0.0)), 0.02
+    assert late.update(*early)
+    assert in_time.update(*early)
+    assert [in_time.update(*frame) for frame in frames] == [True, False, False, True]
+    assert late.doubted_s == in_time.doubted_s == frames[-1][1]
+    np.testing.assert_array_equal(state_of(late, 0.1), state_of(in_time, 0.1))
+
+
+def test_a_frame_that_a_late_one_shows_to_be_false_is_taken_back():
+    """Within the start's 0.2 m the drogue may be 0.8 m aside; not a millisecond after it was seen elsewhere."""
+    filter_, twin = begun(0.2), begun(0.2)
+    false, true = seen_from(filter_, 0.021, (0.0, 0.8, 0.0)), seen_from(filter_, 0.02, (0.0, 0.0, 0.0))
+    assert filter_.update(false, 0.021) and filter_.update(true, 0.02)
+    assert twin.update(true, 0.02) and not twin.update(false, 0.021)
+    np.testing.assert_allclose(state_of(filter_, 0.021), state_of(twin, 0.021), atol=1e-12)
+
+
+@pytest.mark.parametrize(("age_s", "grows"), [(0.1, True), (0.3, False)])
+def test_a_rate_that_is_held_makes_the_tip_s_velocity_uncertain_by_the_lever(age_s, grows):
+    """By 0.05 rad/s within 0.25 s and no more, since the middle of the samples that are averaged, times r = p_IP."""
+    filter_ = RelativeFilter(sheets(6.0), SETTINGS)
+    filter_.propagate([ImuSample(time_stamp_s=k / 250.0, angular_rate_rad_s=np.zeros(3)) for k in range(26)])
+    P = filter_._buffer.beliefs(0.1 + age_s)[0].P
+    shown = np.zeros((3, ERRORS))
+    shown[:, VELOCITY], shown[:, BIAS] = np.eye(3), -skew(TIP_FROM_IMU)
+    since_s = age_s + 0.004  # at 250 Hz three samples last 0.01 s
+    rate2 = (0.05 * since_s / 0.25) ** 2 if grows else 0.05**2
+    expected = shown @ P @ shown.T + rate2 * skew(TIP_FROM_IMU) @ skew(TIP_FROM_IMU).T
+    np.testing.assert_allclose(filter_.state(0.1 + age_s).covariance[6:, 6:], expected, rtol=1e-9)
+
+
+def test_what_was_foretold_is_what_is_believed_without_the_frames_since():
+    """Frames until 0.2 s, samples until 0.4 s: the newest frame that is 0.1 s old is of 0.2 s; asked for older ones."""
+    world = World(sheets(6.0), SETTINGS, np.random.default_rng(72))
+    filter_, blind = RelativeFilter(world.sheets, SETTINGS), RelativeFilter(world.sheets, SETTINGS)
+    for k in range(101):
+        sample, pixels = world.step() if k else world.gyro(), world.pixels(0.1)
+        for each, last in ((filter_, 50), (blind, 40)):
+            each.propagate([sample])
+            if k % 5 == 0 and k <= last:
+                assert each.update(solve(each, pixels, world.time_s, 0.1), world.time_s)
+    for horizon_s, age_s, alike in ((0.1, 0.2, filter_), (0.2, 0.2, filter_), (0.23, 0.24, blind), (0.24, 0.24, blind)):
+        foretold_m, unseen_s = filter_.foretold_p_PD_B(world.time_s, horizon_s + 4e-7)  # to the microsecond
+        assert unseen_s == pytest.approx(age_s, abs=1e-9)
+        np.testing.assert_allclose(foretold_m, alike.p_PD_B(world.time_s), atol=1e-9)
+    foretold_m, unseen_s = filter_.foretold_p_PD_B(world.time_s, 0.41)
+    assert np.isnan(foretold_m).all() and np.isnan(unseen_s)
+
+
+@pytest.mark.parametrize(("look_back_s", "kept"), [(0.0, False), (0.4, True)])
+def test_frames_are_kept_to_be_asked_for_as_long_as_is_looked_back(look_back_s, kept):
+    """One frame, then 0.8 s of samples: a second node after 0.45 s would have it forgotten."""
+    world = World(sheets(6.0), SETTINGS, np.random.default_rng(73))
+    filter_ = RelativeFilter(world.sheets, SETTINGS, look_back_s=look_back_s)
+    filter_.propagate([world.gyro()])
+    assert filter_.update(solve(filter_, world.pixels(0.1), 0.0, 0.1), 0.0)
+    filter_.propagate([world.step() for _ in range(200)])
+    assert np.isfinite(filter_.foretold_p_PD_B(world.time_s, 0.8)[0]).all() == kept
+
+
+def test_before_all_that_is_kept_the_oldest_belief_is_told():
+    world = World(sheets(6.0), SETTINGS, np.random.default_rng(74))
+    filter_ = RelativeFilter(world.sheets, SETTINGS)
+    assert all(fly(world, filter_, 0.4))
+    oldest = filter_._buffer._nodes[0]
+    np.testing.assert_array_equal(state_of(filter_, -1.0)[:9], oldest.beliefs[0].R_BD.ravel())
+    np.testing.assert_array_equal(filter_.p_PD_B(-1.0), oldest.beliefs[0].p_ID - TIP_FROM_IMU)
+
+
+def test_one_led_is_refused_once_in_ten_thousand():
+    """Two degrees of freedom: chi-square of 18.4, crossed between two of the places where it is seen."""
+    taken = []
+    for off_px in np.linspace(150.0, 300.0, 31):
+        filter_ = RelativeFilter(sheets(6.0), SETTINGS)
+        R, p, _ = filter_.predicted_pose(0.0)
+        pixels = CAMERA.pixels_from_points(RING[:1] @ R.T + p) + [off_px, 0.0]
+        taken.append(filter_.update_leds(pixels, RING[:1], np.array([0.1]), 0.0))
+        value, freedom = filter_.innovation
+        assert freedom == 2 and taken[-1] == (value <= chi2.ppf(0.9999, 2))
+    assert taken[0] and not taken[-1]
+
+
+def test_the_gyro_s_bias_that_is_told_is_the_one_that_is_taken_off():
+    """A rate of nothing but bias, learnt in 2 s of frames: what is left of it is small."""
+    calm = replace(SETTINGS, attitude_density=0.002)
+    world = World(sheets(4.0), calm, np.random.default_rng(75))
+    world.bias_B = np.array([0.01, -0.02, 0.015])
+    sheet = replace(world.sheets, gyro=replace(GYRO, bias_sigma_rad_s=0.02))
+    filter_ = RelativeFilter(sheet, calm)
+    assert np.mean(list(fly(world, filter_, 2.0))) > 0.9
+    np.testing.assert_allclose(filter_.bias_B, world.bias_B, atol=0.004)
+    np.testing.assert_allclose(filter_.mean_rate_B(world.time_s, 0.01), world.rate(world.time_s - 0.004), atol=0.02)
