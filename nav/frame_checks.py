@@ -56,8 +56,8 @@ class FrameChecks:
         rows = picture[:: _ROWS if len(picture) > _ROWS else 1].copy()
         before, self._picture = self._picture, picture
         rows_before, self._rows = self._rows, rows
-        alike = picture.size > 0 and picture.shape == before.shape and np.array_equal(rows, rows_before)
-        return alike and np.array_equal(picture, before)
+        alike = picture.size > 0 and picture.shape == before.shape and np.array_equal(rows, rows_before, equal_nan=True)
+        return alike and np.array_equal(picture, before, equal_nan=True)
 
 
 def with_numbers(seen: LedObservation, count: int) -> LedObservation:

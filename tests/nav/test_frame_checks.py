@@ -67,6 +67,12 @@ def test_leds_that_come_again_are_stuck_and_none_at_all_are_not():
     assert kept.refused(leds([[10.0, 20.0]]), NOW_S) is None
 
 
+def test_leds_that_come_again_are_stuck_though_one_of_them_has_no_numbers():
+    kept, rows = checks(), [[10.0, 20.0], [np.nan, np.nan], [30.0, 40.0]]
+    assert [kept.refused(leds(rows), NOW_S) for _ in range(3)] == [None, "frame stuck", "frame stuck"]
+    assert kept.refused(leds([[10.0, 20.0], [np.nan, 25.0], [30.0, 40.0]]), NOW_S) is None
+
+
 def test_a_frame_that_is_out_of_time_is_not_the_one_before():
     kept, seen = checks(), leds([[10.0, 20.0]])
     assert kept.refused(leds([[10.0, 20.0]], time_s=NOW_S + 5.0), NOW_S) == "frame ahead of the clock"
