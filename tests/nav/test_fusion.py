@@ -1052,3 +1052,34 @@ def test_the_gyro_s_bias_that_is_told_is_the_one_that_is_taken_off():
     assert np.mean(list(fly(world, filter_, 2.0))) > 0.9
     np.testing.assert_allclose(filter_.bias_B, world.bias_B, atol=0.004)
     np.testing.assert_allclose(filter_.mean_rate_B(world.time_s, 0.01), world.rate(world.time_s - 0.004), atol=0.02)
+
+
+def test_a_frame_as_late_as_may_be_is_the_frame_in_time_to_the_last_bit():
+    """0.44 s, after a second in which what is older was forgotten all the time."""
+    world = World(sheets(6.0), SETTINGS, np.random.default_rng(76))
+    samples = [world.gyro()] + [world.step() for _ in range(250)]
+    in_time, late = RelativeFilter(world.sheets, SETTINGS), RelativeFilter(world.sheets, SETTINGS)
+    stamp_s = samples[140].time_stamp_s
+    in_time.propagate(samples[:141])
+    pose = seen_from(in_time, stamp_s, (0.05, 0.01, 0.02))
+    assert in_time.update(pose, stamp_s)
+    for sample in samples[141:]:
+        in_time.propagate([sample])
+    for sample in samples:
+        late.propagate([sample])
+    assert late.update(pose, stamp_s)
+    np.testing.assert_array_equal(state_of(late, 1.0), state_of(in_time, 1.0))
+
+
+def test_the_first_force_is_the_formation_s_of_frames_before_it_too():
+    """A receiver in steady flight, a frame, and then the first sample: the drogue does not fall."""
+    filter_ = RelativeFilter(sheets(6.0), SETTINGS)
+    assert filter_.update(seen_from(filter_, 5.0, (0.0, 0.0, 0.0)), 5.0)
+    before_m = filter_.p_PD_B(5.0)
+    f_I = MOUNTING.R_BI.T @ -GRAVITY_N
+    still = [
+        ImuSample(time_stamp_s=5.004 + k / 250.0, angular_rate_rad_s=np.zeros(3), specific_force_m_s2=f_I)
+        for k in range(50)
+    ]
+    filter_.propagate(still)
+    np.testing.assert_allclose(filter_.p_PD_B(5.2), before_m, atol=1e-4)

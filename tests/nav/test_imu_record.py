@@ -162,6 +162,13 @@ def test_a_stamp_that_leaps_needs_a_second_one():
     assert not stamps.believed(np.nan, 47.04)
 
 
+def test_a_second_stamp_says_the_same_only_if_it_is_a_later_one():
+    stamps = Stamps(1.0)
+    assert stamps.believed(5.0, -np.inf)
+    assert not any(stamps.believed(time_s, 5.0) for time_s in (47.0, 47.0, 46.5, 46.5))
+    assert stamps.believed(46.6, 5.0)
+
+
 def test_a_stamp_that_leaps_by_more_than_a_minute_is_of_another_clock():
     stamps = Stamps(1.0)
     assert stamps.believed(5.0, -np.inf)
@@ -192,3 +199,12 @@ def test_a_force_that_is_no_number_is_a_gap_where_forces_are_asked_for(start_s, 
         kept.take(replace(sample(0.01 * k), specific_force_m_s2=force))
     assert kept.is_unbroken(start_s, 0.1, 0.02, forces=True) == felt
     assert kept.is_unbroken(start_s, 0.1, 0.02, forces=False)
+
+
+@pytest.mark.parametrize(("late_s", "whole"), [(0.0, True), (5e-7, True), (2e-6, False)])
+def test_a_gap_is_told_to_the_microsecond(late_s, whole):
+    """0.07 - 0.05 is more than 0.02 in numbers that end."""
+    kept = record()
+    for time_s in (0.05, 0.07 + late_s):
+        kept.take(sample(time_s))
+    assert kept.is_unbroken(0.05, 0.07 + late_s, 0.02, forces=False) == whole

@@ -355,6 +355,85 @@ def test_a_rendered_approach_is_followed_with_every_name_right(render):
     assert max(sizes[1:]) < 0.3 * sizes[0]
 
 
+def test_the_first_frame_says_where_the_ring_is_and_hardly_how_it_moves():
+    """4 radii/s of the centre; 0.5 rad/s of the roll, so that numbers are told apart for a quarter of a second."""
+    tracker = RingTracker(CAMERA, DT)
+    tracker.update(seen((500, 400), 100.0))
+    np.testing.assert_allclose(tracker.covariance, np.diag([4.0, 4.0, 400.0**2, 400.0**2]))
+    assert tracker.expected_sigma_px == pytest.approx(2.0)
+    known = 0
+    while not np.isnan(tracker.roll_rad):
+        tracker.predict()
+        known += 1
+    assert 0.2 < known * DT < 0.3
+
+
+def test_the_next_ring_found_after_a_loss_starts_the_filter_afresh():
+    tracker = RingTracker(CAMERA, DT)
+    for k in range(20):
+        tracker.predict()
+        tracker.update(seen((500 + 10 * k, 400)))
+    while tracker.tracking:
+        tracker.predict()
+        tracker.update(MISSING)
+    assert np.isnan(tracker.expected_sigma_px)
+    assert tracker.update(seen((1200, 700)))
+    assert tracker.tracking and tracker.misses == 0
+    np.testing.assert_array_equal([*tracker.centre_px, *tracker.velocity_px_s], [1200, 700, 0, 0])
+
+
+def test_of_a_lost_ring_nothing_is_followed_but_the_roll():
+    """It was last seen on the axis, moving: a turn that would roll it elsewhere in the image does not there."""
+    tracker, (u, v) = RingTracker(CAMERA, DT), CAMERA.principal_point_px
+    for k in range(20):
+        tracker.predict()
+        tracker.update(seen((u + 20.0 * (k - 19), v)))
+    assert tracker.velocity_px_s[0] > 800.0
+    tracker.lose()
+    before_rad = tracker.roll_rad
+    for _ in range(15):
+        tracker.predict(np.array([0.0, 0.02, 0.0]))
+    assert tracker.roll_rad == pytest.approx(before_rad, abs=1e-3)
+
+
+def test_a_roll_is_filtered_through_the_jump_at_half_a_turn_as_elsewhere():
+    ends = []
+    for roll in (0.0, np.pi):
+        tracker, rng = RingTracker(CAMERA, DT), np.random.default_rng(35)
+        for _ in range(30):
+            tracker.predict()
+            off = roll + 0.02 * rng.standard_normal()
+            tracker.update(replace(seen((500, 400)), roll_rad=float(np.angle(np.exp(1j * off)))))
+            ends.append(tracker.roll_rad - roll)
+    turns = (np.array(ends[:30]) - ends[30:]) / (2.0 * np.pi)
+    np.testing.assert_allclose(turns, np.rint(turns), atol=1e-9)
+
+
+def test_a_roll_with_new_numbers_is_known_as_well_as_it_was_measured():
+    """0.5 px at 100 px; what the next frame says of it counts for about half."""
+    tracker = RingTracker(CAMERA, DT)
+    for _ in range(30):
+        tracker.predict()
+        tracker.update(seen((500, 400)))
+    for roll_rad in (np.deg2rad(135.0), np.deg2rad(137.0)):
+        tracker.predict()
+        assert tracker.update(replace(seen((500, 400)), roll_rad=roll_rad))
+    assert np.rad2deg(tracker.roll_rad) > 135.8
+
+
+def test_the_gate_is_chi_square_s_of_three_degrees_of_freedom():
+    limit, squares = chi2.ppf(TrackSettings().gate_probability, 3), []
+    for off_px in np.linspace(30.0, 60.0, 31):
+        tracker = RingTracker(CAMERA, DT)
+        tracker.update(seen((500, 400)))
+        tracker.predict()
+        taken = tracker.update(seen((500 + off_px, 400)))
+        squares.append(tracker.normalised_innovation_squared)
+        assert taken == (squares[-1] <= limit)
+    assert min(squares) < chi2.ppf(TrackSettings().gate_probability, 2) < limit < max(squares)
+    assert ((np.array(squares) > 0.9 * limit) & (np.array(squares) < limit)).any()
+
+
 def test_a_frame_interval_that_is_not_positive_is_refused():
     with pytest.raises(DockairError, match="frame_interval_s"):
         RingTracker(CAMERA, 0.0)
