@@ -267,6 +267,20 @@ def test_a_gust_s_noise_enters_velocity_and_swing_within_the_step():
     np.testing.assert_allclose(P, expected, atol=1e-15)
 
 
+def test_a_white_drive_s_share_of_the_place_within_a_step_is_the_double_integral_s():
+    """Of one step dt: q dt^3/3 of the place, q dt^2/2 with the rate, q dt of the rate, and so of the swing across."""
+    q2, other2, dt = 0.05, 0.02, 0.01
+    given = samples(np.zeros(3), np.zeros(3), dt, 100.0)
+    driven = SILENT._replace(drive2=q2, accelerometer2=other2)
+    P = propagated(R0, np.zeros((8, 3)), ZERO, 0.0, dt, *given, driven.flat())[2]
+    once = np.array([[dt**3 / 3.0, dt**2 / 2.0], [dt**2 / 2.0, dt]])
+    for axis in range(3):
+        moved, swung = np.array([3, 6]) + axis, np.array([9, 12]) + axis
+        np.testing.assert_allclose(P[np.ix_(moved, moved)], (q2 + other2) * once, rtol=1e-9)
+        np.testing.assert_allclose(P[np.ix_(moved, swung)], SWINGS[axis] * q2 * once, rtol=1e-9)
+        np.testing.assert_allclose(P[np.ix_(swung, swung)], SWINGS[axis] * q2 * once, rtol=1e-9)
+
+
 def test_errors_of_all_but_gyro_and_rest_move_to_the_last_digits_as_the_state_does():
     """Where the body does not turn Eq. (2) is linear in them: differences of the state, of any size, are the errors."""
     given, free = samples(X0[4], np.array([0.2, 0.4, 9.5]), 0.1), np.r_[3 : BIAS.start, BIAS.stop : REST.start, 24:27]

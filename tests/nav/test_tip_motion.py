@@ -139,6 +139,7 @@ def test_after_a_long_gap_a_bias_has_done_nothing_yet_to_gravity_found_anew():
         motion.change_m_s(-GRAVITY, bias, CALIBRATED, STEP_S)
     for _ in range(20):
         motion.change_m_s(np.full(3, np.nan), bias, CALIBRATED, STEP_S)
+    motion.change_m_s(-GRAVITY, bias, CALIBRATED, STEP_S)
     for _ in range(1010):
         change = motion.change_m_s(-GRAVITY, CALIBRATED, bias, STEP_S)
     np.testing.assert_allclose(change, 0.0, atol=1e-12)
