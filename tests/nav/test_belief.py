@@ -109,6 +109,14 @@ def test_strain_of_a_frontal_ring_moves_no_pose():
     assert np.abs((J @ keystone)[:3]).max() > 1.0  # but keystone does
 
 
+@pytest.mark.parametrize("range_m", [3.0, 30.0, 100.0])
+def test_leds_that_are_off_as_a_tilt_would_show_them_are_taken_for_that_tilt(range_m):
+    """Frontal: by a turn u about y an LED goes farther by u z, and is seen as one at (y, z) (1 - u z / range) is."""
+    y, z = LEDS[:, 1], LEDS[:, 2]
+    J = ring_sensitivity(np.eye(3), np.array([range_m, 0.0, 0.0]), LEDS)
+    np.testing.assert_allclose(J @ (-np.column_stack([y, z]) * z[:, None] / range_m).ravel(), np.eye(6)[1], atol=1e-6)
+
+
 def test_predicted_pose_is_uncertain_by_the_calibration_too():
     P = np.zeros((ERRORS, ERRORS))
     P[CALIBRATION.start + 1, CALIBRATION.start + 1] = 1e-6  # the camera turned by 1 mrad about the body's y

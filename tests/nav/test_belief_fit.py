@@ -119,6 +119,27 @@ def test_a_start_behind_the_camera_is_refused():
     assert fitted(R_0, P_0, LEDS, np.eye(22), ab, whiten, R_0, -P_0)[0] == -1
 
 
+def believed_too_far(true_m):
+    """A ring on the axis that is believed 6 m ahead, by 10 m: from there one step to where it is goes behind the lens.
+
+    By the image's scale f/x, dx = 6 m - (6 m)^2 / x.
+    """
+    p, C = np.array([6.0, 0.0, 0.0]), np.diag(np.repeat([0.05, 10.0, 3e-4], [3, 3, 16]) ** 2)
+    pixels = CAMERA.pixels_from_points(LEDS + [true_m, 0.0, 0.0])
+    lines = lines_of_sight_from_pixels(pixels, LEDS, CAMERA, np.full(8, 0.3))
+    return fitted(np.eye(3), p, LEDS, C, *image_of(lines.rays, lines.weights), np.eye(3), p)
+
+
+def test_a_step_that_goes_behind_the_camera_is_shortened_until_it_does_not():
+    settled, _, _, y, *_ = believed_too_far(0.6)
+    assert settled == 1
+    np.testing.assert_allclose(y[3:6], [-5.4, 0.0, 0.0], atol=0.01)
+
+
+def test_a_fit_without_any_step_that_stays_ahead_of_the_camera_has_not_ended():
+    assert believed_too_far(0.02)[0] == 0
+
+
 def test_distance_is_in_sigmas_of_the_pose_alone():
     rng = np.random.default_rng(4)
     shape = rng.standard_normal((6, 6))

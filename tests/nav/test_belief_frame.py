@@ -93,6 +93,13 @@ def test_a_belief_without_a_pose_of_the_frame_s_own_has_no_shoulder():
     assert end.y[1] == pytest.approx(np.deg2rad(23.0), abs=0.01)
 
 
+def test_a_fit_that_has_not_ended_explains_nothing():
+    """Believed 6 m ahead, by 10 m, and seen at 2 cm: no step from there stays ahead of the camera."""
+    seen = believed(tilted(0.0, 6.0), 3.0)
+    seen.C[range(3, 6), range(3, 6)] = 100.0
+    assert explanations(seen, frame(tilted(0.0, 0.02)), []) == []
+
+
 def test_nothing_explains_leds_that_are_believed_behind_the_camera():
     true = tilted(6.0, 5.0)
     assert explanations(believed(tilted(6.0, -5.0), 2.0), frame(true), []) == []

@@ -12,7 +12,7 @@ from dockair.nav.belief_update import BeliefUpdate
 from dockair.nav.fusion_settings import FusionSettings
 from dockair.nav.navigator_settings import NavigatorSettings
 from dockair.nav.pose.estimate import solve_pose
-from dockair.rotations import Array, matrix_from_yaw_pitch_roll
+from dockair.rotations import Array, exp, matrix_from_yaw_pitch_roll
 
 RING, CAMERA = LedRing().positions_D, Camera()
 R_CD, P_CD = matrix_from_yaw_pitch_roll(0.05, 0.25, 0.1), np.array([4.0, 0.5, -0.3])
@@ -36,10 +36,11 @@ class Believes:
     def __init__(self, learnt_m: Array | None = None) -> None:
         self.takes, self.was_contradicted = True, False
         self.poses, self.leds, self.begun = [], [], []
+        self.R_CD = R_CD
         self.learnt_m = np.zeros((8, 3)) if learnt_m is None else learnt_m
 
     def predicted_pose(self, time_s):
-        return R_CD, P_CD, np.diag([1e-4] * 3 + [1e-2] * 3)
+        return self.R_CD, P_CD, np.diag([1e-4] * 3 + [1e-2] * 3)
 
     def led_points_D(self, time_s):
         return RING + self.learnt_m
@@ -140,6 +141,17 @@ def test_three_leds_are_a_pose_with_the_attitude_that_is_believed():
     update.use(observed(list(range(8))))
     assert update.use(three) == "pose used"
     np.testing.assert_allclose(belief.poses[1][0].p_CD, P_CD, atol=1e-4)
+
+
+@pytest.mark.parametrize(("count", "status"), [(6, "pose used"), (5, "pose inconsistent")])
+def test_fewer_leds_than_test_one_another_are_held_against_the_attitude_that_is_believed(count, status):
+    """It is known to 0.6 degrees, and off by 6."""
+    assert SETTINGS.alone_leds == 6
+    belief = Believes()
+    update, _ = made(belief)
+    update.use(observed(list(range(8))))
+    belief.R_CD = exp(np.array([0.0, 0.1, 0.0])) @ R_CD
+    assert update.use(observed(list(range(count)), 1.02)) == status
 
 
 def test_what_the_filter_refuses_is_told_once_it_contradicts_the_belief():

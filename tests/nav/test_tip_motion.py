@@ -130,16 +130,3 @@ def test_through_a_short_gap_gravity_is_carried_for_all_of_its_time():
         force = nothing if 1200 <= k < 1206 else -exp(-w * k * STEP_S) @ GRAVITY
         change = motion.change_m_s(force, w, CALIBRATED, STEP_S)
     np.testing.assert_allclose(change, np.cross(w, np.cross(w, P_IP)) * STEP_S, atol=1e-9)
-
-
-def test_after_a_long_gap_a_bias_has_done_nothing_yet_to_gravity_found_anew():
-    """Standing still with 0.001 rad/s that are taken for a turn for 12 s, unfelt for 0.2 s, and then known."""
-    bias, motion = np.array([0.0, 0.001, 0.0]), TipMotion(P_IP, 60.0)
-    for _ in range(1200):
-        motion.change_m_s(-GRAVITY, bias, CALIBRATED, STEP_S)
-    for _ in range(20):
-        motion.change_m_s(np.full(3, np.nan), bias, CALIBRATED, STEP_S)
-    motion.change_m_s(-GRAVITY, bias, CALIBRATED, STEP_S)
-    for _ in range(1010):
-        change = motion.change_m_s(-GRAVITY, CALIBRATED, bias, STEP_S)
-    np.testing.assert_allclose(change, 0.0, atol=1e-12)
