@@ -10,7 +10,9 @@ from dockair.calibration import Camera, GyroSheet, LedRing, Mounting, Navigation
 from dockair.errors import DockairError
 from dockair.messages import ImuSample
 from dockair.nav import belief_buffer
+from dockair.nav.belief import mixture
 from dockair.nav.belief_motion import BIAS, CALIBRATION, ERRORS, GUST, SWING, SWING_RATE, VELOCITY, propagated
+from dockair.nav.belief_motion import RING as LED_PLACES
 from dockair.nav.fusion import FusionSettings, RelativeFilter
 from dockair.nav.fusion_settings import motion_of, refusals_until_doubt, start_of, swing_covariance, taking_of
 from dockair.nav.pose.estimate import PoseEstimate, solve_pose
@@ -1083,3 +1085,51 @@ def test_the_first_force_is_the_formation_s_of_frames_before_it_too():
     ]
     filter_.propagate(still)
     np.testing.assert_allclose(filter_.p_PD_B(5.2), before_m, atol=1e-4)
+
+
+def test_what_was_foretold_in_a_silence_is_forgotten_once_a_sample_ends_it():
+    """Asked in the silence or not, two filters say the same after it."""
+    asked, quiet = RelativeFilter(sheets(6.0)), RelativeFilter(sheets(6.0))
+    w_I = np.array([0.2, -0.1, 0.3])
+    for filter_ in (asked, quiet):
+        filter_.propagate([ImuSample(time_stamp_s=k / 250.0, angular_rate_rad_s=0.0 * w_I) for k in range(26)])
+    asked.state(0.6)  # longer than the buffer
+    again = [ImuSample(time_stamp_s=time_s, angular_rate_rad_s=w_I) for time_s in (0.65, 0.654)]
+    for filter_ in (asked, quiet):
+        assert filter_.propagate(again) == again[1:]  # the first one leaps
+    np.testing.assert_array_equal(state_of(asked, 0.7), state_of(quiet, 0.7))
+
+
+def test_two_hypotheses_are_told_as_their_mixture():
+    """Frontal at 20 m, 0.1 rad either way: of both together the attitude is uncertain by what they are apart."""
+    far = sheets(20.0, sigma_R_rad=0.14)
+    far = replace(far, start=replace(far.start, R_BD=MOUNTING.R_BC))
+    filter_ = RelativeFilter(far, SETTINGS)
+    _, p, _ = filter_.predicted_pose(0.0)
+    pixels = CAMERA.pixels_from_points(RING @ matrix_from_yaw_pitch_roll(0.0, 0.1, 0.0).T + p)
+    assert filter_.update(solve_pose(pixels, RING, CAMERA, sigma_px=0.1), 0.0)
+    beliefs, state = filter_._buffer.beliefs(0.0), filter_.state(0.0)
+    assert len(beliefs) == 2
+    both = mixture(beliefs)
+    np.testing.assert_array_equal(state.R_BD, both.R_BD)
+    np.testing.assert_array_equal(state.p_PD_B, both.p_ID - TIP_FROM_IMU)
+    assert np.trace(state.covariance[:3, :3]) > np.trace(beliefs[0].P[:3, :3]) + 0.1 * 0.2**2
+
+
+def test_of_other_leds_no_more_is_known_than_at_the_start():
+    """Their places are the sheet's, to 0.3 mm each, where the drogue was rolled by an LED."""
+    filter_ = RelativeFilter(sheets(6.0), FusionSettings())
+    assert filter_.update(seen_from(filter_, 0.0, (0.0, 0.01, 0.0)), 0.0)
+    assert np.abs(filter_.led_points_D(0.0) - RING).max() > 0.0
+    filter_.turn_drogue(np.pi / 4, 0.0)
+    np.testing.assert_array_equal(filter_.led_points_D(0.0), RING)
+    np.testing.assert_allclose(filter_._buffer.beliefs(0.0)[0].P[LED_PLACES, LED_PLACES], 9e-8 * np.eye(16))
+
+
+def test_a_sample_that_is_near_the_newest_frame_is_no_leap():
+    """The IMU was out for 0.2 s, in which frames came."""
+    filter_ = begun(0.2)
+    for time_s in (0.1, 0.2):
+        assert filter_.update(seen_from(filter_, time_s, (0.0, 0.0, 0.0)), time_s)
+    sample = ImuSample(time_stamp_s=0.204, angular_rate_rad_s=np.zeros(3))
+    assert filter_.propagate([sample]) == [sample]

@@ -380,6 +380,23 @@ def test_the_next_ring_found_after_a_loss_starts_the_filter_afresh():
     assert tracker.update(seen((1200, 700)))
     assert tracker.tracking and tracker.misses == 0
     np.testing.assert_array_equal([*tracker.centre_px, *tracker.velocity_px_s], [1200, 700, 0, 0])
+    assert np.isnan(tracker.normalised_innovation_squared)  # there was nothing to hold it against
+
+
+def test_a_ring_is_followed_by_the_slowest_camera_until_it_is_missed_once():
+    """At 1 Hz a frame lasts ten times as long as a ring that is not seen is followed."""
+    tracker = RingTracker(CAMERA, 1.0)
+    assert tracker.update(seen((500, 400)))
+    assert tracker.tracking
+    tracker.predict()
+    tracker.update(MISSING)
+    assert not tracker.tracking
+
+
+def test_a_ring_as_large_as_the_frame_needs_no_window():
+    tracker = RingTracker(CAMERA, DT)
+    tracker.update(seen((1024, 544), radius=1500.0))
+    assert tracker.tracking and tracker.window() is None
 
 
 def test_of_a_lost_ring_nothing_is_followed_but_the_roll():

@@ -26,6 +26,15 @@ def test_a_ring_at_rest_is_seen_where_the_pinhole_puts_it_after_a_turn(angle_rad
         assert ours[2] == pytest.approx(f * RADIUS_M / after_C[0], rel=1e-12)
 
 
+@pytest.mark.parametrize(("turn_rad", "after_m"), [(0.0, 0.5), (np.pi, 0.1)])
+def test_a_ring_that_a_turn_brings_behind_the_lens_is_taken_to_be_just_ahead_of_it(turn_rad, after_m):
+    """0.5 m ahead of a camera 3 m ahead of what it turns about: half a turn brings it 6.5 m behind."""
+    optics, lever_C = (CAMERA.focal_length_px, CAMERA.principal_point_px, RADIUS_M), np.array([3.0, 0.0, 0.0])
+    state = np.array([*CAMERA.principal_point_px, CAMERA.focal_length_px * RADIUS_M / 0.5, 0.0, 0.0, 0.0, 0.0, 0.0])
+    r = turned(state, np.array([0.0, 0.0, turn_rad]), *optics, lever_C)[2]
+    assert r == pytest.approx(CAMERA.focal_length_px * RADIUS_M / after_m)
+
+
 def test_roll_about_the_boresight_turns_the_image_the_other_way():
     state = np.array([*CAMERA.principal_point_px, 100.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     turn = np.array([0.02, 0.0, 0.0])
