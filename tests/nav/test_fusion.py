@@ -970,6 +970,13 @@ def test_a_late_frame_leaves_a_doubt_after_it_as_it_was():
     np.testing.assert_array_equal(state_of(late, 0.1), state_of(in_time, 0.1))
 
 
+def test_the_newest_doubt_is_told_though_late_frames_are_doubted_after_it():
+    filter_, frames = struck_filter()
+    late = [(seen_from(filter_, 0.04 + 5e-4 * k, (0.0, -0.1, 0.0)), 0.04 + 5e-4 * k) for k in (1, 2, 3)]
+    assert [filter_.update(*frame) for frame in late] == [False, False, True]
+    assert filter_.doubted_s == frames[-1][1]
+
+
 def test_a_frame_that_a_late_one_shows_to_be_false_is_taken_back():
     """Within the start's 0.2 m the drogue may be 0.8 m aside; not a millisecond after it was seen elsewhere."""
     filter_, twin = begun(0.2), begun(0.2)
