@@ -157,6 +157,27 @@ def test_a_claim_is_held_against_a_group_whose_flights_are_all_as_the_scenario_i
     assert groups["default", "predictive", "turbulence.sigma_m_s=3.0"]["shortfalls"] is None
 
 
+def test_a_group_of_which_a_part_is_not_as_the_scenario_is_written_is_held_to_no_claim(tmp_path):
+    """Set to what it is by default the controller makes no other group; but the plan has changed the scenario."""
+    changed = '{ scenario = "default", seeds = [7], set = { "guidance.controller" = "predictive" } }'
+    (group,) = claims(tmp_path, f'"default", {changed}').values()
+    assert (group["flights"], group["shortfalls"]) == (4, None)
+
+
+def test_the_summary_has_the_spread_of_the_contacts_and_what_was_unsafe_or_an_error(tmp_path):
+    """Offsets of 0, 1 .. 20 cm: median 10, 95 in 100 within 19."""
+    path = tmp_path / "p.toml"
+    path.write_text(PLAN.format(seeds=24, scenarios='"default"'))
+    jobs = jobs_of(PlanFile(path))
+    docked = [columns_of(result()) | {"radial_offset_m": 0.01 * k, "closure_speed_m_s": 1.2} for k in range(21)]
+    others = [columns_of(result(contact=None, outcome="miss")) | {"unsafe": said} for said in ("touch", "collision")]
+    answers = [*(Answer(columns=columns) for columns in docked + others), Answer(columns=None, error="broke")]
+    (group,) = summary_of([row_of(job, answer) for job, answer in zip(jobs, answers, strict=True)], jobs)
+    assert group["radial_offset_m"] == pytest.approx({"median": 0.1, "p95": 0.19, "min": 0.0, "max": 0.2})
+    assert group["closure_speed_m_s"] == pytest.approx({"median": 1.2, "p95": 1.2, "min": 1.2, "max": 1.2})
+    assert (group["flights"], group["unsafe"], group["errors"]) == (24, 2, 1)
+
+
 def test_the_summary_counts_why_flights_began_no_attempt(tmp_path):
     group = claims(tmp_path, '"default"')["default", "predictive", ""]
     assert group["causes"] == {}

@@ -33,7 +33,7 @@ from dockair.scenarios.campaign.journal import Journal
 from dockair.scenarios.campaign.manifest import read_manifest
 from dockair.scenarios.campaign.plan_file import PlanFile
 from dockair.scenarios.campaign.pool import Done, Pool
-from dockair.scenarios.campaign.progress import CampaignProgress, show_campaign
+from dockair.scenarios.campaign.progress import CampaignProgress, _in_words, show_campaign
 from dockair.scenarios.campaign.run import run
 from dockair.scenarios.campaign.table import read_table
 from dockair.scenarios.campaign.worker import Answer, one_line
@@ -1052,6 +1052,15 @@ def test_the_pace_is_that_of_this_run_and_what_is_left_is_what_no_run_has_flown(
     assert progress._pace() == "5.0 a minute, 10 min 0 s left"
     progress._errors = 2
     assert progress._pace() == "5.0 a minute, 10 min 0 s left, 2 errors"
+
+
+@pytest.mark.parametrize(
+    ("seconds", "said"),
+    [(0.4, "0 s"), (59.4, "59 s"), (59.6, "1 min 0 s"), (3599.4, "59 min 59 s"), (3599.6, "1 h 0 min"),
+     (5400.0, "1 h 30 min"), (86400.0, "24 h 0 min")],
+)  # fmt: skip
+def test_what_is_left_is_said_in_seconds_below_an_hour_and_in_minutes_beyond(seconds, said):
+    assert _in_words(seconds) == said
 
 
 def test_the_samplers_of_the_command_line_are_those_of_the_plan():

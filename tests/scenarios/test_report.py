@@ -110,6 +110,7 @@ def test_a_campaign_that_is_not_over_says_how_many_flights_it_plans():
     assert first_line(3, 8) == "3 of 8 flights planned."
     assert first_line(3, 3) == "3 flights."
     assert first_line(1, 1) == "1 flight."
+    assert first_line(3, 2) == "3 flights."  # a damaged manifest makes no flight unflown
 
 
 def test_the_seeds_of_a_group_are_told_with_their_gaps():
@@ -561,6 +562,8 @@ def test_a_flight_in_two_campaigns_is_refused(tmp_path):
     assert len(read_campaigns(folders[:1])[0].rows) == 1
     with pytest.raises(DockairError, match="seed 0, in .*/a and .*/b"):
         read_campaigns(folders)
+    table.write_table([_row(0, sensing="truth"), _row(1)], folders[1])  # the same seed, by others
+    assert [len(campaign.rows) for campaign in read_campaigns(folders)] == [1, 2]
 
 
 def test_a_folder_without_a_campaign_is_one_clear_line(tmp_path):
