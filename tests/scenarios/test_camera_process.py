@@ -256,6 +256,18 @@ def test_who_waits_for_long_sleeps(monkeypatch):
     later.join()
 
 
+def test_the_time_waited_adds_up_over_all_messages(monkeypatch):
+    """By a clock that is looked at before and after each wait: 1 s for the first message, 10 s for the second."""
+    ours, theirs = multiprocessing.Pipe()
+    times = iter([5.0, 6.0, 100.0, 110.0])
+    inbox = camera_process._Inbox(ours)
+    monkeypatch.setattr(camera_process, "time", SimpleNamespace(perf_counter=lambda: next(times)))
+    for _ in range(2):
+        theirs.send("frame")
+        assert inbox.next() == "frame"
+    assert inbox.waited_s == 11.0
+
+
 def test_an_inbox_whose_other_end_was_closed_says_so(monkeypatch):
     monkeypatch.setattr(camera_process, "_AWAKE_S", 60.0)
     ours, theirs = multiprocessing.Pipe()

@@ -369,6 +369,23 @@ def test_a_touch_between_two_control_ticks_begins_an_attempt(env, monkeypatch):
     assert info["outcome"] == "rim_strike"  # four metres behind: over as soon as it has begun
 
 
+def test_each_failed_attempt_but_the_last_costs_one_and_the_last_its_outcome_alone(monkeypatch):
+    """A touch four metres behind the ring is over a control tick later: two in one step, then the last of three."""
+    flown = DockEnv(QUICK, attempts=3, reward="sparse", ticks_per_step=4)
+    flown.reset(seed=0)
+    world, ticks = flown._flight.world, iter(range(1000))
+    step = world.step
+    touches = (3, 23, 43)  # of the physics, ten of which are a control tick
+    monkeypatch.setattr(
+        world, "step", lambda command: replace(step(command), probe_touches_drogue=next(ticks) in touches)
+    )
+    _, both, *_, info = flown.step(np.zeros(6, np.float32))
+    assert (both, info["attempt"], info["outcome"]) == (-2.0, 3, "")
+    _, last, *_, info = flown.step(np.zeros(6, np.float32))
+    assert (last, info["outcome"]) == (OUTCOME_REWARD[Outcome.RIM_STRIKE], "rim_strike")
+    flown.close()
+
+
 def test_until_clear_an_attempt_has_failed_when_the_next_begins(monkeypatch):
     flown = DockEnv(QUICK, until_clear=True, reward="sparse")
     flown.reset(seed=0)
