@@ -8,7 +8,7 @@ import pytest
 
 from dockair.scenarios.campaign.jobs import jobs_of
 from dockair.scenarios.campaign.plan_file import PlanFile
-from dockair.scenarios.campaign.row import COLUMNS, column_names, columns_of, is_row, row_of, unflown
+from dockair.scenarios.campaign.row import COLUMNS, as_asked, column_names, columns_of, is_row, row_of, unflown
 from dockair.scenarios.campaign.summary import summary_of
 from dockair.scenarios.campaign.table import read_table, write_table
 from dockair.scenarios.campaign.worker import Answer
@@ -87,6 +87,12 @@ def test_a_row_says_the_rims_radius_of_its_scenarios_drogue_and_one_of_before_it
     assert (own["rim_radius_m"], other["rim_radius_m"]) == (0.25, 0.305)
     before = {name: value for name, value in other.items() if name != "rim_radius_m"}
     assert is_row(before)
+
+
+def test_a_row_of_before_is_said_as_the_plan_says_it_now_and_keeps_no_key_that_is_no_longer_drawn(job):
+    flown = row_of(job, Answer(columns=columns_of(result())))
+    before = flown | {"set.turbulence.sigma_m_s": 0.5, "set.start.aft_m": 9, "command": "dockair fly other"}
+    assert as_asked(before, job) == flown
 
 
 def test_without_contact_its_columns_are_empty_and_what_was_unsafe_is_one_text(job):

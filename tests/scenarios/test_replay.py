@@ -222,6 +222,7 @@ def test_a_folder_without_a_recording_is_refused_with_one_line(tmp_path):
 
 def test_bits_are_compared_and_not_values():
     assert same_bits(np.array([np.nan, 1.0]), np.array([np.nan, 1.0]))
+    assert same_bits(np.array([np.nan]), np.array([-np.nan]))  # whatever the sign and the rest of it
     assert not same_bits(np.array([0.0]), np.array([-0.0]))
     assert not same_bits(np.array([1.0]), np.array([1.0, 1.0]))
     assert not same_bits(np.array([1.0]), np.array([np.nan]))
