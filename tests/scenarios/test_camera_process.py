@@ -256,6 +256,15 @@ def test_who_waits_for_long_sleeps(monkeypatch):
     later.join()
 
 
+def test_an_error_that_came_through_the_pipe_has_what_it_had():
+    refused = DockairError("camera", expected="a window inside", got=(1, 2), exists=("a", "b"))
+    made = camera_process._Failed(type(refused), refused.args, refused.__dict__).error()
+    assert (type(made), str(made), made.args, made.__dict__) == (
+        DockairError, str(refused), refused.args, refused.__dict__,
+    )  # fmt: skip
+    assert refused.__dict__
+
+
 def test_the_time_waited_adds_up_over_all_messages(monkeypatch):
     """By a clock that is looked at before and after each wait: 1 s for the first message, 10 s for the second."""
     ours, theirs = multiprocessing.Pipe()

@@ -400,6 +400,7 @@ def test_until_clear_an_attempt_has_failed_when_the_next_begins(monkeypatch):
 
 def test_the_newest_sample_is_observed_until_the_next(env):
     env.reset(seed=0, options={"set": {"faults": [{"kind": "gyro_drop_out", "start_s": 0.02, "stop_s": 9.0}]}})
+    assert len(env.tick.imu) > 1 and env.imu is env.tick.imu[-1]
     for _ in range(3):
         observation, *_ = env.step(np.zeros(6, np.float32))
     named = dict(zip([entry.name for entry in OBSERVATION], observation, strict=True))
