@@ -33,7 +33,7 @@ from dockair.scenarios.campaign.journal import Journal
 from dockair.scenarios.campaign.manifest import read_manifest
 from dockair.scenarios.campaign.plan_file import PlanFile
 from dockair.scenarios.campaign.pool import Done, Pool
-from dockair.scenarios.campaign.progress import CampaignProgress, _in_words, show_campaign
+from dockair.scenarios.campaign.progress import CampaignProgress, _in_words, docked, show_campaign
 from dockair.scenarios.campaign.run import run
 from dockair.scenarios.campaign.table import read_table
 from dockair.scenarios.campaign.worker import Answer, one_line
@@ -1061,6 +1061,10 @@ def test_the_pace_is_that_of_this_run_and_what_is_left_is_what_no_run_has_flown(
 )  # fmt: skip
 def test_what_is_left_is_said_in_seconds_below_an_hour_and_in_minutes_beyond(seconds, said):
     assert _in_words(seconds) == said
+
+
+def test_a_rate_is_said_with_the_lower_end_of_its_interval_first():
+    assert docked(9, 10) == "9 of 10 docked (60-98 %)"
 
 
 def test_the_samplers_of_the_command_line_are_those_of_the_plan():
