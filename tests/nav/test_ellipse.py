@@ -200,3 +200,11 @@ def test_perspective_moves_the_places_as_far_as_the_digest_says(ring_scene):
 )
 def test_points_that_fix_no_ellipse_give_none(points):
     assert fit_ellipse(points) is None
+
+
+def test_an_upright_ellipse_has_its_major_axis_at_plus_a_quarter_turn():
+    """Of the two angles only pi/2 is in (-pi/2, pi/2]; 4 x^2 + y^2 = 4 either way round."""
+    for sign in (1.0, -1.0):
+        upright = ellipse_from_conic(sign * np.array([4.0, 0.0, 1.0, 0.0, 0.0, -4.0]))
+        assert upright.angle_rad == 0.5 * np.pi
+        np.testing.assert_allclose(upright.semi_axes_px, [2.0, 1.0])

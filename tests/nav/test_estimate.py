@@ -412,6 +412,18 @@ def test_isotropic_weight_is_near_the_efficient_one_on_the_axis_and_worse_off_it
     assert ratio > 1.1
 
 
+def test_hubers_cost_is_the_square_up_to_k_and_linear_beyond():
+    """r^2 up to k, 2 k r - k^2 beyond; chi2 stays the sum of squares."""
+    R, p = tilted(15.0, 6.0)
+    pixels = pixels_of(R, p) + 0.1 * np.random.default_rng(11).standard_normal((8, 2))
+    pixels[2] += [0.0, 4.0]
+    pose = solve_pose(pixels, RING, CAMERA, options=PoseOptions(huber_sigma=3.0))
+    r = np.sqrt(pose.led_chi2)
+    assert np.count_nonzero(r > 3.0) > 0 and np.count_nonzero(r < 3.0) > 0
+    assert pose.cost == pytest.approx(np.where(r <= 3.0, r**2, 6.0 * r - 9.0).sum())
+    assert pose.chi2 == pytest.approx((r**2).sum())
+
+
 def test_hubers_loss_leaves_a_wrong_led_where_it_is_and_shows_it():
     rng, (R, p) = np.random.default_rng(52), tilted(15.0, 8.0)
     pixels = pixels_of(R, p) + 0.1 * rng.normal(size=(8, 2))
@@ -465,7 +477,8 @@ def test_any_pixels_give_a_status_and_nan_covariance_unless_converged(pixels, me
         assert np.isfinite(estimate.p_CD).all() and np.isfinite(estimate.R_CD).all()
         seen = np.isfinite(estimate.led_chi2)
         assert ((points @ estimate.R_CD.T + estimate.p_CD)[seen, 0] > 0.0).all()  # every LED used is ahead
-        assert (np.linalg.eigvalsh(estimate.covariance) > 0.0).all()
+        sigma = np.sqrt(np.diag(estimate.covariance))  # up to 1e6 m: unscaled, rounding is as large as the least root
+        assert (np.linalg.eigvalsh(estimate.covariance / np.outer(sigma, sigma)) > 0.0).all()
 
 
 @pytest.mark.parametrize(

@@ -625,6 +625,19 @@ def test_measured_leds_too_few_for_a_ring_are_a_frame_of_the_whole_field_that_sh
     assert [state.not_shown for state in states] == [True, True, False]
 
 
+def test_guidance_is_told_where_the_coupling_is_and_how_well_the_drogue_is_known_across():
+    """The coupling is forward of the ring's plane along the drogue's own x axis, which is tilted here."""
+    sky = Sky(None, still)
+    states = told(sky)
+    for _ in range(50):
+        solution = step_on_leds(sky, range(8))
+    depth_D = np.array([sky.sheets.coupling_depth_m, 0.0, 0.0])
+    np.testing.assert_allclose(states[-1].p_PK_B, solution.p_PD_B + solution.R_BD @ depth_D, atol=1e-12)
+    across = np.linalg.eigvalsh(solution.covariance[4:6, 4:6])
+    assert states[-1].sigma_lateral_m == pytest.approx(np.sqrt(across[-1]))
+    assert states[-1].sigma_lateral_m < 0.95 * np.sqrt(solution.covariance[3, 3])  # it is better known than along
+
+
 @pytest.mark.parametrize(("roll_deg", "pitch_deg"), [(15.0, 0.0), (-35.0, 0.0), (0.0, 8.0)])
 def test_a_receiver_that_stands_otherwise_when_it_sees_the_drogue_again_goes_on(render, roll_deg, pitch_deg):
     """Turned by its gyro while it saw nothing: the attitude at the start says nothing any more."""
@@ -1089,15 +1102,21 @@ def test_a_lost_drogue_is_not_looked_for_where_an_old_frame_shows_it():
     assert np.abs(after.p_PD_B - before.p_PD_B).max() < 0.02
 
 
-def test_a_frame_of_a_time_that_has_not_come_is_no_reason_to_fly_on_the_state():
-    """It is taken, as the clocks of camera and IMU may differ; flown on is the state once the time has come."""
+@pytest.mark.parametrize(
+    ("ahead_s", "valid"),
+    [(0.018, [False, False, True, True]), (0.006, [False, True, True, True]), (0.004, [True, True, True, True])],
+)
+def test_a_frame_of_a_time_that_has_not_come_is_no_reason_to_fly_on_the_state(ahead_s, valid):
+    """It is taken, as the clocks of camera and IMU may differ; flown on is the state half a tick before its time."""
     sky = Sky(None, still)
     for _ in range(50):
         step_on_leds(sky, range(8))
     imu = sky.imu()
-    early = sky.navigator.step(imu, named(sky, range(8), imu[-1].time_stamp_s + 0.018))
+    early = sky.navigator.step(imu, named(sky, range(8), imu[-1].time_stamp_s + ahead_s))
     assert early.status == "pose used" and early.frame_time_stamp_s > early.time_stamp_s
-    assert [early.valid, *(sky.navigator.step(sky.imu(), None).valid for _ in range(3))] == [False, False, True, True]
+    solutions = [early, *(sky.navigator.step(sky.imu(), None) for _ in range(3))]
+    assert [solution.valid for solution in solutions] == valid
+    assert [bool(np.isfinite(solution.covariance).all()) for solution in solutions] == valid  # else none is given
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from dockair.calibration import Camera, LedRing
-from dockair.nav.identify.perspective import fit_ring
+from dockair.nav.identify.perspective import fit_ring, undistorted, undistorted_prediction
 from dockair.rotations import matrix_from_yaw_pitch_roll
 
 CAMERA = Camera()
@@ -77,3 +77,24 @@ def test_of_two_poses_alike_the_one_within_the_tilt_is_taken():
         bounded.append(fit_ring(points, slots, *camera, **TOLERANCES, max_tilt_rad=limit).tilt_rad)
     assert (np.array(free) > limit).sum() >= 5  # the limit is needed
     assert (np.array(bounded) <= limit).all()
+
+
+def test_the_rms_is_over_the_degrees_of_freedom_and_none_without_any(ring_scene):
+    """Six are fitted: of eight LEDs ten are left, of four two, of three none."""
+    scene = ring_scene(np.random.default_rng(34), visible=8)
+    slots = np.argsort(scene.numbers)
+    for leds, freedom in ((8, 10), (4, 2), (3, 0)):
+        points = scene.points[slots[:leds]]
+        found = fit(points, np.where(np.arange(8) < leds, np.arange(8), -1))
+        assert found.count == leds
+        squares = ((points - found.slots_px[:leds]) ** 2).sum()
+        assert found.rms_px == pytest.approx(np.sqrt(squares / freedom) if freedom else 0.0)
+
+
+def test_a_prediction_in_which_no_ray_makes_an_led_is_left_as_it_is():
+    camera = Camera(distortion=(-0.3, 0.0, 0.0, 0.0, 0.0))
+    near = np.array(camera.principal_point_px) + np.array([[300.0, 100.0], [-200.0, 50.0]])
+    assert np.abs(undistorted_prediction(near, camera) - near).max() > 0.5
+    beyond = np.vstack([near, np.array(camera.principal_point_px) + [20000.0, 0.0]])
+    assert np.isnan(undistorted(beyond, camera)[2]).all()
+    np.testing.assert_array_equal(undistorted_prediction(beyond, camera), beyond)

@@ -318,17 +318,13 @@ def test_candidates_are_those_within_reach_and_of_too_many_those_nearest_to_the_
 
 
 def test_five_leds_on_one_side_make_the_ellipse_of_the_whole_ring():
-    """Through five points alone with 0.1 px of noise its centre may be tens of pixels off."""
-    tried = 0
-    for seed in range(8):
-        rng = np.random.default_rng(seed)
-        points = leds()
-        seen = points[1:6] + rng.normal(0.0, 0.1, (5, 2))
+    """A far ring with 0.1 px of noise: through the five points alone the centre is up to 0.8 px off."""
+    points = leds(radius=30.0)
+    for seed in range(12):
+        seen = points[1:6] + np.random.default_rng(seed).normal(0.0, 0.1, (5, 2))
         result = identify(seen, expected_led_px=points)
-        if result.status is FOUND:
-            tried += 1
-            np.testing.assert_allclose(result.ellipse.centre_px, [900.0, 500.0], atol=2.0)
-    assert tried >= 6
+        assert result.status is FOUND
+        np.testing.assert_allclose(result.ellipse.centre_px, [900.0, 500.0], atol=0.2)
 
 
 def test_of_credible_rings_size_counts_before_roll():

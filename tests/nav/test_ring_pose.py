@@ -1,6 +1,7 @@
 """The least-squares pose of a ring and the candidates on it."""
 
 import numpy as np
+import pytest
 
 from dockair.nav.identify.ring_pose import normal_equations, orthonormalise, project
 from dockair.rotations import exp
@@ -44,3 +45,10 @@ def test_orthonormal_axes_stay_in_their_plane():
         np.testing.assert_allclose(pose[1:] @ pose[1:].T, np.eye(2), atol=1e-12)
         np.testing.assert_allclose(np.cross(*pose[1:]) @ before[1:].T, 0.0, atol=1e-12)
         assert pose[1] @ before[1] > 0.0 and pose[2] @ before[2] > 0.0
+
+
+def test_a_slot_behind_the_camera_has_an_image_far_off_and_none_that_is_mirrored():
+    """A ring in the plane of the line of sight, half a radius ahead: slot 4 is half a radius behind the camera."""
+    image = image_of(np.array([[0.5, 0.1, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]))
+    assert image[0, 0] == pytest.approx(-0.1 / 1.5)
+    assert image[4, 0] < -1e4  # mirrored: 0.2

@@ -83,3 +83,10 @@ def test_bounded_distances_find_the_ring_where_the_printed_ones_find_the_median(
 
 def test_two_candidates_make_no_circle():
     assert most_trusted_circle(np.zeros((2, 2))) is None
+
+
+def test_members_are_the_candidates_within_a_tenth_of_the_radius():
+    points = np.vstack([ring((500.0, 400.0), 100.0), [609.5, 400.0], [500.0, 289.5], [390.5, 400.0], [589.5, 400.0]])
+    best = most_trusted_circle(points, cap_px=5.0)
+    np.testing.assert_allclose([*best.centre_px, best.radius_px], [500.0, 400.0, 100.0], atol=1e-6)
+    np.testing.assert_array_equal(best.members, [*range(9), 10])
