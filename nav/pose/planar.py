@@ -155,9 +155,7 @@ def mirrored(R_CD: Array, p_CD: Array, points_D: Array) -> tuple[Array, Array]:
             middle[i] += R_CD[i, j] * mean[j]
             normal[i] += R_CD[i, j] * axes[2, j]
     sight = middle / np.sqrt((middle**2).sum())
-    cosine = (sight * normal).sum()
-    if cosine < 0.0:
-        cosine, normal = -cosine, -normal
+    cosine = (sight * normal).sum()  # of either sign: what follows has the same of both normals
     k = np.array(
         [
             sight[1] * normal[2] - sight[2] * normal[1],
