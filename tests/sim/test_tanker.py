@@ -188,6 +188,20 @@ def test_racetrack_that_cannot_be_flown_is_refused_by_its_key(changed, where):
         TankerPath(TankerPathParameters(**parameters), V)
 
 
+def test_racetrack_is_flown_as_long_as_rolling_in_and_out_fits_into_the_turn():
+    """Rolling in takes as long as it does out, and turns half as far as the same time in the turn."""
+
+    def racetrack(share: float) -> TankerPath:
+        """One whose rolling in takes a share of the time in which the full bank turns by 180 degrees."""
+        rate = 1.875 * np.tan(BANK) * TURN / np.pi / share  # 1.875: the peak of a smooth change's rate over its mean
+        return TankerPath(TankerPathParameters(manoeuvre="racetrack", bank_rad=BANK, roll_rate_rad_s=rate), V)
+
+    turned = racetrack(0.98).at(1.98 * np.pi / TURN)
+    assert abs(turned.heading_rad) == pytest.approx(np.pi, abs=1e-9)
+    with pytest.raises(DockairError, match=r"tanker\.roll_rate_rad_s: expected a rate at which"):
+        racetrack(1.02)
+
+
 @pytest.mark.parametrize(
     ("changed", "where"),
     [
