@@ -57,6 +57,14 @@ def test_large_rise_of_thrust_is_slow_and_a_fall_quick() -> None:
     assert 1.0 - span.throttle(fall.thrust_n) == pytest.approx(quick, rel=1e-9)
 
 
+def test_thrust_follows_a_small_command_with_the_sheets_time_constant() -> None:
+    """Other than the book's 1 s, whose inverse is the same number."""
+    quick = Actuators(replace(AIRFRAME, engine_time_constant_s=0.25), TRIM, 1e-3)
+    for _ in range(250):
+        quick.step(TRIM.surfaces_rad, TRIM.thrust_n + 1000.0)
+    assert quick.thrust_n - TRIM.thrust_n == pytest.approx(1000.0 * (1.0 - np.exp(-1.0)), rel=1e-9)
+
+
 def test_throttle_is_the_commands_place_in_the_thrust_range() -> None:
     actuators, span = Actuators(AIRFRAME, TRIM, 1e-3), TRIM.thrust_range
     for command_n, throttle in ((-1e6, 0.0), (1e6, 1.0), (0.5 * (span.idle_n + span.military_n), 0.5)):

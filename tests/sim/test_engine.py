@@ -1,5 +1,7 @@
 """The receiver's engine: thrust range, lag, rotor."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -40,6 +42,13 @@ def test_thrust_between_nodes_is_bilinear() -> None:
 def test_lag_is_the_books_up_to_military_power(rise_percent_of_power: float, lag_1_s: float) -> None:
     """RTAU of [Stevens & Lewis, appendix A]: 1 up to 25, 0.1 from 50 on, 1.9 - 0.036 rise between; 50 is military."""
     assert engine_lag_1_s(AIRFRAME, rise_percent_of_power / 50.0) == pytest.approx(lag_1_s, abs=1e-12)
+
+
+def test_lag_goes_from_the_quick_time_constant_to_the_slow_one() -> None:
+    """Both other than the book's, whose quick one is 1 s: its rate is the same number."""
+    other = replace(AIRFRAME, engine_time_constant_s=0.5, engine_slow_time_constant_s=4.0, engine_quick_rise=0.2)
+    rates = [engine_lag_1_s(other, rise) for rise in (-0.5, 0.2, 0.6, 1.0)]
+    assert rates == pytest.approx([2.0, 2.0, 0.5 * (2.0 + 0.25), 0.25])
 
 
 def test_rotor_resists_as_a_spinning_mass_does() -> None:

@@ -1,5 +1,7 @@
 """The receiver's equations of motion about trim, and their Jacobians."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -37,6 +39,16 @@ def test_linear_model_is_the_derivative_of_the_equations_of_motion(airspeed_m_s:
         x, u, g = rng.normal(size=STATES) * 1e-4, rng.normal(size=INPUTS) * 1e-4, rng.normal(size=3) * 1e-4
         slope = 0.5 * (state_derivative(AIRFRAME, trim, x, u, g) - state_derivative(AIRFRAME, trim, -x, -u, -g))
         np.testing.assert_allclose(slope, model.A @ x + model.B @ u + model.B_gust @ g, atol=1e-7)
+
+
+def test_actuators_close_what_they_lack_of_their_commands_at_the_rates_of_the_sheet() -> None:
+    """The engine's other than 1/s, the sheets' own."""
+    airframe = replace(AIRFRAME, engine_time_constant_s=0.25)
+    model = linear_model(airframe, level_trim(airframe, 180.0, standard_atmosphere(6000.0)))
+    rates = np.diag([*np.full(3, airframe.actuator_bandwidth_rad_s), 4.0])
+    np.testing.assert_allclose(model.B[9:], rates, rtol=1e-12)
+    np.testing.assert_allclose(model.A[9:, 9:], -rates, rtol=1e-9, atol=1e-9)
+    assert not model.B[:9].any() and np.abs(model.A[9:, :9]).max() < 1e-9
 
 
 @pytest.mark.parametrize("turn_rate_rad_s", [0.0, 0.025, -0.04])

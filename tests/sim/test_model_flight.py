@@ -1,5 +1,7 @@
 """The model that the receiver's flight control follows: a free rigid body of the on-board airframe."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -68,6 +70,16 @@ def test_model_flies_as_an_independent_integration_of_the_equations_of_motion() 
     np.testing.assert_allclose(flight.w_WB_B, expected[12:15], atol=4e-3)
     np.testing.assert_allclose(flight.actuators, expected[15:], atol=5e-3)
     np.testing.assert_allclose(flight.R_WB @ flight.R_WB.T, np.eye(3), atol=1e-12)
+
+
+def test_first_tick_moves_the_actuators_by_what_they_lack_over_their_time_constants() -> None:
+    """The engine's other than 1 s, the sheet's own."""
+    trim = steady_trim(AIRFRAME, 180.0, AIR)
+    flight, move = ModelFlight(replace(AIRFRAME, engine_time_constant_s=0.25), STEP_S), np.array([0.1, -0.2, 0.3, 0.4])
+    flight.start(trim.R_WB, trim.velocity_W, trim.w_WB_B, np.zeros(4))
+    flight.step(np.zeros(6), move)
+    rates = np.array([*np.full(3, AIRFRAME.actuator_bandwidth_rad_s), 4.0])
+    np.testing.assert_allclose(flight.actuators, STEP_S * rates * move, rtol=1e-12)
 
 
 def test_first_tick_turns_as_eulers_equations_say_with_the_rotor() -> None:
