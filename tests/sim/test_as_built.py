@@ -26,6 +26,7 @@ MOUNTING = Mounting(
     p_BC=np.array([3.3, -0.4, 0.7]),
     p_BP=np.array([6.0, -0.9, 0.6]),
     p_BI=np.array([0.5, 0.1, -0.2]),
+    R_BI=exp(np.array([0.3, -0.2, 0.1])),
 )
 N = 3000
 DISTORTION_SIGMAS = (
@@ -50,7 +51,7 @@ def _assert_normal(values: np.ndarray, sigma: float) -> None:
 
 def test_mounting_errors_have_their_standard_deviations_about_each_axis(drawn: list[AsBuilt]) -> None:
     camera = np.array([log(d.mounting.R_BC @ MOUNTING.R_BC.T) for d in drawn])
-    imu = np.array([log(d.mounting.R_BI) for d in drawn])
+    imu = np.array([log(d.mounting.R_BI @ MOUNTING.R_BI.T) for d in drawn])
     for axis in range(3):
         _assert_normal(camera[:, axis], SHEET.mounting_angle_sigma_rad)
         _assert_normal(imu[:, axis], SHEET.mounting_angle_sigma_rad)
@@ -145,7 +146,7 @@ def test_without_errors_the_hardware_is_the_sheets() -> None:
     assert built.camera == Camera()
     assert np.allclose(built.ring_positions_D, LedRing().positions_D)
     assert np.allclose(built.led_intensity_w_sr, led_intensity_w_sr(LEDS))
-    assert np.allclose(built.mounting.R_BC, MOUNTING.R_BC) and np.allclose(built.mounting.R_BI, np.eye(3))
+    assert np.allclose(built.mounting.R_BC, MOUNTING.R_BC) and np.allclose(built.mounting.R_BI, MOUNTING.R_BI)
     assert np.allclose(built.mounting.p_BC, MOUNTING.p_BC)
 
 
