@@ -135,6 +135,25 @@ def test_turn_on_bias_is_drawn_once_a_unit_with_its_standard_deviation(sensors: 
     assert abs(np.mean(biases)) < 4.5 * sigma / np.sqrt(biases.size)
 
 
+def test_a_steady_motion_is_felt_with_all_errors_that_stay_from_the_first_sample_on() -> None:
+    """Rates and forces are different, so that each is seen to come in by its own matrix."""
+    fixed = replace(
+        QUIET,
+        gyro_scale_factor_sigma=0.01,
+        gyro_misalignment_sigma_rad=0.01,
+        gyro_g_sensitivity_sigma_rad_s_m=0.01,
+        gyro_turn_on_bias_sigma_rad_s=0.01,
+        accelerometer_scale_factor_sigma=0.01,
+        accelerometer_misalignment_sigma_rad=0.01,
+        accelerometer_turn_on_bias_sigma_m_s2=0.01,
+    )
+    w, f = np.tile([0.1, -0.2, 0.3], (100, 1)), np.tile([2.0, -3.0, 9.0], (100, 1))
+    record = imu_of(fixed, 3).record(100, w, np.zeros((100, 3)), f)
+    for samples in (record.angular_rate_rad_s, record.specific_force_m_s2):
+        np.testing.assert_allclose(samples, samples[-1:].repeat(100, axis=0), rtol=0.0, atol=1e-9)
+    assert np.abs(record.angular_rate_rad_s[0] - w[0]).min() > 1e-3
+
+
 def test_every_drawn_error_is_a_draw_of_its_own() -> None:
     """Scale factors, misalignments, g-sensitivities, biases of both triads: 33 numbers a unit, none with another."""
     all_drawn = replace(
