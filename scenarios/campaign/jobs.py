@@ -174,9 +174,10 @@ def _scenario(
 
 def _require_listed(source: PlanFile, index: int, entry: Entry, points: Sequence[Point]) -> None:
     """Refuse a listed value that no flight can have, though this time none has drawn it: more seeds would."""
-    for key, draw in source.plan.drawn.items():
+    listed = {key: draw.values for key, draw in source.plan.drawn.items() if draw.values}
+    for key, values in listed.items():
         drawn = {as_toml(point[key], key) for point in points}
-        for value in draw.values or ():
+        for value in values:
             if as_toml(value, key) not in drawn:
                 layers = _layers(source, index, entry, points[0] | {key: value})
                 _scenario(source, index, entry, layers, _merged(layers))

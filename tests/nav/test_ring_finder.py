@@ -226,11 +226,8 @@ def test_the_identification_is_told_the_brightnesses_and_how_sure_the_belief_is(
     belief.sigma_px = np.array([0.5, 0.7, np.nan, 0.1, 0.1, 0.1, 0.1, 0.1])
     monkeypatch.setattr(ring_finder, "identify", lambda *_, **keys: told.append(keys) or nothing(NOT_FOUND))
     look(monkeypatch, finder_of(belief), LEDS_PX)
-    assert [keys.get("expected_sigma_px") for keys in told] == [
-        0.7,
-        0.7,
-        None,
-    ]  # for the roll, the ring, within a radius
+    # for the roll, the ring, within a radius
+    assert [keys.get("expected_sigma_px") for keys in told] == [0.7, 0.7, None]
     assert all((keys["brightness"] == 1000.0).all() for keys in told)
     assert ring_finder._largest(np.full(8, np.nan)) is None
 

@@ -70,6 +70,16 @@ def test_the_integral_of_the_measured_rate_is_the_angle_turned() -> None:
 
 UNITS = 200  # instruments that are looked at
 WITHIN = 4.5 * np.sqrt(2.0 / (3 * UNITS))  # relative bound of a variance over their three axes
+ALL_DRAWN = replace(
+    QUIET,
+    gyro_scale_factor_sigma=0.01,
+    gyro_misalignment_sigma_rad=0.01,
+    gyro_g_sensitivity_sigma_rad_s_m=0.01,
+    gyro_turn_on_bias_sigma_rad_s=0.01,
+    accelerometer_scale_factor_sigma=0.01,
+    accelerometer_misalignment_sigma_rad=0.01,
+    accelerometer_turn_on_bias_sigma_m_s2=0.01,
+)  # each error that a unit keeps
 
 
 def _responses(parameters: ImuParameters, stimulus: str) -> tuple[np.ndarray, np.ndarray]:
@@ -137,18 +147,8 @@ def test_turn_on_bias_is_drawn_once_a_unit_with_its_standard_deviation(sensors: 
 
 def test_a_steady_motion_is_felt_with_all_errors_that_stay_from_the_first_sample_on() -> None:
     """Rates and forces are different, so that each is seen to come in by its own matrix."""
-    fixed = replace(
-        QUIET,
-        gyro_scale_factor_sigma=0.01,
-        gyro_misalignment_sigma_rad=0.01,
-        gyro_g_sensitivity_sigma_rad_s_m=0.01,
-        gyro_turn_on_bias_sigma_rad_s=0.01,
-        accelerometer_scale_factor_sigma=0.01,
-        accelerometer_misalignment_sigma_rad=0.01,
-        accelerometer_turn_on_bias_sigma_m_s2=0.01,
-    )
     w, f = np.tile([0.1, -0.2, 0.3], (100, 1)), np.tile([2.0, -3.0, 9.0], (100, 1))
-    record = imu_of(fixed, 3).record(100, w, np.zeros((100, 3)), f)
+    record = imu_of(ALL_DRAWN, 3).record(100, w, np.zeros((100, 3)), f)
     for samples in (record.angular_rate_rad_s, record.specific_force_m_s2):
         np.testing.assert_allclose(samples, samples[-1:].repeat(100, axis=0), rtol=0.0, atol=1e-9)
     assert np.abs(record.angular_rate_rad_s[0] - w[0]).min() > 1e-3
@@ -156,18 +156,8 @@ def test_a_steady_motion_is_felt_with_all_errors_that_stay_from_the_first_sample
 
 def test_every_drawn_error_is_a_draw_of_its_own() -> None:
     """Scale factors, misalignments, g-sensitivities, biases of both triads: 33 numbers a unit, none with another."""
-    all_drawn = replace(
-        QUIET,
-        gyro_scale_factor_sigma=0.01,
-        gyro_misalignment_sigma_rad=0.01,
-        gyro_g_sensitivity_sigma_rad_s_m=0.01,
-        gyro_turn_on_bias_sigma_rad_s=0.01,
-        accelerometer_scale_factor_sigma=0.01,
-        accelerometer_misalignment_sigma_rad=0.01,
-        accelerometer_turn_on_bias_sigma_m_s2=0.01,
-    )
-    biases = [np.array([getattr(imu_of(all_drawn, s), f"{n}_bias_I") for s in range(UNITS)]) for n in SENSORS]
-    by_rate, by_force = _responses(all_drawn, "w_WB_B"), _responses(all_drawn, "specific_force_B")
+    biases = [np.array([getattr(imu_of(ALL_DRAWN, s), f"{n}_bias_I") for s in range(UNITS)]) for n in SENSORS]
+    by_rate, by_force = _responses(ALL_DRAWN, "w_WB_B"), _responses(ALL_DRAWN, "specific_force_B")
     responses = [by_rate[0] - biases[0][:, :, None], by_force[0] - biases[0][:, :, None]]
     responses.append(by_force[1] - biases[1][:, :, None])
     drawn = np.hstack([r.reshape(UNITS, 9) for r in responses] + biases)
