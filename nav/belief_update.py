@@ -13,7 +13,6 @@ from dataclasses import replace
 import numpy as np
 
 from dockair.calibration import NavigationSheets
-from dockair.errors import DockairError
 from dockair.messages import LedObservation
 from dockair.nav.contact_watch import ContactWatch
 from dockair.nav.frame_checks import only
@@ -37,17 +36,11 @@ class BeliefUpdate:
         settings: of the navigator.
         belief: that is corrected.
         contact: what takes note of each pose.
-
-    Raises:
-        DockairError: fewer than no tolerances of a learnt place.
     """
 
     def __init__(
         self, sheets: NavigationSheets, settings: NavigatorSettings, belief: RelativeFilter, contact: ContactWatch
     ) -> None:
-        learnt_sigmas = settings.learnt_place_sigmas
-        if not learnt_sigmas >= 0.0:
-            raise DockairError("navigator.learnt_place_sigmas", expected="a number, 0 or more", got=learnt_sigmas)
         self._sheets, self._settings, self._filter, self._contact = sheets, settings, belief, contact
         self._points_D = sheets.ring.positions_D
         #: LEDs that make a pose without a belief; a loose filter would take for news what fewer have of its attitude

@@ -1,13 +1,13 @@
 """Belief about motion and hardware that the relative filter starts from."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from scipy.linalg import solve_continuous_lyapunov
 
 from dockair.calibration import GyroSheet, LedRing, NavigationSheets
-from dockair.errors import DockairError
+from dockair.errors import DockairError, check_numbers
 from dockair.nav.belief import Taking
 from dockair.nav.belief_motion import GUST, PHI, REST, SWING, SWING_RATE, VELOCITY, Motion
 from dockair.nav.belief_sight import Belief
@@ -21,7 +21,7 @@ class FusionSettings:
     """Belief about motion, and the gate.
 
     Raises:
-        DockairError: a coupling that does not exist.
+        DockairError: a coupling that does not exist, a number that cannot be.
     """
 
     #: "tight": a frame's lines of sight are fitted together with the belief, single LEDs can be used; "loose": the
@@ -92,6 +92,11 @@ class FusionSettings:
         exists = ("tight", "loose")
         if self.coupling not in exists:
             raise DockairError("fusion.coupling", expected="one that exists", got=self.coupling, exists=exists)
+        exact = [field.name for field in fields(self) if {"sigma", "density", "walk"} & set(field.name.split("_"))]
+        exact.remove("held_rate_sigma_rad_s")  # of a rate that is not measured something is always unknown
+        check_numbers("fusion", self, zero=(*exact, "swing_damping", "led_place_share"))
+        if not self.gate_probability < 1.0:
+            raise DockairError("fusion.gate_probability", expected="a number below 1", got=self.gate_probability)
         if not self.gust_time_s > self.longest_step_s:
             expected = f"a number above longest_step_s = {self.longest_step_s:g}"
             raise DockairError("fusion.gust_time_s", expected=expected, got=self.gust_time_s)

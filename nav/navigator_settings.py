@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from dockair.errors import check_numbers
 from dockair.nav.fusion import FusionSettings
 from dockair.nav.guidance.guidance_settings import GuidanceSettings
 from dockair.nav.heading.own_heading import OwnHeadingSettings
@@ -40,3 +41,9 @@ class NavigatorSettings:
     #: Time for which no frame has been used, after which the ring is looked for anywhere. By then an acceleration that
     #: is 0.3 m/s^2 in error has moved the belief by 0.6 m, more than the ring's own size.
     search_anew_s: float = 2.0
+
+    def __post_init__(self) -> None:
+        endless = "learnt_place_sigmas", "usable_sigma_m", "usable_age_s", "search_anew_s"
+        check_numbers(
+            "navigator", self, zero=("led_position_sigma_m", "learnt_place_sigmas", "alone_leds"), infinite=endless
+        )

@@ -34,6 +34,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dockair.calibration import NavigationSheets
+from dockair.errors import check_numbers
 from dockair.messages import CameraFrame, LedObservation, Window
 from dockair.nav.fusion import RelativeFilter
 from dockair.nav.identify.code import CodeSettings, code_of
@@ -59,6 +60,9 @@ class FewSettings:
     false_names_max: float = (
         5e-3  # Eq. (1), a frame: one in 4 s at 50 Hz, which moves a belief by its own 4 sigma at most
     )
+
+    def __post_init__(self) -> None:
+        check_numbers("few", self)
 
 
 class RingFinder:

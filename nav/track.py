@@ -36,7 +36,7 @@ import numpy as np
 from scipy.special import chdtri
 
 from dockair.calibration import Camera
-from dockair.errors import DockairError
+from dockair.errors import DockairError, check_numbers
 from dockair.messages import Window
 from dockair.nav.identify.perspective import SLOTS
 from dockair.nav.identify.ring import Identification, IdentificationStatus
@@ -74,6 +74,12 @@ class TrackSettings:
     growth: float = 1.5  # of the window, for every so long that no measurement counts:
     growth_s: float = 0.02  # a frame at 50 Hz
     lost_s: float = 0.1  # without a measurement that counts: what the drogue does meanwhile is the same at every rate
+
+    def __post_init__(self) -> None:
+        still = "process_variance", "acceleration_radii_s2", "roll_acceleration_rad_s2"
+        check_numbers("track", self, zero=(*still, "window_margin_px", "window_margin_radii"))
+        if not self.gate_probability < 1.0:
+            raise DockairError("track.gate_probability", expected="a number below 1", got=self.gate_probability)
 
 
 class RingTracker:

@@ -24,6 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from dockair.errors import check_numbers
 from dockair.kernels import njit
 from dockair.rotations import Array
 
@@ -41,6 +42,9 @@ class BrightnessSettings:
     kernel: float = 0.5  # standard deviation of a blob's share in q
     prior_weight: float = 5.0  # blobs
     prior_range: float = 3.4  # a factor of 30; rendered frames' clutter spreads over 150
+
+    def __post_init__(self) -> None:
+        check_numbers("identify.brightness", self)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

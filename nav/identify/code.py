@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dockair.calibration import LedRing
+from dockair.errors import check_numbers
 from dockair.nav.identify.perspective import SLOTS, RingFit
 from dockair.rotations import Array
 
@@ -34,6 +35,9 @@ class CodeSettings:
     brightness_margin: float = 6.0  # of Eq. (1) between the best numbering and any other that is ruled out
     reach: float = 2.0  # tolerances of the fit within which a displaced LED is looked for: its place is extrapolated
     max_chance_hits: float = 3e-3  # displaced LEDs that clutter may feign
+
+    def __post_init__(self) -> None:
+        check_numbers("identify.code", self)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

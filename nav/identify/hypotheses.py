@@ -12,12 +12,13 @@ whole rings of which none is preferred the answer is known.
 """
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dockair.calibration import Camera
+from dockair.errors import DockairError, check_numbers
 from dockair.kernels import njit
 from dockair.nav.identify.brightness import BrightnessModel, BrightnessSettings
 from dockair.nav.identify.chance import box_area_px2, densities_px2, log10_false_rings, member_odds
@@ -65,6 +66,13 @@ class IdentifySettings:
     max_impostors_with_prior: float = 2e-3
     brightness: BrightnessSettings = field(default_factory=BrightnessSettings)
     code: CodeSettings = field(default_factory=CodeSettings)
+
+    def __post_init__(self) -> None:
+        accidents = [each.name for each in fields(self) if each.name.startswith(("max_false_rings", "max_impostors"))]
+        check_numbers("identify", self, zero=("sigma_px", "ring_sigma"), infinite=accidents)
+        least, most = self.radius_range_px
+        if not least < most:
+            raise DockairError("identify.radius_range_px", expected="from a smaller to a larger", got=(least, most))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

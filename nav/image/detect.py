@@ -21,7 +21,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from dockair.errors import DockairError
+from dockair.errors import DockairError, check_numbers
 from dockair.kernels import njit
 from dockair.messages import Window
 from dockair.nav.image.binarise import Image, adaptive_threshold, check_image, frame_statistics
@@ -76,6 +76,8 @@ class DetectSettings:
         ):
             if value not in exists:
                 raise DockairError(f"detect.{name}", expected="one that exists", got=value, exists=exists)
+        exact = "noise_dn", "response_spread", "sigma_floor_px", "clipped_sigma_floor_px"
+        check_numbers("detect", self, zero=exact, infinite=("max_equivalent_area_px", "max_elongation"))
         if not 1 <= self.min_area_px <= self.max_area_px:
             raise DockairError(
                 "detect.min_area_px", expected=f"1 to max_area_px = {self.max_area_px}", got=self.min_area_px

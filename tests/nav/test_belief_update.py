@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from dockair.calibration import Camera, GyroSheet, LedRing, Mounting, NavigationSheets, StartGeometry
-from dockair.errors import DockairError
 from dockair.messages import LedObservation
 from dockair.nav.belief_update import BeliefUpdate
 from dockair.nav.fusion_settings import FusionSettings
@@ -243,9 +242,3 @@ def test_a_loose_filter_is_offered_poses_alone():
     for numbers in ([1], [0, 3, 6], list(range(SETTINGS.alone_leds - 1))):
         assert update.use(observed(numbers, 1.02)) == "pose too few LEDs"
     assert len(belief.poses) == 1 and belief.leds == []
-
-
-@pytest.mark.parametrize("sigmas", [-0.1, np.nan])
-def test_fewer_than_no_tolerances_of_a_learnt_place_are_refused(sigmas):
-    with pytest.raises(DockairError, match="learnt_place_sigmas"):
-        made(Believes(), replace(SETTINGS, learnt_place_sigmas=sigmas))

@@ -261,11 +261,6 @@ def test_an_led_that_wanders_off_slower_than_any_frame_can_see_is_left_out_at_la
     assert np.mean(np.array(over) > 1.0) < 0.002 and max(over) < 1.2
 
 
-def test_fewer_than_no_tolerances_of_a_learnt_place_are_refused():
-    with pytest.raises(DockairError, match=r"navigator\.learnt_place_sigmas"):
-        Navigator(sheets(), NavigatorSettings(learnt_place_sigmas=-1.0))
-
-
 def test_contact_may_be_claimed_near_and_recent_and_not_before_a_pose(render):
     sky = Sky(render, still)
     assert sky.navigator.contact_claim() is None
