@@ -275,4 +275,4 @@ def _as_received(
         if width_px < _SMALLEST_PX:
             size_m[i] = 0.0
         elif width_px < WIDE_PX:
-            size_m[i] = 1e-3 * 2.0 ** round(math.log2(max(size_m[i], _NEAREST_M) / 1e-3))
+            size_m[i] = 1e-3 * 2.0 ** round(math.log2(size_m[i] / 1e-3))

@@ -5,12 +5,13 @@ from typing import Any
 
 import mujoco
 import numpy as np
+import pytest
 
 from dockair.rotations import exp
 from dockair.sim.camera.glints import find_glints
 from dockair.sim.camera.led_reflections import find_led_reflections
 from dockair.sim.camera.mirrors import Mirrors
-from dockair.sim.camera.point_sources import PointSources, Sources
+from dockair.sim.camera.point_sources import PointSources, Sources, _as_received
 from dockair.sim.camera.radiometry import Responses, extinction_1_m, responses
 from dockair.sim.camera.sheets import CameraSheets
 from dockair.sim.camera.sky import Sky
@@ -179,3 +180,18 @@ def test_patches_are_points_below_half_a_pixel_and_whole_octaves_of_a_millimetre
     assert np.allclose(octaves, np.round(octaves))
     # what is rounded down by at most sqrt(2) was at least half a pixel wide
     assert (size[sized] * world.as_built.camera.focal_length_px / depth[sized] > 0.5 / np.sqrt(2.0) - 1e-9).all()
+
+
+@pytest.mark.parametrize(
+    ("size_mm", "drawn_mm"),
+    [(0.33, 0.0), (0.34, 0.25), (0.4, 0.5), (0.7, 0.5), (0.72, 1.0), (1.4, 1.0), (3.0, 4.0), (5.3, 4.0), (5.4, 5.4)],
+)
+def test_a_patch_is_drawn_as_wide_as_the_octave_nearest_to_its_own_width(size_mm: float, drawn_mm: float) -> None:
+    """At 2 m depth, 1.5 px a millimetre: below 0.5 px it is a point, from 8 px on it keeps its width.
+
+    Its light is e cos t/r^2 exp(-b r) t_exp, its range here 2.5 m.
+    """
+    p_C, electrons, size_m = np.array([[2.0, 1.5, 0.0]]), np.array([7.0]), np.array([1e-3 * size_mm])
+    _as_received(p_C, 0, (0.2, 3000.0), EXPOSURE_S, electrons, size_m)
+    assert size_m[0] == pytest.approx(1e-3 * drawn_mm, rel=1e-12)
+    assert electrons[0] == pytest.approx(7.0 * 0.8 / 2.5**2 * np.exp(-0.2 * 2.5) * EXPOSURE_S, rel=1e-12)
