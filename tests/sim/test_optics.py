@@ -290,11 +290,22 @@ def test_sizes_beyond_those_kept_are_made_again() -> None:
     assert np.array_equal(_blob(spread, (0.1, 0.2), size_m=1e-3, depth_m=3.0), first)
 
 
-def test_nearer_than_the_nearest_depth_the_blur_grows_no_more() -> None:
+@pytest.mark.parametrize("size_m", [0.0, DIE_M, 0.012])
+def test_nearer_than_the_nearest_depth_the_blur_grows_no_more(size_m: float) -> None:
+    """Nor do a square's image, and the places of the parts that a large one is cut into."""
     spread = _spread()
-    nearest = _blob(spread, (0.0, 0.0), depth_m=NEAREST_M)
-    assert np.array_equal(_blob(spread, (0.0, 0.0), depth_m=0.2), nearest)
-    assert not np.array_equal(_blob(spread, (0.0, 0.0), depth_m=0.6), nearest)
+    nearest = _blob(spread, (0.0, 0.0), depth_m=NEAREST_M, size_m=size_m)
+    assert np.array_equal(_blob(spread, (0.0, 0.0), depth_m=0.2, size_m=size_m), nearest)
+    assert not np.array_equal(_blob(spread, (0.0, 0.0), depth_m=0.6, size_m=size_m), nearest)
+
+
+@pytest.mark.parametrize("f_number", [2.8, 8.0, 16.0])
+def test_the_widest_core_is_that_of_the_largest_square_at_the_nearest_depth(f_number: float) -> None:
+    """5 mm at 0.5 m; whatever was drawn before."""
+    lens, spread = replace(LENS, f_number=f_number, focus_distance_m=FOCUS_M), _spread(f_number)
+    blur, die = abs(float(blur_px(lens, CAMERA, np.array([2.0]))[0])), CAMERA.focal_length_px * 0.01
+    widest = Spread(airy=airy_px(lens, CAMERA, LED_M), diffusion=0.3, blur=blur, die=die)
+    assert spread.widest_px == core(widest).shape[-1] // 2
 
 
 @pytest.mark.parametrize("f_number", [1.4, 2.8, 8.0, 16.0])
