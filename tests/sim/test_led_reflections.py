@@ -210,6 +210,29 @@ def test_an_oblique_tubes_reflection_is_as_bright_as_a_bundle_of_rays() -> None:
     assert count > 5
 
 
+def test_an_ellipsoids_reflection_is_as_bright_as_a_bundle_of_rays() -> None:
+    rng, count, axes, centre = np.random.default_rng(6), 0, np.array([0.12, 0.08, 0.05]), np.array([3.0, 0.2, -0.1])
+    for _ in range(10):
+        R = exp(rng.normal(size=3))
+        form, led = R / axes**2 @ R.T, centre + unit(-1.0, *rng.normal(size=2)) * 0.5
+        quat = quaternion_from_matrix(R)
+        tip = {"name": "probe_tip", "type": _G.mjGEOM_ELLIPSOID, "pos": list(centre), "size": axes, "quat": quat}
+
+        def gradient(q: np.ndarray, form: np.ndarray = form) -> np.ndarray:
+            return form @ (q - centre)
+
+        def height(q: np.ndarray, form: np.ndarray = form) -> float:
+            return float(0.5 * ((q - centre) @ form @ (q - centre) - 1.0))
+
+        found = _find(scene_of(tip), led)
+        for p, intensity in zip(found.p_W, found.intensity_w_sr, strict=True):
+            assert height(p) == pytest.approx(0.0, abs=1e-6)
+            assert _mirror_error_rad(p, unit(*gradient(p)), led) < 1e-4
+            assert intensity == pytest.approx(2.0 * _bundle_intensity(led, p, gradient, height), rel=2e-3)
+            count += 1
+    assert count >= 8
+
+
 def test_a_balls_reflected_light_over_all_directions_is_the_light_it_catches() -> None:
     """The share of an LED's light that a ball of radius r at the distance b catches is (1 - sqrt(1 - r^2/b^2))/2."""
     r, b, far = 0.2, 0.5, 2e3
@@ -295,6 +318,26 @@ def test_the_bound_is_above_every_reflection_and_not_far_above_the_best() -> Non
                     assert intensity / 2.0 <= bound
                     best[kind] = max(best[kind], intensity / 2.0 / bound)
     assert min(best.values()) > 0.3, best
+
+
+def test_the_bound_of_a_tube_holds_where_its_side_alone_lies_ahead_of_the_led() -> None:
+    """Its axis 2 cm behind the LED and across its beam; the LED's back would send a hundredth."""
+    centre, led, axis = np.array([3.0, 0.3, 0.0]), np.array([3.0, 0.0, 0.0]), unit(-1.0, -0.02 / 0.3, 0.0)
+    world, side = scene_of(_tube(centre, 0.04, 2.0, np.eye(3))), replace(IDEAL, led_side_light=0.01)
+    found = _find(world, led, side, axis=axis, exponent=1e-6)
+    assert len(found.p_W) == 1 and (centre - led) @ axis < 0.0 < (found.p_W[0] - led) @ axis
+    assert found.intensity_w_sr[0] / 2.0 <= _bound(world, led, axis, side)
+
+
+def test_a_reflection_is_too_faint_by_the_brightest_leds_light() -> None:
+    """A tenth of what the bright one's reflection is, of which the other's is a hundredth."""
+    world, leds = scene_of(_sphere(np.array([4.0, 0.0, 0.0]), 0.2)), np.array([[3.0, 1.5, 0.0], [3.0, -1.5, 0.0]])
+    light = np.array([0.02, 2.0])
+    args = *world, Mirrors.of(world[0]), EYE, leds, AFT, light, 2.6
+    both = find_led_reflections(*args, IDEAL)
+    assert both.led.tolist() == [0, 1]
+    faintest = 0.1 * both.intensity_w_sr[1] / light[1]
+    assert find_led_reflections(*args, replace(IDEAL, faintest_reflection=faintest)).led.tolist() == [1]
 
 
 def test_polished_ribs_and_coupling_show_the_leds_and_dull_ones_do_not(make_world) -> None:
