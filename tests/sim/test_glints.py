@@ -145,8 +145,9 @@ def test_what_is_not_drawn_does_not_glint() -> None:
     assert len(glints_in(scene_of(ball | {"rgba": [1.0, 1.0, 1.0, 0.0]}), sun).p_W) == 0
 
 
-def test_what_lies_behind_the_lens_is_left_out_when_its_axis_is_given() -> None:
-    world, sun = scene_of(metal_sphere([8.0, 0.0, 0.0], 0.5)), unit(-1, 0, 1)
+@pytest.mark.parametrize("distance", [0.2, 8.0])
+def test_what_lies_behind_the_lens_is_left_out_when_its_axis_is_given(distance: float) -> None:
+    world, sun = scene_of(metal_sphere([distance, 0.0, 0.0], 0.06 * distance)), unit(-1, 0, 1)
     assert len(glints_in(world, sun, ahead=unit(1, 0, 0)).p_W) == 1
     assert len(glints_in(world, sun, ahead=unit(-1, 0, 0)).p_W) == 0
 

@@ -12,7 +12,7 @@ from dockair.sim.camera.glints import find_glints
 from dockair.sim.camera.led_reflections import find_led_reflections
 from dockair.sim.camera.mirrors import Mirrors
 from dockair.sim.camera.point_sources import PointSources, Sources, _as_received
-from dockair.sim.camera.radiometry import Responses, extinction_1_m, responses
+from dockair.sim.camera.radiometry import Responses, extinction_1_m, led_electrons, responses
 from dockair.sim.camera.sheets import CameraSheets
 from dockair.sim.camera.sky import Sky
 from dockair.sim.camera.sky_radiance import SkyRadiance
@@ -89,6 +89,10 @@ def test_reflections_and_glints_in_one_batch_are_those_found_by_themselves(small
     )
     by_hand = EXPOSURE_S * e_m2_s * p_C[LEDS:, 0] / r**3 * np.exp(-EXTINCTION_1_M * r)
     np.testing.assert_allclose(found.electrons[LEDS:], by_hand, rtol=1e-12)
+    axis_C, visible = axis_W @ R_WC, sources.visible_leds(world.data, p_WC)
+    leds = led_electrons(response, SHEETS.leds, intensity, p_C[:LEDS], axis_C, EXPOSURE_S, EXTINCTION_1_M)
+    assert visible.any() and (leds > 0.0).all()
+    np.testing.assert_allclose(found.electrons[:LEDS], leds * visible, rtol=1e-12)
 
 
 def test_without_sun_there_are_no_glints(small_world: Any) -> None:
@@ -96,6 +100,18 @@ def test_without_sun_there_are_no_glints(small_world: Any) -> None:
     lit, dark = (_seen(world, _sources_of(world, sun)) for sun in (True, False))
     assert LEDS < len(dark.electrons) < len(lit.electrons)
     assert np.array_equal(dark.electrons, lit.electrons[: len(dark.electrons)])
+
+
+def test_of_some_of_the_candidates_the_same_is_said_as_of_all(small_world: Any) -> None:
+    """Mirrors are lit by LEDs that are not among them, too; the last LED is hidden by the box."""
+    world = _placed(small_world)
+    sources, pose = _sources_of(world), _pose(world, world.data)
+    world.put("box", 0.5 * (pose[1] + sources.leds_W(world.data)[LEDS - 1]), pose[0])
+    found = sources.candidates(world.data, pose, EXPOSURE_S, np.ones(LEDS))
+    every, some = np.arange(len(found.electrons)), np.arange(LEDS - 1, len(found.electrons), 2)
+    seen, of_some = (sources.are_seen(world.data, pose[1], found, which) for which in (every, some))
+    assert not seen[LEDS - 1] and (found.patches_W[some[seen[some]], 9] > 0.0).any()
+    assert np.array_equal(of_some, seen[some])
 
 
 def test_an_led_is_dark_in_the_batch_when_a_ray_to_it_alone_is_blocked(small_world: Any) -> None:
