@@ -340,13 +340,17 @@ def test_a_reflection_is_too_faint_by_the_brightest_leds_light() -> None:
     assert find_led_reflections(*args, replace(IDEAL, faintest_reflection=faintest)).led.tolist() == [1]
 
 
-def test_polished_ribs_and_coupling_show_the_leds_and_dull_ones_do_not(make_world) -> None:
-    """In the basket, ahead of the ring; by the sheets only the probe mirrors them, under 0.2 % of an LED."""
-    polished = _scene(make_world, 4.0, replace(SHEET, metal_share=1.0, led_side_light=0.1, faintest_reflection=1e-5))
+def test_polished_rim_and_coupling_show_the_leds_and_dull_ones_do_not(make_world) -> None:
+    """Ahead of the ring, the coupling's mouth within 0.1 m of the drogue's axis, the rim beyond 0.2 m.
+
+    By the sheets only the probe mirrors them, under 0.2 % of an LED.
+    """
+    polished = _scene(make_world, 4.0, replace(SHEET, metal_share=1.0, led_side_light=0.1, faintest_reflection=1e-6))
     world = make_world(p_PD_B=(4.0, 0.0, 0.0))
-    in_drogue = (polished.p_W - world.truth.p_WD) @ world.truth.R_WD
-    basket = (in_drogue[:, 0] > 0.0) & (np.hypot(in_drogue[:, 1], in_drogue[:, 2]) < 0.3)
-    assert set(polished.led[basket]) == set(range(8))
+    x, y, z = ((polished.p_W - world.truth.p_WD) @ world.truth.R_WD).T
+    beside = np.hypot(y, z)
+    assert set(polished.led[(x > 0.0) & (beside > 0.2) & (beside < 0.3)]) == set(range(8))
+    assert ((x > 0.0) & (beside < 0.1)).sum() > 4
     for ahead_m in (6.0, 1.0, 0.3):
         dull = _scene(make_world, ahead_m, SHEET)
         assert np.all(dull.intensity_w_sr < 0.002 * 0.015 * 3.1)
