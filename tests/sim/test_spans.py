@@ -81,3 +81,23 @@ def test_solids_behind_the_lens_and_beside_the_picture_have_no_runs(
     kind: mujoco.mjtGeom, p_C: tuple[float, float, float]
 ) -> None:
     assert not _placed(kind, np.array(p_C), np.eye(3), LEVEL)[0].any()
+
+
+@pytest.mark.parametrize("side", ["left", "right", "above", "below", "behind"])
+def test_a_box_whose_corner_just_reaches_into_the_picture_has_runs_and_one_just_beside_it_has_none(side: str) -> None:
+    """By a fiftieth of its diagonal, which is across the plane of the lens and an edge's blocks, or the near plane."""
+    low, high = (X[0], Y[0]), (X[-1], Y[-1])
+    inward, edge = {
+        "left": (np.array([-low[0], -1.0, 0.0]), np.array([5.0, -5.0 * low[0], 0.0])),
+        "right": (np.array([high[0], 1.0, 0.0]), np.array([5.0, -5.0 * high[0], 0.0])),
+        "above": (np.array([-low[1], 0.0, -1.0]), np.array([5.0, 0.0, -5.0 * low[1]])),
+        "below": (np.array([high[1], 0.0, 1.0]), np.array([5.0, 0.0, -5.0 * high[1]])),
+        "behind": (np.array([1.0, 0.0, 0.0]), np.array([NEAR, 0.0, 0.0])),
+    }[side]
+    half = np.array(KINDS[GEOM.mjGEOM_BOX])
+    a, b = half / np.linalg.norm(half), inward / np.linalg.norm(inward)
+    axis = np.cross(a, b)
+    R = exp(axis / np.linalg.norm(axis) * np.arccos(a @ b))
+    for part in (0.98, 1.02):
+        in_run, _ = _placed(GEOM.mjGEOM_BOX, edge - part * np.linalg.norm(half) * b, R, LEVEL)
+        assert in_run.any() == (part < 1.0)

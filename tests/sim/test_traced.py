@@ -137,6 +137,16 @@ def test_a_solid_that_reaches_past_the_lens_is_seen_as_far_as_the_near_plane(
     assert np.array_equal(_draw(model, data) > 0.0, hit)
 
 
+@pytest.mark.parametrize(("size", "kind"), [([0.05, 0.0, 0.0], "sphere"), ([0.05, 0.05, 0.05], "box")])
+@pytest.mark.parametrize(("nearest_m", "is_seen"), [(0.11, True), (0.09, False)])
+def test_a_solid_that_begins_nearer_than_the_near_plane_is_not_seen(
+    kind: str, size: list[float], nearest_m: float, is_seen: bool
+) -> None:
+    """At 0.1 m here; along the axis."""
+    model, data = _scene(_geom(kind, [nearest_m + 0.05, 0.0, 0.0], size=size))
+    assert (_draw(model, data)[25, 40] != SKY) == is_seen
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_solid_around_the_lens_or_behind_it_is_not_seen(kind: str) -> None:
     around, data = _scene(_geom(kind, [0.0, 0.0, 0.0]))
