@@ -8,8 +8,10 @@ import pytest
 from scipy.stats import norm, truncnorm
 
 from dockair.rotations import exp
+from dockair.sim.camera.glints import glint_rows
 from dockair.sim.camera.lobes import _strip
-from mirror_scenes import EYE, IDEAL, LIGHT, SHEET, glints_in, metal_body, metal_sphere, scene_of, unit
+from dockair.sim.camera.mirrors import Mirrors
+from mirror_scenes import EYE, IDEAL, LIGHT, POINT_SUN, SHEET, glints_in, metal_body, metal_sphere, scene_of, unit
 
 # --------------------------------------------------------------------------------------------------- energy, rays
 
@@ -226,7 +228,10 @@ def test_the_suns_image_in_a_ball_is_wider_across_the_plane_of_a_slanting_reflec
     assert glints.size_m[0] == pytest.approx(np.sqrt(12.0 * variances.mean()), rel=1e-3)
 
 
-@pytest.mark.parametrize(("low", "high"), [(-0.3, 1.9), (0.8, 1.1), (-2.0, -0.9), (1.2, 30.0), (0.69, 0.6902)])
+@pytest.mark.parametrize(
+    ("low", "high"),
+    [(-0.3, 1.9), (0.8, 1.1), (-2.0, -0.9), (1.2, 30.0), (0.69, 0.6902), (-2.4, 3.2), (3.6, 3.9), (-9.0, -3.0)],
+)
 def test_a_strip_of_a_normal_law_has_its_part_mean_and_variance(low: float, high: float) -> None:
     mean, sd = 0.4, 0.7
     a, b = (low - mean) / sd, (high - mean) / sd
@@ -258,15 +263,55 @@ def test_a_streak_on_a_tube_is_a_row_of_points_with_the_light_of_one() -> None:
     assert np.median(row.size_m) == pytest.approx(np.median(spacing) / np.sqrt(2.0), rel=0.1)
 
 
-def test_the_pieces_of_a_streak_lie_on_the_ellipsoid_they_are_of() -> None:
+def test_the_pieces_of_a_streak_lie_on_the_ellipsoid_they_are_of_and_have_its_light() -> None:
     axes, centre = np.array([10.4, 1.7, 1.5]), np.array([16.0, 2.0, 6.0])
     n, v = unit(-0.1, 0.2, -1.0), -unit(*centre)
     rough = replace(IDEAL, metal_roughness_rad=0.03)
-    glints = glints_in(scene_of(metal_body(_G.mjGEOM_ELLIPSOID, centre, list(axes))), 2.0 * (n @ v) * n - v, rough)
-    assert len(glints.p_W) >= 8
+    world, sun = scene_of(metal_body(_G.mjGEOM_ELLIPSOID, centre, list(axes))), 2.0 * (n @ v) * n - v
+    glints, one = glints_in(world, sun, rough), glints_in(world, sun, replace(rough, patch_step_rad=1.0))
+    assert len(glints.p_W) >= 8 and len(one.p_W) == 1
+    assert glints.area_m2_sr.sum() == pytest.approx(one.area_m2_sr[0], rel=1e-9)  # the ends have what lies beyond them
     assert np.ptp(glints.p_W[:, 0]) > 2.0
     radius = np.sqrt((((glints.p_W - centre) / axes) ** 2).sum(axis=1))
     np.testing.assert_allclose(radius, 1.0, atol=4e-3)
+    rows = glint_rows(world[1], Mirrors.of(world[0]), EYE, sun, rough, POINT_SUN)
+    outward = (rows[:, :3] - centre) / axes**2
+    outward /= np.linalg.norm(outward, axis=1, keepdims=True)
+    np.testing.assert_allclose(rows[:, 3:6], outward, atol=0.02)
+
+
+@pytest.mark.parametrize("turn", [0.4, 1.1])
+def test_a_faces_glint_is_as_bright_and_wide_however_the_face_is_turned_in_its_plane(turn: float) -> None:
+    """A slanting one, far inside the edges; what stands first in the scene does not mirror."""
+    dull, surfaces = metal_sphere([5.0, 9.0, 0.0], 0.1, name="hose_0"), replace(IDEAL, metal_roughness_rad=0.003)
+    found = []
+    for R in (np.eye(3), exp(np.array([turn, 0.0, 0.0]))):
+        model, data = scene_of(dull, metal_body(_G.mjGEOM_BOX, np.array([1.02, 0.0, 0.0]), [0.02, 0.14, 0.14], R))
+        rows = glint_rows(data, Mirrors.of(model), np.array([0.0, -0.5, -0.9]), unit(-1.0, 0.5, 0.9), surfaces, LIGHT)
+        found.append(rows[rows[:, 10] == 1.0])
+    assert [len(rows) for rows in found] == [1, 1]
+    np.testing.assert_allclose(found[1][0], found[0][0], rtol=1e-3, atol=1e-3)
+    assert found[1][0, 7] == pytest.approx(found[0][0, 7], rel=1e-4)
+
+
+@pytest.mark.parametrize(("share", "count"), [(0.99, 1), (1.01, 0)])
+@pytest.mark.parametrize("sun", [unit(-1, 0.01, 0), unit(0, 0.6, 0.8), unit(-0.3, 0.5, -0.6)])
+def test_a_smooth_balls_highlight_is_as_bright_as_the_sun_however_it_slants(
+    sun: np.ndarray, share: float, count: int
+) -> None:
+    """Mean R/(8 v.n sqrt(det S)), sqrt(det S) = (a^2/16)/cos i, v.n = cos i: 2/a^2 of a white surface in sunlight."""
+    limit = replace(IDEAL, faintest_radiance=share * 2.0 / LIGHT.sun_angular_radius_rad**2)
+    assert len(glints_in(scene_of(metal_sphere([3e3, 0.0, 0.0], 0.5)), sun, limit, light=LIGHT).p_W) == count
+
+
+@pytest.mark.parametrize(("beyond_rad", "count"), [(-0.01, 0), (0.01, 1)])
+@pytest.mark.parametrize("incidence", [0.9, 1.3])
+def test_light_that_grazes_a_surface_beyond_the_limit_makes_no_glint(
+    incidence: float, beyond_rad: float, count: int
+) -> None:
+    sun = np.array([-np.cos(2.0 * incidence), np.sin(2.0 * incidence), 0.0])
+    limit = replace(IDEAL, grazing_rad=incidence + beyond_rad)
+    assert len(glints_in(scene_of(metal_sphere([3e3, 0.0, 0.0], 0.5)), sun, limit).p_W) == count
 
 
 def test_a_highlight_darker_than_the_limit_is_left_out() -> None:
