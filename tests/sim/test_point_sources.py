@@ -41,12 +41,12 @@ def _response(built: Any) -> Responses:
     return responses(s.lens, s.filter, s.sensor, s.leds, s.light, built.camera)
 
 
-def _sources_of(world: Any, sun: bool = True) -> PointSources:
+def _sources_of(world: Any, sun: bool = True, seat_m: float = SURFACES.led_seat_m) -> PointSources:
     built, view = world.as_built, None
     if sun:
         sky = _Overcast(SkyRadiance(SHEETS.sky, Weather(), SUN_W, 6000.0, 1))
         view = SunView(world.model, built.camera, sky, SUN_W, SHEETS.light.sun_angular_radius_rad, 3.0)
-    sheets = replace(SHEETS, surfaces=SURFACES)
+    sheets = replace(SHEETS, surfaces=replace(SURFACES, led_seat_m=seat_m))
     return PointSources(world.model, sheets, built, _response(built), view, EXTINCTION_1_M)
 
 
@@ -103,15 +103,17 @@ def test_without_sun_there_are_no_glints(small_world: Any) -> None:
 
 
 def test_of_some_of_the_candidates_the_same_is_said_as_of_all(small_world: Any) -> None:
-    """Mirrors are lit by LEDs that are not among them, too; the last LED is hidden by the box."""
+    """Mirrors are lit by LEDs that are not among them, too; the box stands in the way of each reflection in turn."""
     world = _placed(small_world)
-    sources, pose = _sources_of(world), _pose(world, world.data)
-    world.put("box", 0.5 * (pose[1] + sources.leds_W(world.data)[LEDS - 1]), pose[0])
-    found = sources.candidates(world.data, pose, EXPOSURE_S, np.ones(LEDS))
-    every, some = np.arange(len(found.electrons)), np.arange(LEDS - 1, len(found.electrons), 2)
-    seen, of_some = (sources.are_seen(world.data, pose[1], found, which) for which in (every, some))
-    assert not seen[LEDS - 1] and (found.patches_W[some[seen[some]], 9] > 0.0).any()
-    assert np.array_equal(of_some, seen[some])
+    sources, pose = _sources_of(world, sun=False), _pose(world, world.data)
+    found, put_out = sources.candidates(world.data, pose, EXPOSURE_S, np.ones(LEDS)), 0
+    every, mirrored = np.arange(len(found.electrons)), np.arange(LEDS, len(found.electrons))
+    for patch in found.patches_W[LEDS:]:
+        world.put("box", 0.5 * (patch[:3] + found.patches_W[int(patch[9]), :3]), np.eye(3))
+        seen, of_mirrored = (sources.are_seen(world.data, pose[1], found, which) for which in (every, mirrored))
+        assert np.array_equal(of_mirrored, seen[LEDS:])
+        put_out += int((~of_mirrored).sum())
+    assert len(mirrored) <= put_out < len(mirrored) ** 2
 
 
 def test_an_led_is_dark_in_the_batch_when_a_ray_to_it_alone_is_blocked(small_world: Any) -> None:
@@ -127,6 +129,26 @@ def test_an_led_is_dark_in_the_batch_when_a_ray_to_it_alone_is_blocked(small_wor
         assert np.array_equal(found.electrons[:LEDS] > 0.0, visible)
         hidden += int((~visible).sum())
     assert LEDS <= hidden < LEDS * LEDS
+
+
+def test_what_is_nearer_to_an_led_than_its_clearance_or_its_seat_hides_it_from_neither_lens_nor_mirror(
+    small_world: Any,
+) -> None:
+    """The box, 4 cm thick: its face before an LED by half of the clearance, or more; then the LED in its middle."""
+    world = _placed(small_world)
+    sources, R_WC = _sources_of(world, sun=False), _pose(world, world.data)[0]
+    led_W, clearance_m = sources.leds_W(world.data)[0], SHEETS.leds.occlusion_clearance_m
+    for before_m, is_lit in ((0.5 * clearance_m, True), (1.5 * clearance_m, False)):
+        world.put("box", led_W + (0.02 - before_m) * R_WC[:, 0], R_WC)
+        assert (_seen(world, sources).electrons[0] > 0.0) == is_lit
+    mirrored = {}
+    for seat_m in (0.01, 0.1):
+        mirrored[seat_m] = set()
+        for k, place in enumerate(sources.leds_W(world.data)):
+            world.put("box", place, np.eye(3))
+            shown = _seen(world, _sources_of(world, sun=False, seat_m=seat_m)).patches_W[LEDS:, 9]
+            mirrored[seat_m] |= {k} & set(shown.astype(int))
+    assert mirrored[0.01] == set() and len(mirrored[0.1]) > 0
 
 
 def test_a_patch_is_dark_in_the_batch_when_a_box_stands_between_it_and_its_light(small_world: Any) -> None:
