@@ -282,13 +282,13 @@ def test_the_pieces_of_a_streak_lie_on_the_ellipsoid_they_are_of_and_have_its_li
 
 @pytest.mark.parametrize("turn", [0.4, 1.1])
 def test_a_faces_glint_is_as_bright_and_wide_however_the_face_is_turned_in_its_plane(turn: float) -> None:
-    """A slanting one, far inside the edges; what stands first in the scene does not mirror."""
-    dull, surfaces = metal_sphere([5.0, 9.0, 0.0], 0.1, name="hose_0"), replace(IDEAL, metal_roughness_rad=0.003)
-    found = []
+    """A slanting one, far inside the edges; its rows say which geom it is of, the fourth."""
+    dull = [metal_sphere([5.0, 9.0, 0.0], 0.1, name=f"hose_{k}") for k in range(3)]
+    surfaces, found = replace(IDEAL, metal_roughness_rad=0.003), []
     for R in (np.eye(3), exp(np.array([turn, 0.0, 0.0]))):
-        model, data = scene_of(dull, metal_body(_G.mjGEOM_BOX, np.array([1.02, 0.0, 0.0]), [0.02, 0.14, 0.14], R))
+        model, data = scene_of(*dull, metal_body(_G.mjGEOM_BOX, np.array([1.02, 0.0, 0.0]), [0.02, 0.14, 0.14], R))
         rows = glint_rows(data, Mirrors.of(model), np.array([0.0, -0.5, -0.9]), unit(-1.0, 0.5, 0.9), surfaces, LIGHT)
-        found.append(rows[rows[:, 10] == 1.0])
+        found.append(rows[rows[:, 10] == 3.0])
     assert [len(rows) for rows in found] == [1, 1]
     np.testing.assert_allclose(found[1][0], found[0][0], rtol=1e-3, atol=1e-3)
     assert found[1][0, 7] == pytest.approx(found[0][0, 7], rel=1e-4)
