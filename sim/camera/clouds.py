@@ -39,7 +39,7 @@ from scipy.special import ndtr, ndtri
 from dockair.kernels import njit
 from dockair.rotations import Array
 
-_OCTAVES = 12  # 4096:1; the footprint ends the sum earlier
+_OCTAVES = 12  # 2048:1; the footprint ends the sum earlier
 _FINEST = 2.0  # lattice over footprint at which an octave has faded out, from twice that on
 _THICKEST = 4.0  # standard deviations that the threshold keeps away from an endless one (cover 0 or 1)
 _AIRY_HALF = 1.6802  # z of Eq. (3)

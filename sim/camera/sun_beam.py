@@ -1,6 +1,6 @@
 """Sunlight through cloud and haze, over the Sun's disc: what all of the disc does is by the mean of its rays.
 
-    mean over rings of equal area of beam(d)                                                                     (1)
+    mean of beam(d) over rays that each stand for the same solid angle                                           (1)
 
 with beam(d) the transmittance along the ray d. Edges of cloud cross the disc; one ray to its centre would be all or
 nothing.
@@ -13,7 +13,7 @@ import numpy as np
 
 from dockair.rotations import Array
 
-_RINGS = 4  # of equal area, with 6, 12, 18, 24 rays: 60 rays resolve 2 % of the disc
+_RINGS = 4  # with 6, 12, 18, 24 rays, as their areas are: 60 rays resolve 2 % of the disc
 
 
 class Beam(Protocol):
