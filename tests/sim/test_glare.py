@@ -248,6 +248,22 @@ def test_a_round_irises_wing_is_the_airy_patterns_tail() -> None:
     assert np.allclose(nodes[r > 500.0], law[r > 500.0], rtol=1e-3)
 
 
+@pytest.mark.parametrize("along_px", [300.0, 800.0, 1400.0])
+def test_spikes_run_along_the_sheets_angle_and_widen_by_its_fan(along_px: float) -> None:
+    """[iris, eqs 2, 3] in a spike's middle, which the grid holds to an eighth; between two spikes there is none."""
+    glare, sun_C = _glare(**(ALONE | {"spike_share": 1.0})), _toward((300.0, 400.0))
+    grid = glare.stray(sun_C, 1.0, EXPOSURE_S, STRAIGHT.full_window)
+    assert grid is not None
+    turned = PARAMETERS.iris_angle_rad + np.array([0.0, np.pi / PARAMETERS.iris_blades])
+    middle, between = grid.at([300.0, 400.0] + along_px * np.column_stack([np.cos(turned), np.sin(turned)]))
+    R = STRAIGHT.focal_length_px * np.tan(LIGHT.sun_angular_radius_rad)
+    z = np.sqrt(7.0 * (R**2 / 4.0 + (PARAMETERS.spike_fan_rad * along_px) ** 2))
+    each = glare.shares["spikes"] / LENS.transmittance / PARAMETERS.iris_blades * FLUX_E_S * EXPOSURE_S * sun_C[0]
+    law = each * along_px / R**2 * (1.0 + (along_px / R) ** 2) ** -1.5 * 15.0 / (16.0 * z)
+    assert middle == pytest.approx(law, rel=0.125)
+    assert between < 1e-3 * law
+
+
 def test_a_ghost_is_as_large_as_the_defocused_pupil_or_as_the_suns_image_in_it() -> None:
     """A cone of f/2.8 is, from its axis, 1/5.6 as wide as it is long."""
     told = _glare(f_number=2.8).compact_ghosts(_toward((500.0, 300.0)), 1.0, EXPOSURE_S)
@@ -312,6 +328,7 @@ def test_a_window_is_the_full_frames_crop_bit_for_bit(camera: Camera, place: tup
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
+        ({"iris_blades": 1}, r"iris_blades.*at least 3.*1"),
         ({"iris_blades": 2}, r"iris_blades.*at least 3.*2"),
         ({"veiling_glare": 0.1, "halo_share": np.array([0.03, 0.03])}, r"<= 1"),
         ({"halo_share": np.array([0.01])}, r"halo_share.*halo_core_rad"),

@@ -1,5 +1,6 @@
 """The photon budget by hand, the laws that each kind of source follows, the spectra against the standard's table."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -22,10 +23,12 @@ from dockair.sim.camera.radiometry import (
     led_wavelength_m,
     relative_air_mass,
     responses,
+    responses_in_flight,
     solar_spectrum,
     sun_detection,
 )
 from dockair.sim.camera.sheets import (
+    CameraSheets,
     FilterParameters,
     LedParameters,
     LensParameters,
@@ -233,6 +236,12 @@ def test_an_led_at_the_edge_of_the_field_is_dimmed_by_the_tilted_band_pass() -> 
     assert _at_angle(angle, flat) / _at_angle(0.0, flat) == pytest.approx(np.cos(angle) * tilted, rel=1e-4)
 
 
+def test_on_the_axis_the_lens_transmits_what_the_tables_last_node_says() -> None:
+    """And nothing beyond it is read: what lies there in memory is no number."""
+    last = np.array([0.0, 0.25, 0.75, np.nan])[:3]
+    assert _led(np.array([8.0, 0.0, 0.0]), replace(RESPONSE, led_transmission=last)) == 0.75 * _on_axis(8.0)
+
+
 def test_absorbing_glass_does_not_mind_the_angle() -> None:
     assert np.allclose(RESPONSE.led_transmission, 1.0, rtol=0.0, atol=1e-9)
 
@@ -260,6 +269,12 @@ def test_the_band_pass_cuts_both_sides() -> None:
     assert edges == pytest.approx(0.5 * BAND_PASS.transmittance, rel=1e-9)
 
 
+def test_a_filter_that_blocks_the_leds_line_leaves_the_led_dark_and_the_sun_as_bright_as_what_is_left() -> None:
+    blocked = responses(LENS, replace(LONG_PASS, cut_on_m=1000e-9), SENSOR, LEDS, LIGHT, Camera())
+    assert _led(np.array([8.0, 0.5, 0.2]), blocked) == 0.0
+    assert 0.0 < blocked.white_e_s < 0.1 * RESPONSE.white_e_s
+
+
 def test_the_band_pass_costs_45_percent_of_led_light_and_86_percent_of_the_suns() -> None:
     assert NARROW.led_e_m2_sr_w_s / RESPONSE.led_e_m2_sr_w_s == pytest.approx(0.546, abs=0.002)
     assert NARROW.white_e_s / RESPONSE.white_e_s == pytest.approx(0.137, abs=0.001)
@@ -284,6 +299,13 @@ def test_the_data_hold_the_standards_irradiance(
     table = solar_spectrum()
     columns = (table.extraterrestrial_w_m3, table.global_tilt_w_m3, table.direct_w_m3)
     assert [_irradiance(low_nm, high_nm, c) for c in columns] == pytest.approx(expected_w_m2, abs=0.006)
+
+
+def test_the_table_that_all_share_cannot_be_written_to() -> None:
+    table = solar_spectrum()
+    for column in (table.wavelength_m, table.extraterrestrial_w_m3, table.global_tilt_w_m3, table.direct_w_m3):
+        with pytest.raises(ValueError, match="read-only"):
+            column[0] = 0.0
 
 
 def test_the_suns_electrons_are_those_of_a_sum_over_the_tables_rows() -> None:
@@ -319,6 +341,23 @@ def test_between_water_and_aerosol_the_clear_air_of_6_km_takes_rayleighs_share()
     assert taken == pytest.approx(0.0155 * np.exp(-6.0 / 8.0) + 0.04 * np.exp(-3.0), abs=0.001)
 
 
+@pytest.mark.parametrize("nm", [400.0, 550.0, 850.0, 1000.0])
+def test_the_gas_scatters_as_much_as_its_molecules_by_rayleighs_cross_section(nm: float) -> None:
+    """24 pi^3 F/(l^4 N^2) ((n^2 - 1)/(n^2 + 2))^2 a molecule, p/(m g) of them over the sea: within 1 %.
+
+    n is Peck & Reeder's at 15 degC, F the King factor of a depolarisation of 0.0279. 100 m up low haze of 1 m is gone.
+    """
+    um, per_m3 = 1e-3 * nm, 2.54743e25
+    n = 1.0 + 1e-8 * (8060.51 + 2480990.0 / (132.274 - um**-2) + 17455.7 / (39.32957 - um**-2))
+    king = (6.0 + 3.0 * 0.0279) / (6.0 - 7.0 * 0.0279)
+    of_one_m2 = 24.0 * np.pi**3 * king / ((1e-6 * um) ** 4 * per_m3**2) * ((n**2 - 1.0) / (n**2 + 2.0)) ** 2
+    over_sea = of_one_m2 * 101325.0 * constants.N_A / (0.0289644 * constants.g)
+    outside = solar_spectrum().extraterrestrial_w_m3
+    seen = direct_beam_w_m3(replace(LIGHT, haze_scale_height_m=1.0), 100.0, 1.0) / outside
+    row = np.argmin(np.abs(1e9 * solar_spectrum().wavelength_m - nm))
+    assert -np.log(seen[row]) == pytest.approx(over_sea * np.exp(-100.0 / 8000.0), rel=0.01)
+
+
 def test_at_refuelling_altitude_the_sun_has_94_to_99_percent_of_its_light() -> None:
     outside = sun_detection(LENS, LONG_PASS, SENSOR, solar_spectrum().extraterrestrial_w_m3)
     at_6_km, at_9_km = (
@@ -329,6 +368,23 @@ def test_at_refuelling_altitude_the_sun_has_94_to_99_percent_of_its_light() -> N
         LENS, LONG_PASS, SENSOR, LEDS, LIGHT, Camera(), altitude_m=6000.0, sun_elevation_rad=np.radians(41.75)
     )
     assert flight.white_e_s / RESPONSE.white_e_s == pytest.approx(at_6_km, rel=1e-4)
+    assert flight.led_e_m2_sr_w_s == RESPONSE.led_e_m2_sr_w_s
+
+
+@pytest.mark.parametrize(
+    ("sun_W", "air_mass"), [(None, 0.9997), ((0.6, -0.5, math.sqrt(0.39)), 1.6), ((0.8, 0.6, 0.0), 37.92)]
+)
+def test_in_flight_sunlight_comes_down_to_the_altitude_along_the_suns_elevation(
+    sun_W: tuple[float, float, float] | None, air_mass: float
+) -> None:
+    """None is overhead. The Sun's light alone changes; 1/0.6245 is the plane layers' air mass."""
+    sheets, direction = CameraSheets.load(), None if sun_W is None else np.array(sun_W)
+    flight = responses_in_flight(sheets, Camera(), 6000.0, direction)
+    beam = direct_beam_w_m3(LIGHT, 6000.0, air_mass)
+    outside = sun_detection(LENS, LONG_PASS, SENSOR, solar_spectrum().extraterrestrial_w_m3)
+    share = sun_detection(LENS, LONG_PASS, SENSOR, beam) / outside
+    for light in ("white_e_s", "sun_disc_e_s", "sun_flux_e_s", "glint_e_m2_s"):
+        assert getattr(flight, light) / getattr(RESPONSE, light) == pytest.approx(share, rel=1e-3)
     assert flight.led_e_m2_sr_w_s == RESPONSE.led_e_m2_sr_w_s
 
 

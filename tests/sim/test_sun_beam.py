@@ -42,6 +42,17 @@ def test_the_light_on_solids_is_the_share_of_the_disc_that_stands_clear_of_an_ed
     assert SunBeam.of(sky, SUN_W, RADIUS_RAD).mean == Lighting.toward(SUN_W, sky, RADIUS_RAD).direct
 
 
+@pytest.mark.parametrize("sun_W", [SUN_W, np.array([0.0, 0.0, 1.0]), np.array([-0.48, 0.8, 0.36])])
+def test_the_rays_fill_the_disc_as_evenly_as_its_moments_tell(sun_W: np.ndarray) -> None:
+    """Over a disc of radius R both axes have the variance R^2/4, no covariance, and the middle as their mean."""
+    d = SunBeam.of(_HalfCloudedSky(0.0), sun_W, RADIUS_RAD).directions_W
+    assert np.linalg.norm(d, axis=1) == pytest.approx(np.ones(len(d)), abs=1e-14)
+    across = d - np.outer(d @ sun_W, sun_W)
+    assert across.mean(axis=0) == pytest.approx(np.zeros(3), abs=1e-6 * RADIUS_RAD)
+    plane = np.eye(3) - np.outer(sun_W, sun_W)
+    assert across.T @ across / len(d) == pytest.approx(RADIUS_RAD**2 / 4.0 * plane, abs=1e-4 * RADIUS_RAD**2)
+
+
 def test_solids_glints_and_stray_light_have_one_beam_under_broken_cloud(small_world: Any) -> None:
     """Twenty Suns; under 0.3 of cloud the ray to the middle alone is off by more than a quarter for some."""
     alone = []
