@@ -224,6 +224,29 @@ def test_a_clipped_frame_changes_the_exposure_by_however_little_it_is_told_to() 
     assert control.step(np.full(SHAPE, 255, dtype=np.uint8), 1e-4) == pytest.approx(0.8e-4, rel=1e-12)
 
 
+@pytest.mark.parametrize(("of_frame_s", "level", "wanted_s"), [(40e-6, 54, 105.9e-6), (200e-6, 240, 114.8e-6)])
+def test_a_change_is_small_or_not_by_the_exposure_it_would_change(
+    of_frame_s: float, level: int, wanted_s: float
+) -> None:
+    """Now 100 us; frames of other exposures arrive late. 5.9 % more is inside the dead band of 10 %, 14.8 % is not."""
+    control = ExposureControl(replace(EXPOSURE, exposure_s=100e-6), SENSOR)
+    found_s = control.step(np.full(SHAPE, level, dtype=np.uint8), of_frame_s)
+    assert found_s == pytest.approx(100e-6 if wanted_s < 110e-6 else wanted_s, rel=1e-3)
+
+
+def test_at_the_clipped_level_itself_a_frame_counts_as_clipped() -> None:
+    control = ExposureControl(replace(EXPOSURE, clipped_level=1.0, exposure_s=1e-4), SENSOR)
+    assert control.step(np.full(SHAPE, 255, dtype=np.uint8), 1e-4) == EXPOSURE.clipped_factor * 1e-4
+
+
+def test_an_exposure_asked_for_is_made_within_the_hardwares_limits() -> None:
+    control = ExposureControl(EXPOSURE, SENSOR)
+    asked_s = 1e-9, EXPOSURE.shortest_s, 1e-4, EXPOSURE.longest_s, 1.0
+    made_s = EXPOSURE.shortest_s, EXPOSURE.shortest_s, 1e-4, EXPOSURE.longest_s, EXPOSURE.longest_s
+    assert tuple(control.within_limits(exposure_s) for exposure_s in asked_s) == made_s
+    assert control.exposure_s == EXPOSURE.exposure_s
+
+
 def test_exposures_and_limits_that_exclude_each_other_are_refused() -> None:
     with pytest.raises(DockairError, match="exposure.shortest_s.*0.0005"):
         replace(EXPOSURE, shortest_s=0.0005)

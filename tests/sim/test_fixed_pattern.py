@@ -67,6 +67,12 @@ def test_another_key_is_another_sensor_and_the_same_key_the_same() -> None:
         assert abs(np.corrcoef(a.ravel(), b.ravel())[0, 1]) < 4.5 / np.sqrt(a.size)
 
 
+def test_a_pattern_that_has_been_drawn_stays_as_it_is() -> None:
+    for array in (PATTERN.gain_map, PATTERN.offset_map, PATTERN.column_e):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 0
+
+
 def test_an_even_sensor_has_no_pattern() -> None:
     even = FixedPattern(
         replace(SENSOR, photo_response_nonuniformity=0.0, dark_signal_nonuniformity_e=0.0, column_pattern_e=0.0),

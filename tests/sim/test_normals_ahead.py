@@ -52,6 +52,7 @@ def test_a_window_that_moves_or_grows_by_sixteen_pixels_finds_its_numbers_and_re
         ((317, 500), (200, 300), 6),
         ((300, 600), (200, 300), 6),
         ((300, 500), (200, 300), 7),  # a frame later: one was left out
+        ((300, 500), (200, 300), 5),  # the same frame again
         ((0, 0), SIZE, 6),
     ],
 )

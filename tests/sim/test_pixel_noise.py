@@ -13,7 +13,15 @@ from scipy.special import ndtri
 from dockair.parameters import load_parameters
 from dockair.sim.camera.electronics import digitise
 from dockair.sim.camera.fixed_pattern import FixedPattern
-from dockair.sim.camera.pixel_noise import EXACT_BELOW_E, count_from_normal, mix, normal_from_bits
+from dockair.sim.camera.pixel_noise import (
+    EXACT_BELOW_E,
+    LANES,
+    _row_bits,
+    count_from_normal,
+    mix,
+    normal_from_bits,
+    padded_columns,
+)
 from dockair.sim.camera.sheets import SensorParameters
 
 #: No pattern, no dark current, one level an electron, 12 bits.
@@ -56,6 +64,24 @@ def test_the_hash_gives_every_bit_to_half_of_consecutive_numbers_and_flips_half_
         flipped = np.array([mix(i ^ np.uint32(1 << bit)) for i in x[:2000]], dtype=np.uint32)
         changed = np.bitwise_count(hashed[:2000] ^ flipped)
         assert changed.mean() == pytest.approx(16.0, abs=4.5 * np.sqrt(8.0 / 2000))
+
+
+def test_the_numbers_along_a_row_go_on_by_an_odd_step_from_whatever_column() -> None:
+    """Odd, so that 2^32 columns would have as many numbers; one column on is one step on, modulo 2^32."""
+    for row in range(40):
+        begin, step = _row_bits(np.uint64(5), 3, row, 0)
+        assert int(step) % 2 == 1
+        assert int(_row_bits(np.uint64(5), 3, row, 700)[0]) == (int(begin) + 700 * int(step)) % 2**32
+
+
+@pytest.mark.parametrize(
+    ("columns", "first", "worked_on"),
+    [(1, 0, LANES), (LANES, 0, LANES), (LANES + 1, 100, 2 * LANES), (58, 1990, 58), (30, 2000, 48), (2048, 0, 2048)],
+)
+def test_a_rows_pixels_are_worked_on_in_whole_lanes_as_far_as_the_sensor_goes(
+    columns: int, first: int, worked_on: int
+) -> None:
+    assert padded_columns(columns, first, 2048) == worked_on
 
 
 @pytest.mark.parametrize("electrons", [0.1, 0.7, 3.3, 12.9, 29.99, 30.01, 300.0])

@@ -21,6 +21,8 @@ NODES = [750e-9, 800e-9, 850e-9, 900e-9, 950e-9, 1000e-9, 1050e-9, 1100e-9]
         ("sensor", {"wavelength_m": [NODES[0], *NODES[:7]]}, "sensor.wavelength_m: expected rising"),
         ("sensor", {"converter_bits": 12, "outputs": 4}, "sensor.clock_hz: expected up to 4e"),
         ("filter_long_pass", {"cut_on_m": 900e-9, "cut_off_m": 700e-9}, "filter.cut_on_m: expected less than"),
+        ("filter_long_pass", {"cut_on_m": 900e-9, "cut_off_m": 900e-9}, "filter.cut_on_m: expected less than"),
+        ("exposure", {"exposure_s": 0.6e-3}, "exposure.exposure_s: expected 1.4e-05 to 0.0005 s"),
         (
             "filter_long_pass",
             {"cut_on_m": 850e-9, "cut_off_m": 864e-9},
@@ -36,6 +38,17 @@ def test_values_that_exclude_each_other_are_refused(sheet: str, values: dict[str
     with pytest.raises(DockairError) as caught:
         CameraSheets.load(overrides={sheet: values})
     assert str(caught.value).startswith(words)
+
+
+def test_a_quantum_efficiency_without_its_wavelength_is_refused() -> None:
+    sensor = CameraSheets.load().sensor
+    with pytest.raises(DockairError, match="sensor.wavelength_m: expected rising wavelengths, one for each"):
+        replace(sensor, quantum_efficiency=sensor.quantum_efficiency[:-1])
+
+
+def test_smudges_may_all_be_of_one_size() -> None:
+    one_size = CameraSheets.load(overrides={"glare": {"dirt_smallest_rad": 0.05, "dirt_largest_rad": 0.05}}).glare
+    assert one_size.dirt_smallest_rad == one_size.dirt_largest_rad == 0.05
 
 
 @pytest.mark.parametrize(("cut_on_ramp_m", "cut_off_ramp_m"), [(20e-9, 20e-9), (35e-9, 5e-9)])
