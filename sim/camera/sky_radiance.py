@@ -15,8 +15,9 @@ angle X from the Sun, s the sine of the elevation.
 Eq. (1) is the CIE clear sky's indicatrix, which is 1 at 90 degrees; (2) its gradation, scaled so that the zenith and
 endless air at 90 degrees from the Sun are the sheet's. w is the thickness of cloud elements over their width: it keeps
 slant paths finite where a layer is seen edge-on. J' has less Sun in it where cloud shades the air (mean of the
-layer); J_h less where the haze itself does. The light that cloud sends down is `clouds`. Cloud, deck and haze are lit
-while the Sun stands above the horizon that their own height sees; the clear sky and the air stay as they are.
+layer); J_h less where the haze itself does. The light that cloud sends down is `clouds`, and 1 - T of what the ground
+below it sends up. Cloud, deck and haze are lit while the Sun stands above the horizon that their own height sees; the
+clear sky and the air stay as they are.
 
 Land is patches of all sizes, darker and lighter, and water. Deck and ground are asked for from the place of the camera,
 the key; what is above goes along with the camera, as W does.
