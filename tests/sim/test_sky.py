@@ -9,12 +9,14 @@ import numpy as np
 import pytest
 from scipy.ndimage import label
 from scipy.spatial.transform import Rotation
+from scipy.special import ndtri
 
 from dockair.errors import DockairError
 from dockair.parameters import load_parameters, read_sheet
+from dockair.sim.camera.clouds import optical_depth
 from dockair.sim.camera.sheets import SkyParameters
 from dockair.sim.camera.sky import Sky
-from dockair.sim.camera.sky_radiance import SkyRadiance
+from dockair.sim.camera.sky_radiance import LAYER_NODE_RAD, NODE_RAD, SkyRadiance
 from dockair.sim.camera.weather import Weather
 
 SHEET = load_parameters("sky", SkyParameters)
@@ -363,6 +365,175 @@ def test_a_sun_below_the_horizon_leaves_the_clear_sky_as_it_is() -> None:
             factor / (1.0 + float(SHEET.beyond_even(np.zeros(1))[0])) * even.radiance(up[None])[0], rel=1e-6
         )
         assert law.airlight(up) == pytest.approx(SHEET.airlight * factor, rel=1e-12)
+
+
+_MEAN_NOISE = 1.3383e-4  # of a normal law above -4, where a cover of 1 begins: cloud as thick as its mean
+
+
+class _Even:
+    """A texture that is the same everywhere, and remembers where it was asked for."""
+
+    def __init__(self, value: float) -> None:
+        self.value, self.asked = value, np.empty((0, 3))
+
+    def at(self, x_m: np.ndarray, y_m: np.ndarray, footprint_m: np.ndarray) -> np.ndarray:
+        self.asked = np.column_stack([x_m, y_m, footprint_m])
+        return np.full(len(x_m), self.value)
+
+
+def _air_mass(sine: float) -> float:
+    return 1.0 / (sine + 0.025 * math.exp(-11.0 * sine))
+
+
+def _flux(depth: float) -> float:
+    """Two-stream, [clouds, eq 7]."""
+    return 1.0 / (1.0 + 0.75 * (1.0 - SHEET.cloud_asymmetry) * depth)
+
+
+KEY_M = np.array([700.0, -400.0, 250.0])
+
+
+def test_cloud_above_is_that_of_where_the_ray_crosses_it_as_fine_as_the_tables_nodes_stand_there() -> None:
+    """Eq. (3): height (d_x, d_y)/(s + w). Nodes are 1/(s + w) farther apart along than across: the mean of both."""
+    law, d = _law(Weather(cloud_cover=0.5)), np.array([_toward(90.0), _toward(30.0, 20.0), _toward(4.0, -70.0)])
+    law._above = above = _Even(0.5)  # type: ignore[assignment]
+    law.beam(d)
+    reach = SHEET.cloud_height_m / (d[:, 2] + SHEET.cloud_aspect)
+    wanted = np.column_stack(
+        [d[:, 0] * reach, d[:, 1] * reach, NODE_RAD * reach / np.sqrt(d[:, 2] + SHEET.cloud_aspect)]
+    )
+    assert above.asked == pytest.approx(wanted, rel=1e-12, abs=1e-9)
+
+
+def test_deck_and_ground_are_those_of_where_the_ray_meets_them_from_the_key() -> None:
+    """Eq. (4), in the triangle with the Earth's middle by the laws of sine and cosine; nodes are 1/mu farther along."""
+    law, d = _law(), np.array([_toward(-90.0), _toward(-40.0, 20.0), _toward(-4.0, -70.0)])
+    ground, coasts, deck = _Even(0.0), _Even(0.0), _Even(0.0)
+    law._ground, law._coasts, law._deck = ground, coasts, deck  # type: ignore[assignment]
+    law.below(d, KEY_M)
+    law.over(d, KEY_M)
+    for found, top_m in ((ground, 0.0), (coasts, 0.0), (deck, SHEET.deck_top_m)):
+        high, low = (SHEET.earth_radius_m + h for h in (ALTITUDE_M + KEY_M[2], top_m))
+        nadir = np.arccos(-d[:, 2])
+        incidence = np.arcsin(np.sin(nadir) * high / low)
+        distance = np.sqrt(high**2 + low**2 - 2.0 * high * low * np.cos(incidence - nadir))
+        level = KEY_M[:2] + d[:, :2] * distance[:, None]
+        wanted = np.column_stack([level, LAYER_NODE_RAD * distance / np.sqrt(np.cos(incidence))])
+        assert found.asked == pytest.approx(wanted, rel=1e-6)
+
+
+@pytest.mark.parametrize("noise", [-0.9, 0.8, 2.0])
+@pytest.mark.parametrize("elevation_deg", [-90.0, -35.0])
+def test_a_deck_reflects_what_its_slant_thickness_does_and_lets_the_rest_through(
+    noise: float, elevation_deg: float
+) -> None:
+    """Eq. (5), under a closed cloud of 8 optical depths: bumps that face the Sun are brighter, none beyond white."""
+    s, w, sun = math.sin(math.radians(-elevation_deg)), SHEET.cloud_aspect, math.radians(50.0)
+    law = _law(Weather(cloud_cover=1.0), _toward(50.0), replace(BARE, deck_cover=1.0))
+    law._deck = _Even(noise)  # type: ignore[assignment]
+    (light, clear) = law.over(np.array([_toward(elevation_deg)]), np.zeros(3))[0]
+    tau = float(optical_depth(np.array([noise]), 1.0, SHEET.deck_optical_depth)[0])
+    mu = s if s == 1.0 else math.sqrt(1.0 - (6377e3 / 6373e3 * math.cos(math.radians(elevation_deg))) ** 2)
+    share = _flux(tau * (1.0 + w) / (mu + w))
+    facing = min((math.sin(sun) + w) / (1.0 + w) * (1.0 + w * noise), 1.0)
+    assert light == pytest.approx((1.0 - share) * facing * _flux(8.0), rel=1e-9)
+    assert clear == pytest.approx(share, rel=1e-9)
+
+
+@pytest.mark.parametrize("visibility_m", [100e3, 8e3])
+def test_a_deck_of_no_thickness_changes_nothing(visibility_m: float) -> None:
+    """Air and haze before it and under it are one: what is below is neither dimmed twice nor not at all."""
+    weather, d = Weather(visibility_m=visibility_m, cloud_cover=0.5), np.array([_toward(-80.0), _toward(-15.0, 60.0)])
+    thin, none = (replace(SHEET, **changes) for changes in ({"deck_optical_depth": 0.0}, {"deck_cover": 0.0}))
+    assert _law(weather, sheet=thin).has_deck and not _law(weather, sheet=none).has_deck
+    assert _law(weather, sheet=thin).radiance(d) == pytest.approx(_law(weather, sheet=none).radiance(d), rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("noise", "coast", "share_of_land"), [(0.7, -0.06, 1.0), (-0.7, 0.0, 0.5), (-3.0, -1.0, 1.0), (0.7, 0.06, 0.0)]
+)
+def test_land_is_as_patchy_as_the_sheet_says_and_ends_where_the_waters_share_begins(
+    noise: float, coast: float, share_of_land: float
+) -> None:
+    """Lambertian under a closed cloud; the coast is where noise exceeds its quantile of 1 - water's share, 0.1 wide."""
+    sun, sheet = math.radians(50.0), replace(SHEET, deck_cover=0.0, aerosol_optical_depth=0.0)
+    law = _law(Weather(cloud_cover=1.0), _toward(50.0), sheet)
+    shore = float(ndtri(1.0 - SHEET.water_cover))
+    law._ground, law._coasts = _Even(noise), _Even(shore + coast)  # type: ignore[assignment]
+    land = SHEET.ground_reflectance * max(1.0 + SHEET.ground_contrast * noise, 0.0)
+    seen = share_of_land * land + (1.0 - share_of_land) * SHEET.water_reflectance
+    assert law.radiance(_toward(-60.0)[None]) == pytest.approx([seen * math.sin(sun) * _flux(8.0)], rel=1e-9, abs=1e-12)
+
+
+@pytest.mark.parametrize("depth", [0.3, 40.0])
+def test_cloud_is_lit_from_the_ground_by_what_comes_through_and_comes_back(depth: float) -> None:
+    """Of T sin 50 degrees the ground sends up its reflectance; cloud as thick as its mean sends back 1 - T of that."""
+    weather, up = Weather(cloud_cover=1.0, cloud_optical_depth=depth), _toward(70.0, 90.0)[None]
+    light = []
+    for reflectance in (0.25, 0.0):
+        law = _law(weather, _toward(50.0), replace(BARE, zenith=1e-9, ground_reflectance=reflectance))
+        law._above = _Even(_MEAN_NOISE)  # type: ignore[assignment]
+        light.append(law.upward(up)[0])
+    through = _flux(depth)
+    assert light[0] - light[1] == pytest.approx(
+        0.25 * math.sin(math.radians(50.0)) * through * (1.0 - through), rel=1e-6
+    )
+
+
+def test_air_before_a_cloud_dims_it_and_air_behind_is_seen_through_it() -> None:
+    """Of the air the part under the cloud is 1 - exp(-height/scale); a black ground. What cloud sends is [clouds]'s."""
+    depth, sheet = 1.5, replace(BARE, zenith=0.05, ground_reflectance=0.0)
+    weather, d = Weather(cloud_cover=1.0, cloud_optical_depth=depth), _toward(40.0, 100.0)
+    law, thin = (_law(weather, _toward(50.0), s) for s in (sheet, replace(sheet, zenith=1e-9)))
+    for each in (law, thin):
+        each._above = _Even(_MEAN_NOISE)  # type: ignore[assignment]
+    b, s, w = -math.log(1.0 - 0.05 / SHEET.airlight), math.sin(math.radians(40.0)), SHEET.cloud_aspect
+    before = math.exp(-b * (1.0 - math.exp(-SHEET.cloud_height_m / SHEET.aerosol_scale_m)) * _air_mass(s))
+    behind = math.exp(-b * _air_mass(s))
+    lit = SHEET.airlight * (1.0 + float(SHEET.beyond_even(np.array([d @ _toward(50.0)]))[0]))
+    wanted = law.airlight(d) * (1.0 - before) + before * thin.upward(d[None])[0]
+    wanted += lit * (before - behind) * math.exp(-depth * (1.0 + w) / (s + w))
+    assert law.upward(d[None])[0] == pytest.approx(wanted, rel=1e-6)
+
+
+@pytest.mark.parametrize("visibility_m", [100e3, 5e3])
+@pytest.mark.parametrize("azimuth_deg", [15.0, 90.0])
+def test_in_the_shade_of_clouds_air_has_less_sun_in_it_and_in_haze_still_less(
+    visibility_m: float, azimuth_deg: float
+) -> None:
+    """What 0.6 of cloud diffracts still is a beam, exp(-tau/2 mu) of it; of haze exp(-t m), the rest is even."""
+    weather, w = Weather(cloud_cover=0.6, cloud_optical_depth=3.0, visibility_m=visibility_m), SHEET.cloud_aspect
+    law, s = _law(weather, _toward(40.0)), math.sin(math.radians(40.0))
+    mu = (s + w) / (1.0 + w)
+    light = 0.4 + 0.6 * _flux(3.0)
+    beam = (0.4 + 0.6 * math.exp(-0.5 * 3.0 / mu)) / light
+    cosine = float(_toward(0.0, azimuth_deg) @ _toward(40.0))
+    air = SHEET.airlight * light * (1.0 + beam * float(SHEET.beyond_even(np.array([cosine]))[0]))
+    haze = 3.912023 * (1.0 / visibility_m - 1e-5) * SHEET.haze_depth_m
+    direct = math.exp(-haze * _air_mass(s))
+    wanted = air * direct + light * mu * max(_flux(haze) - direct, 0.0)
+    assert law.airlight(_toward(0.0, azimuth_deg)) == pytest.approx(wanted, rel=1e-6)
+
+
+def test_air_clearer_than_the_clear_skys_is_as_clear() -> None:
+    sun, d = _toward(40.0), _directions(50, 4)
+    clear, clearer = (_law(Weather(visibility_m=v), sun) for v in (SHEET.clear_visibility_m, 1e6))
+    assert np.array_equal(clearer.radiance(d), clear.radiance(d))
+    assert np.array_equal(clearer.beam(d), clear.beam(d))
+
+
+def test_the_length_of_directions_does_not_matter() -> None:
+    weather, d = Weather(cloud_cover=0.5, visibility_m=20e3), _directions(50, 4)
+    one, other = (_law(weather, length * _toward(40.0, 10.0)) for length in (1.0, 7.0))
+    assert other.radiance(3.0 * d) == pytest.approx(one.radiance(d), rel=1e-9)
+    assert other.airlight(3.0 * d[0]) == pytest.approx(one.airlight(d[0]), rel=1e-12)
+
+
+def test_the_light_in_the_shade_leaves_the_clouds_aureole_out() -> None:
+    """Before a Sun at 35 degrees that of one optical depth holds 0.249 of the sunlight, a quarter of it all round."""
+    law = _law(Weather(cloud_cover=1.0, cloud_optical_depth=1.0), _toward(35.0), BARE)
+    law._above = _Even(_MEAN_NOISE)  # type: ignore[assignment]
+    assert law.radiance(_directions(100_000, 5)).mean() - law._ambient() == pytest.approx(0.249 / 4.0, abs=0.015)
 
 
 def test_at_night_all_is_dark() -> None:
