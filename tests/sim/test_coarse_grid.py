@@ -16,6 +16,14 @@ def test_between_nodes_a_plane_is_a_plane() -> None:
     assert got == pytest.approx(3.0 + 0.5 * pixels[:, 1] - 0.25 * pixels[:, 0], abs=1e-4)
 
 
+def test_at_a_node_it_has_the_nodes_value_and_beyond_the_outermost_that_of_the_edge() -> None:
+    values, first = np.random.default_rng(4).uniform(1.0, 2.0, (4, 6)).astype(np.float32), (3, 10)
+    i, j = np.indices((8, 10)) - 2  # two nodes farther out on every side
+    pixels = SPACING_PX * np.column_stack([(first[1] + j).ravel(), (first[0] + i).ravel()]).astype(float)
+    nearest = values[np.clip(i, 0, 3), np.clip(j, 0, 5)]
+    assert CoarseGrid(values, first).at(pixels) == pytest.approx(nearest.ravel(), rel=1e-12)
+
+
 def test_the_nodes_around_a_window_enclose_every_pixel_and_no_ring_more() -> None:
     rng = np.random.default_rng(2)
     for _ in range(300):

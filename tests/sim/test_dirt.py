@@ -88,7 +88,9 @@ def test_stray_light_is_dimmed_by_the_dirt_toward_the_sun_and_by_the_mean_where_
     i, j = np.unravel_index(np.argmin(dirt.grid.values[:-1, :-1]), np.array(dirt.grid.values.shape) - 1)
     darkest = Camera().rays_from_pixels(np.array([[8.0 * j, 8.0 * i]]))[0]
     assert dirt.toward(darkest) == pytest.approx(float(dirt.grid.values[i, j]), abs=1e-6)
-    assert dirt.toward(np.array([0.1, 1.0, 0.0])) == pytest.approx(dirt.grid.values.mean(), rel=1e-6)
+    beside = Camera().rays_from_pixels(np.array([[2050.0, 500.0], [-3.0, 500.0], [900.0, 1090.0], [900.0, -3.0]]))
+    for direction in (np.array([0.1, 1.0, 0.0]), *beside):
+        assert dirt.toward(direction) == pytest.approx(dirt.grid.values.mean(), rel=1e-6)
 
 
 def test_a_led_is_dimmed_by_the_dirt_before_its_pixel() -> None:

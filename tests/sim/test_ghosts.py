@@ -50,12 +50,22 @@ def test_a_large_ghosts_light_is_its_share_of_the_suns(blades: int, position: fl
 
 
 @pytest.mark.parametrize("blades", [0, 3, 6])
-@pytest.mark.parametrize(("position", "pupil_px"), [(0.25, 0.0), (0.02, 0.0), (0.55, 3.4), (1.0, 11.4), (0.3, 12.0)])
+@pytest.mark.parametrize(
+    ("position", "pupil_px"), [(0.25, 0.0), (0.02, 0.0), (0.55, 3.4), (1.0, 11.4), (0.3, 12.0), (1.0, 13.6)]
+)
 def test_a_compact_ghosts_light_is_its_share_of_the_suns(blades: int, position: float, pupil_px: float) -> None:
     for shift in ([0.0, 0.0], [0.7, 1.3]):
         ghosts = _one(blades, position, pupil_px)
         assert _fine(ghosts, SUN + shift).sum(dtype=float) == pytest.approx(1e5, rel=0.03 if position < 0.1 else 5e-3)
         assert not _coarse(ghosts, SUN + shift).values.any()  # and is not counted twice
+
+
+@pytest.mark.parametrize(("position", "compact"), [(0.1, True), (0.5, False)])
+def test_a_ghost_is_compact_if_its_edge_too_is_within_32_pixels(position: float, compact: bool) -> None:
+    """A pupil of 29 px; the edge is the Sun's image in it, 1.4 or 6.8 px, times sqrt(5)/2."""
+    ghosts = _one(0, position, 29.0)
+    assert len(ghosts.compact(SUN, 1e9).pixels) == compact
+    assert _fine(ghosts).any() == compact and _coarse(ghosts).values.any() != compact
 
 
 def test_a_ghosts_edge_has_the_width_of_the_suns_image_in_it() -> None:

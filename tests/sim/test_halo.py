@@ -70,6 +70,13 @@ def test_grid_and_pixels_together_are_the_law_at_every_distance() -> None:
     assert np.sqrt(np.mean(error**2)) < 0.008
 
 
+@pytest.mark.parametrize(("sun_px", "near_px"), [(0.5, 96.0), (13.5, 96.0), (24.0, 96.0), (40.0, 160.0)])
+def test_pixel_by_pixel_it_is_drawn_as_far_as_96_pixels_or_four_radii_of_the_disc(
+    sun_px: float, near_px: float
+) -> None:
+    assert Halo(SHARES, CORES, EXPONENTS, sun_px).near_px == near_px
+
+
 def test_nothing_is_taken_away_pixel_by_pixel() -> None:
     """The grid alone never exceeds the law: what is left to add is positive and ends where it should."""
     image = _image(Window(0, 1088, 0, 2048))

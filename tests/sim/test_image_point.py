@@ -39,7 +39,7 @@ def test_light_from_far_beside_the_axis_stays_far_beside_the_sensor() -> None:
 @pytest.mark.parametrize("camera", [Camera(), FOLDING], ids=["pinhole", "distorted"])
 def test_many_points_are_imaged_as_each_by_itself(camera: Camera) -> None:
     ahead = 3.0 * np.array([_off_axis(angle, 4.0 * angle) for angle in (0.0, 10.0, 25.0, 30.0, 60.0, 81.0, 89.0)])
-    pixels = image_points(camera, np.vstack([ahead, -ahead]))
+    pixels = image_points(camera, np.vstack([ahead, -ahead, [[0.0, 1.0, 0.5]]]))
     np.testing.assert_array_equal(pixels[:7], [image_point(camera, p) for p in ahead])
     assert np.isnan(pixels[7:]).all()
 

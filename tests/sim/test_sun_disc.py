@@ -77,6 +77,12 @@ def test_its_centre_is_where_the_lens_images_the_sun(camera: Camera, place: tupl
     assert centre == pytest.approx(place, abs=0.02)
 
 
+def test_the_pixel_in_its_very_middle_is_as_bright_as_the_others() -> None:
+    image, start = _picture(STRAIGHT, (1020.0, 540.0), 0.7)
+    middle = image[540 - start[0], 1020 - start[1]]
+    assert middle == pytest.approx(image[540 - start[0], 1022 - start[1]], rel=1e-6) and middle > 0.0
+
+
 def test_its_edge_is_as_soft_as_asked() -> None:
     """Along a row through the middle the edge is the normal distribution's integral: 16 to 84 % is 2 sigma."""
     image, _ = _picture(STRAIGHT, (1023.5, 543.0), 2.5)
