@@ -148,6 +148,20 @@ def test_nothing_finer_than_the_footprint_is_left() -> None:
     assert differences[1] < 1e-3 < 2e-2 < differences[0]
 
 
+@pytest.mark.parametrize(
+    ("footprint_m", "of_octaves"), [(100.0, (1.0, 1.0, 0.25)), (200.0, (1.0, 0.25)), (350.0, (3.0 / 7.0,)), (600.0, ())]
+)
+def test_octaves_are_whole_down_to_four_samples_a_lattice_and_gone_at_two(
+    footprint_m: float, of_octaves: tuple[float, ...]
+) -> None:
+    """Lattices of 1000 m/2^k: the variance is that of Eq. (1), w_k linear in between; to 4.5 sqrt(2/4000)."""
+    x, y = np.random.default_rng(11).uniform(-1e6, 1e6, (2, 4000))
+    gain_2 = 2.0 ** (-2.0 / 3.0)
+    wanted = (1.0 - gain_2) * sum(w * w * gain_2**k for k, w in enumerate(of_octaves))
+    found = _texture(12).at(x, y, np.full(4000, footprint_m)).var()
+    assert found == pytest.approx(wanted, rel=4.5 * math.sqrt(2.0 / 4000.0), abs=0.0)
+
+
 def test_the_field_is_continuous_across_its_lattice() -> None:
     x = np.array([1000.0, 3000.0, -2000.0])[:, None] + np.array([-1e-6, 1e-6])
     y = np.array([123.0, 0.0, -777.0])[:, None] + np.zeros(2)

@@ -50,9 +50,7 @@ def test_a_large_ghosts_light_is_its_share_of_the_suns(blades: int, position: fl
 
 
 @pytest.mark.parametrize("blades", [0, 3, 6])
-@pytest.mark.parametrize(
-    ("position", "pupil_px"), [(0.25, 0.0), (0.02, 0.0), (0.55, 3.4), (1.0, 11.4), (0.3, 12.0), (1.0, 13.6)]
-)
+@pytest.mark.parametrize(("position", "pupil_px"), [(0.25, 0.0), (0.02, 0.0), (0.55, 3.4), (1.0, 11.4), (0.3, 12.0)])
 def test_a_compact_ghosts_light_is_its_share_of_the_suns(blades: int, position: float, pupil_px: float) -> None:
     for shift in ([0.0, 0.0], [0.7, 1.3]):
         ghosts = _one(blades, position, pupil_px)

@@ -96,6 +96,30 @@ def _sky(**changes: float) -> Sky:
     return Sky(SkyRadiance(replace(SHEET, **changes), Weather(), SUN, ALTITUDE_M, 7))
 
 
+class _Wave:
+    """A texture without anything that nodes 1 mrad apart cannot hold."""
+
+    def __init__(self, wave_m: float) -> None:
+        self._wave_m = wave_m
+
+    def at(self, x_m: np.ndarray, y_m: np.ndarray, footprint_m: np.ndarray) -> np.ndarray:
+        return np.asarray(np.sin(x_m / self._wave_m) * np.cos(y_m / self._wave_m))
+
+
+@pytest.mark.parametrize("place", [(0.0, 0.0, 0.0), (900.0, -700.0, 150.0), (-123456.0, 65432.0, -600.0)])
+def test_the_ground_under_a_deck_stays_in_place_at_its_own_depth(place: tuple[float, float, float]) -> None:
+    """Through a deck of no thickness and clear air: waves of 9 km, against the law asked from that place."""
+    sheet = replace(SHEET, deck_cover=1.0, deck_optical_depth=0.0, aerosol_optical_depth=0.0, water_cover=0.0)
+    law = SkyRadiance(sheet, Weather(), SUN, ALTITUDE_M, 7)
+    law._ground = _Wave(9e3)  # type: ignore[assignment]
+    R, at = matrix_from_yaw_pitch_roll(0.7, 0.5, 0.2), np.array(place)
+    out = np.empty((len(Y[::7]), len(X[::9])), dtype=np.float32)
+    Sky(law).fill(out, R, X[::9], Y[::7], at)
+    wanted = law.below(_rays(R), at)[:, 0]
+    assert law.has_deck and np.ptp(wanted) > 0.02
+    assert np.abs(out.ravel() - wanted).max() < 1e-3
+
+
 def _frame(sky: Sky, R: np.ndarray, place: np.ndarray | None = None) -> np.ndarray:
     out = np.empty((len(Y), len(X)), dtype=np.float32)
     sky.fill(out, R, X, Y, place)

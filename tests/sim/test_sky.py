@@ -572,7 +572,11 @@ def test_what_the_aureole_takes_from_the_light_on_solids_is_as_large_as_stated(
 
 @pytest.mark.parametrize(
     ("key", "value"),
-    [("cloud_cover", 1.2), ("cloud_cover", -0.1), ("cloud_optical_depth", -1.0), ("visibility_m", 0.0)],
+    [
+        *(("cloud_cover", value) for value in (1.2, -0.1, math.nan)),
+        *(("cloud_optical_depth", value) for value in (-1.0, math.inf, math.nan)),
+        *(("visibility_m", value) for value in (0.0, math.nan)),
+    ],
 )
 def test_impossible_weather_is_refused_by_name(key: str, value: float) -> None:
     with pytest.raises(DockairError, match=key):
