@@ -233,7 +233,7 @@ class SkyRadiance:
         beam = math.exp(-self._haze_depth * float(air_mass(self._sun[2:])[0]))
         through = float(self._droplets.transmittance(np.asarray(self._haze_depth)))
         lit = self._lit(self.altitude_m) if self._haze_depth > 0.0 else 1.0  # without haze J_h is the clear air's J
-        self._haze_light = lit * beam, lit * self._mu_sun * max(through - beam, 0.0) * self._light_below
+        self._haze_light = lit * beam, lit * self._mu_sun * (through - beam) * self._light_below
 
     def _lit(self, height_m: float) -> float:
         """1 while the Sun stands above the horizon of a height over the ground, else 0."""
