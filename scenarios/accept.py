@@ -76,9 +76,9 @@ class Accept(Table):
         if self.radial_offset_median_max_m is not None:
             parts.append(f"median offset {self.radial_offset_median_max_m:g} m")
         if low is not None or high is not None:
-            speeds = f"{low or 0.0:g} to {high:g} m/s" if high is not None else f"from {low:g} m/s on"
+            speeds = f"at {low or 0.0:g} to {high:g} m/s" if high is not None else f"from {low:g} m/s on"
             share = "" if self.closure_rate_min is None else f"{100.0 * self.closure_rate_min:g} % "
-            parts.append(f"{share}at {speeds}")
+            parts.append(f"{share}{speeds}")
         if parts and self.unsafe_max:
             parts.append(f"unsafe in at most {self.unsafe_max}")
         return ", ".join(parts)

@@ -108,6 +108,7 @@ def test_where_no_rate_is_asked_for_every_flight_must_show_what_one_must():
     accept = Accept(outcome="contact", radial_offset_max_m=0.15)
     assert accept.judge(rows(5, 0, {})) == []
     assert accept.judge(rows(5, 2, MISSED)) == ["2 of 7 flights fall short: seeds 5, 6"]
+    assert accept.judge(rows(0, 5, MISSED)) == ["5 of 5 flights fall short: seeds 0, 1, 2, 3, 4"]
     assert accept.judge(rows(0, 7, {"radial_offset_m": 0.16})) == [
         "7 of 7 flights fall short: seeds 0, 1, 2, 3, 4, ..."
     ]
@@ -203,3 +204,33 @@ def test_a_figure_of_a_contact_that_could_not_be_measured_is_inside_no_limit():
 def test_what_nothing_could_meet_or_asks_for_nothing_is_refused(asked, said):
     with pytest.raises(DockairError, match=re.escape(said)):
         Accept(**asked)
+
+
+def test_limits_of_ones_own_stand_in_the_place_of_a_good_contacts():
+    loose = Accept(clean_rate_min=1.0, radial_offset_max_m=0.3, closure_speed_max_m_s=3.0)
+    assert loose.shortfalls("contact", 0.24, 2.7) == []
+    tight = Accept(clean_rate_min=1.0, radial_offset_max_m=0.05, closure_speed_max_m_s=1.0)
+    assert tight.shortfalls("contact", 0.1, 1.2) == [
+        "radial offset 0.100 m, wanted 0 to 0.05",
+        "closure speed 1.200 m/s, wanted 0 to 1",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("speeds", "words", "counted"),
+    [
+        ({"closure_speed_min_m_s": 1.0}, "90 % from 1 m/s on", "1 to inf m/s 2 of 3"),
+        ({"closure_speed_max_m_s": 1.5}, "90 % at 0 to 1.5 m/s", "0 to 1.5 m/s 2 of 3"),
+        ({"closure_speed_min_m_s": 1.2, "closure_speed_max_m_s": 1.2}, "90 % at 1.2 to 1.2 m/s", "1.2 m/s 1 of 3"),
+    ],
+)
+def test_of_two_closure_speeds_one_is_enough_and_both_may_be_the_same(speeds, words, counted):
+    accept = Accept(closure_rate_min=0.9, **speeds)
+    assert accept.in_words == words
+    flights = [row(k, closure_speed_m_s=speed) for k, speed in enumerate((0.9, 1.2, 4.0))]
+    (line,) = accept.judge(flights)
+    assert line.endswith(f"{counted}, wanted at least 90 %")
+
+
+def test_a_rate_of_nothing_asks_nothing_of_one_flight():
+    assert Accept(refuelled_rate_min=0.0).shortfalls("contact", 0.1, 1.2, refuelled=False) == []
