@@ -54,7 +54,7 @@ class ScenarioFile:
         if "scenarios" in self.table:
             raise PLANS.misplaced(self._shown, SCENARIOS.kind, name_or_path)
         _resolve_hardware(self.table, path.parent)
-        if _MODEL not in settings and any(key in _ALTERNATIVES for key in settings):
+        if any(key in _ALTERNATIVES for key in settings):
             _drop(self.table, _MODEL)
         for key, value in settings.items():
             _set(self.table, key, toml_value(value) if isinstance(value, str) else _plain(value))

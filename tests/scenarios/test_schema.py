@@ -58,6 +58,7 @@ SIGMAS = "three numbers, each 0 to 20"
         ("rates.gyro_hz = 50", "rates.gyro_hz", "a rate from the control rate 100 Hz on"),
         ("rates.physics_hz = 0", "rates.physics_hz", "an integer from 1 to 100000, got 0"),
         ('navigation.navigator = "x"', "navigation.navigator", """"truth" or "module:Class", got 'x'"""),
+        ('hardware.ring = "."', "hardware.ring", "the path of a calibration sheet, got '/"),
         ('hardware.camera = "none.toml"', "hardware.camera", "the path of a calibration sheet, got '/"),
         ("guidance.closure_speed_m_s = 0.49", "guidance.closure_speed_m_s", "a number from 0.5 to 1.5, got 0.49"),
         ("guidance.closure_speed_m_s = 1.6", "guidance.closure_speed_m_s", "a number from 0.5 to 1.5, got 1.6"),
@@ -66,6 +67,10 @@ SIGMAS = "three numbers, each 0 to 20"
         ("parameters.mounting.camera_yaw_rad = 1", "parameters.mounting.camera_yaw_rad", "a number in [-0.07,"),
         ("parameters.airframe.gust_points_m = [1]", "parameters.airframe.gust_points_m", "4 x 3 numbers, each in ["),
         ("parameters.mounting.probe_tip_m = 1", "parameters.mounting.probe_tip_m", "3 numbers, each in [-10.0, 10.0]"),
+        ("parameters.imu_consumer.gyro_range_rad_s = 4.0", "parameters.imu_consumer", "a sheet that this scenario"),
+        ("parameters.filter_band_pass.cut_on_m = 8.4e-7", "parameters.filter_band_pass", "a sheet that this scenario"),
+        ("accept.closure_speed_min_m_s = -1", "accept.closure_speed_min_m_s", "a number of at least 0.0, got -1"),
+        ("accept.radial_offset_max_m = 0", "accept.radial_offset_max_m", "a number above 0.0, got 0"),
         ('accept.outcome = "x"', "accept.outcome", "one of the names that exist, got 'x'; exists: contact, miss,"),
     ],
 )
@@ -140,9 +145,9 @@ def test_what_python_s_reader_of_toml_itself_cannot_bear_is_refused(scenario_fil
         load_scenario("default", {"seed": value})
 
 
-@pytest.mark.parametrize("missing", ["none.toml", "folder/none.toml", Path("default")])
+@pytest.mark.parametrize("missing", ["none.toml", "none.TOML", "folder/none", "folder/none.toml", Path("default")])
 def test_a_missing_file_is_named(missing):
-    with pytest.raises(DockairError, match="none.toml|default") as caught:
+    with pytest.raises(DockairError, match=f"^{missing}: ") as caught:
         load_scenario(missing)
     assert "no such file" in str(caught.value)
 
@@ -256,6 +261,7 @@ def test_of_a_key_without_its_table_or_in_another_s_the_whole_name_is_said(key, 
         ("flight.speed", "1", "flight.speed", "a known key, got 'speed'; exists: airspeed_m_s,"),
         ("flight.airspeed_m_s", "fast", "flight.airspeed_m_s", f"{SPEED}, got 'fast'"),
         ("flight", "1", "flight", "a table, got 1"),
+        ("turbulence.model", "dryden", "turbulence", "sigma_m_s or intensity beside the model"),
         ("navigation", "truth", "navigation", "a table, got 'truth'; exists: heading, heading_every_s, navigator"),
         ("navigator", "truth", "navigator", "a known key, got 'navigator'; exists: accept, bow_wave, camera,"),
         ("rates.camera_hz", "33", "rates.camera_hz", "a rate that divides the physics rate 1000 Hz, got 33"),
@@ -267,8 +273,14 @@ def test_of_a_key_without_its_table_or_in_another_s_the_whole_name_is_said(key, 
 )
 def test_a_wrong_setting_is_refused_as_a_setting(key, value, where, expected):
     with pytest.raises(DockairError) as caught:
-        load_scenario("default", {key: value})
+        load_scenario("still_air", {key: value})
     assert str(caught.value).startswith(f"--set {where}: expected {expected}")
+
+
+def test_a_wrong_value_of_the_file_is_the_files_though_a_key_that_its_own_begins_with_is_set(scenario_file):
+    path = scenario_file('name = "mine"\nnavigation.heading_every_s = 99.0')
+    with pytest.raises(DockairError, match=f"^{path}: navigation.heading_every_s: expected a number from 0.5 to 5.0"):
+        load_scenario(path, {"navigation.heading": False})
 
 
 @pytest.mark.parametrize("key", ["flight.airspeed_m_s.x", "seed.x"])
@@ -287,8 +299,13 @@ def test_a_path_in_a_file_starts_at_the_files_folder_and_in_a_setting_where_one_
     (tmp_path / "sheets").mkdir()
     sheet = tmp_path / "sheets" / "camera.toml"
     sheet.write_text("focal_length_m = 0.016")
-    (tmp_path / "mine.toml").write_text('name = "mine"\n[hardware]\ncamera = "sheets/camera.toml"')
-    assert load_scenario(tmp_path / "mine.toml").hardware.camera == str(sheet)
+    ring = tmp_path / "sheets" / "ring.toml"
+    ring.write_text("diameter_m = 0.6")
+    (tmp_path / "mine.toml").write_text(
+        'name = "mine"\n[hardware]\ncamera = "sheets/camera.toml"\nring = "sheets/ring.toml"'
+    )
+    hardware = load_scenario(tmp_path / "mine.toml").hardware
+    assert (hardware.camera, hardware.ring) == (str(sheet), str(ring))
     monkeypatch.chdir(sheet.parent)
     assert load_scenario("default", {"hardware.camera": "camera.toml"}).hardware.camera == "camera.toml"
 
@@ -308,8 +325,24 @@ def test_the_sun_stands_ahead_at_zero_and_to_the_left_at_ninety_degrees(azimuth_
     np.testing.assert_allclose(sun.direction_W, direction, atol=1e-15)
 
 
-def test_without_sun_there_is_no_direction():
+def test_without_sun_there_is_no_direction_and_light_from_overhead_and_at_night_no_sun():
     assert Sun(present=False).direction_W is None
+    np.testing.assert_array_equal(Sun(present=False).lit_from_W, [0.0, 0.0, 1.0])
+    np.testing.assert_array_equal(Sun().lit_from_W, Sun().direction_W)
+    assert Scenario(name="x").sun_W is not None
+    assert Scenario(name="x", weather={"night": True}).sun_W is None
+
+
+@pytest.mark.parametrize(
+    ("keys", "sensing"),
+    [
+        ({}, "camera"),
+        ({"camera.sensing": "measurements"}, "measurements"),
+        ({"navigation.navigator": "truth", "camera.sensing": "measurements"}, "truth"),
+    ],
+)
+def test_flights_are_told_apart_by_what_the_navigation_sees(keys, sensing):
+    assert load_scenario("still_air", keys).sensing == sensing
 
 
 def test_a_tip_behind_left_and_above_has_the_ring_ahead_right_and_below():
