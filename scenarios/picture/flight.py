@@ -79,6 +79,8 @@ def _chosen_frame(folder: Path, flight: Any) -> tuple[NDArray[np.uint8], tuple[i
     ticks = fresh(flight)
     inward = ticks[ticks <= contact(flight)[1]]
     ticks = inward if len(inward) else ticks  # the way back passes there, too
+    known = ticks[np.isfinite(ahead[ticks])]  # a navigator of one's own may answer NaN while it is not valid
+    ticks = known if len(known) else ticks
     chosen = int(ticks[np.argmin(np.abs(ahead[ticks] - FRAME_AT_M) + 10.0 * (8 - named[ticks]))])
     messages = message_log.read_messages(folder, pixels=False)
     tick = next(tick for k, tick in enumerate(messages) if k == chosen)
@@ -109,7 +111,8 @@ def _draw_frame(
             u, v = led + 0.16 * (centre - led)
             axes.text(u, v, str(number), color=_FOUND, fontsize=9, ha="center", va="center")
     axes.set(xlabel="u [px]", ylabel="v [px]")
-    axes.set_title(f"Near-infrared frame, {ahead_m:.1f} m to go", fontsize=10)
+    to_go = f", {ahead_m:.1f} m to go" if np.isfinite(ahead_m) else ""
+    axes.set_title(f"Near-infrared frame{to_go}", fontsize=10)
     axes.set_xlim(extent[0], extent[1])
     axes.set_ylim(extent[2], extent[3])
     axes.tick_params(labelsize=8)

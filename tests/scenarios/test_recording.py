@@ -9,9 +9,10 @@ import numpy as np
 import pyarrow as pa
 import pytest
 from PIL import Image
+from scipy.spatial.transform import Rotation
 
 from dockair.messages import Window
-from dockair.rotations import matrix_from_yaw_pitch_roll
+from dockair.rotations import exp, matrix_from_yaw_pitch_roll
 from dockair.scenarios.flight_log import FlightLog
 from dockair.scenarios.message_log import MessageLog, read_messages
 from dockair.scenarios.navigator_recipe import NavigatorRecipe
@@ -182,6 +183,69 @@ def test_pixels_and_scene_have_the_same_number_of_one_frame(dropped_out, hand_ma
     assert pixels == scene == overlay
 
 
+def test_overlays_lie_on_the_pixels_of_the_solution_and_the_close_up_looks_at_the_believed_rings_middle(
+    flown, hand_made
+):
+    """The viewer puts a pixel's corner where the project puts its centre: half a pixel is added."""
+    folder, log, entries = flown
+    path = _write(folder, log, hand_made.sheets)
+    (_, _, frame, solution), window = entries[41], entries[41][2].window
+    overlay, found, middle, outline, place = (
+        next(row for row in _rows(path, f"/camera/{entity}") if row.get("frame") == 20)
+        for entity in ("leds", "candidates", "close_up", "window/outline", "window")
+    )
+    np.testing.assert_allclose(overlay["Points2D:positions"], solution.led_pixels_px + 0.5, atol=1e-3)
+    assert overlay["Points2D:labels"] == list("01234567")
+    np.testing.assert_allclose(found["Ellipses2D:centers"], solution.candidates_px + 0.5, atol=1e-3)
+    ring_px = believed_ring_px(solution, hand_made.sheets)
+    np.testing.assert_allclose(middle["Transform3D:translation"][0][:2], ring_px.mean(axis=0) + 0.5, atol=1e-3)
+    assert place["Transform3D:translation"] == [[window.column_start, window.row_start, 0.0]]
+    assert outline["Boxes2D:half_sizes"] == [[0.5 * frame.pixels.shape[1], 0.5 * frame.pixels.shape[0]]]
+
+
+def test_of_two_sizes_of_windows_only_the_newest_frame_is_shown(hand_made, tmp_path):
+    log = FlightLog()
+    with MessageLog(tmp_path, NavigatorRecipe(class_name="a:B", sheets=hand_made.sheets)) as messages:
+        for k, (truth, imu, frame, solution) in enumerate(hand_made.ticks(8), start=1):
+            if k == 4:
+                frame = replace(frame, pixels=frame.pixels[:100, :100].copy(), window=Window(0, 100, 0, 100))
+            log.append(truth, imu, frame, solution)
+            messages.append(imu, frame, solution)
+    path = _write(tmp_path, log, hand_made.sheets)
+    shown = {
+        size: {row["frame"]: row["EncodedImage:opacity"][0] for row in rows if row.get("EncodedImage:opacity")}
+        for size in ("128x128", "384x384")
+        if (rows := _rows(path, f"/camera/window/pixels_{size}"))
+    }
+    assert shown == {"128x128": {1: 1.0, 2: 0.0}, "384x384": {0: 1.0, 1: 0.0, 2: 1.0}}
+
+
+def test_the_believed_drogue_is_drawn_where_and_how_the_solution_has_it_from_the_receiver(flown, hand_made):
+    folder, log, entries = flown
+    (row,) = (r for r in _rows(_write(folder, log, hand_made.sheets), "/world/receiver/belief") if r.get("frame") == 20)
+    solution = entries[41][3]
+    place = solution.p_PD_B + hand_made.sheets.mounting.p_BP
+    np.testing.assert_allclose(row["Transform3D:translation"][0], place, atol=1e-5)
+    turned = Rotation.from_quat(row["Transform3D:quaternion"][0]).as_matrix()
+    np.testing.assert_allclose(turned, solution.R_BD, atol=1e-6)
+
+
+def test_a_capsule_lies_about_its_middle_along_its_own_axis(flown, hand_made):
+    """The viewer's begins at its origin, and goes on along its z axis."""
+    folder, log, _ = flown
+    turn = Rotation.from_rotvec([0.4, -0.9, 0.3])
+    x, y, z, w = turn.as_quat()
+    capsule = replace(_box("capsule"), q_wxyz=np.array([w, x, y, z]), p_m=np.array([1.0, 2.0, 3.0]))
+    columns = _columns(_write(folder, log, hand_made.sheets, shapes=[capsule], messages=()))
+    begin, length, attitude = (
+        np.array(columns[f"/world/receiver/capsules:Capsules3D:{name}"][0])
+        for name in ("translations", "lengths", "quaternions")
+    )
+    middle = begin + Rotation.from_quat(attitude.ravel()).apply([0.0, 0.0, 0.5 * float(length[0])])
+    np.testing.assert_allclose(middle.ravel(), capsule.p_m, atol=1e-6)
+    assert length == pytest.approx(1.0)  # of its cylinder; half of it is the shape's third half size
+
+
 def test_the_believed_ring_passes_through_the_leds_when_the_belief_is_true(make_hand_made):
     flight = make_hand_made(error_B=np.zeros(3))
     truth, _, _, solution = flight.tick(10)
@@ -226,6 +290,54 @@ def test_plots_show_truth_and_belief_as_they_are(flown):
     np.testing.assert_allclose(series["range_error/error"][2], 5.0, atol=1e-9)  # 5 mm, put in by hand
     np.testing.assert_allclose(series["lateral_error/upper"][2], 30.0, atol=1e-9)  # 3 sigma of 10 mm
     np.testing.assert_allclose(series["range/truth"][2], 4.0, atol=1e-9)
+
+
+def test_every_plot_is_of_its_own_quantity_in_the_unit_of_its_name(hand_made):
+    """On the probe, the receiver's nose 0.3 rad to the left of the first tick's, no frame at the second tick."""
+    log, about_z = FlightLog(), np.array([0.0, 0.0, 0.3])
+    for k in (690, 700, 701, 702):
+        truth, imu, frame, solution = hand_made.tick(k)
+        if k > 690:
+            truth = replace(truth, R_WB=exp(about_z) @ truth.R_WB)
+        imu = tuple(replace(sample, specific_force_m_s2=np.array([1.0, 2.0, 9.8]) + k) for sample in imu)
+        covariance = np.diag(np.arange(1.0, 10.0) ** 2 * 1e-6)
+        believed = {"heading_rad": 0.31, "heading_sigma_rad": 0.02, "covariance": covariance, "p_PD_B": np.arange(3.0)}
+        log.append(truth, imu, frame, replace(solution, v_PD_B=np.array([-0.7, 0.0, 0.0]), **believed))
+    last, values = log.truths[-1], {entity: series for entity, (_, _, series) in plot_series(log).items()}
+    p_PD_B, v_PD_B = (last.R_WB.T @ apart for apart in (last.p_WD - last.p_WP, last.v_WD - last.v_WP))
+    expected = {
+        "range/truth": p_PD_B[0],
+        "lateral/truth_y": p_PD_B[1],
+        "lateral/truth_z": p_PD_B[2],
+        "lateral/belief_y": 1.0,
+        "lateral/belief_z": 2.0,
+        "lateral_error/z": 1e3 * (2.0 - p_PD_B[2]),
+        "range_error/upper": 12.0,  # 3 sigma of 4, 5 and 6 mm
+        "range_error/lower": -12.0,
+        "lateral_error/upper": 18.0,
+        "lateral_error/lower": -18.0,
+        "closing/truth": -v_PD_B[0],
+        "closing/belief": 0.7,
+        "reel/position": last.reel_position_m,
+        "tension/root": 1500.0,
+        "tension/drogue": 1300.0,
+        "gyro/z": np.degrees(702 / 3e5),
+        "accelerometer/y": 704.0,
+        "heading_error/error": np.degrees(0.01),
+        "heading_error/upper": np.degrees(0.06),
+        "heading_error/lower": -np.degrees(0.06),
+    }
+    np.testing.assert_allclose([values[name][-1] for name in expected], list(expected.values()), rtol=1e-9)
+    assert last.reel_position_m > 0.4
+    np.testing.assert_allclose(values["exposure/exposure"], 20.0, rtol=1e-12)
+
+
+def test_before_the_first_frame_no_exposure_is_plotted_and_then_the_newest(hand_made):
+    log = FlightLog()
+    for k, (truth, imu, frame, solution) in enumerate(hand_made.ticks(6)):
+        exposed = None if frame is None else replace(frame, exposure_s=1e-5 * k)
+        log.append(truth, imu, exposed, solution)
+    np.testing.assert_allclose(plot_series(log)["exposure/exposure"][2], [np.nan, 10.0, 10.0, 30.0, 30.0, 50.0])
 
 
 def _stored_plots(path) -> dict[str, list | None]:
@@ -308,6 +420,23 @@ def test_a_picture_shows_a_frame_of_the_way_in_though_one_of_the_way_back_is_nea
     monkeypatch.setattr(picture, "_draw_frame", lambda axes, pixels, *rest: drawn.append(pixels))
     picture_of_flight(tmp_path)
     np.testing.assert_array_equal(drawn[0], hand_made.tick(490)[2].pixels)
+
+
+def test_a_picture_shows_a_frame_whose_range_is_known_though_a_navigator_of_ones_own_knows_none_at_first(
+    hand_made, tmp_path, monkeypatch
+):
+    """NaN is what it may answer while it is not valid."""
+    log = FlightLog()
+    with MessageLog(tmp_path, NavigatorRecipe(class_name="a:B", sheets=hand_made.sheets)) as messages:
+        for k, (truth, imu, frame, solution) in enumerate(hand_made.ticks(20), start=1):
+            unknown = {"valid": False, "p_PD_B": np.full(3, np.nan)} if k < 10 else {}
+            log.append(truth, imu, frame, replace(solution, **unknown))
+            messages.append(imu, frame, replace(solution, **unknown))
+    log.write_parquet(tmp_path)
+    drawn = []
+    monkeypatch.setattr(picture, "_draw_frame", lambda axes, *frame: drawn.append(frame))
+    picture_of_flight(tmp_path)
+    assert drawn[0][-1] == pytest.approx(4.005)  # the hand-made belief is 5 mm off
 
 
 def test_a_picture_needs_no_frames(flown):
