@@ -10,17 +10,19 @@ from scipy.stats import chi2, norm
 
 from dockair.calibration import Camera, LedRing, Mounting
 from dockair.errors import DockairError
+from dockair.messages import Window
 from dockair.nav.navigator import NavigatorSettings
 from dockair.parameters import load_parameters
 from dockair.rotations import exp
 from dockair.scenarios.assembly.measured import SHEET, refuse_unmodelled
-from dockair.scenarios.measured_leds import MeasuredLeds, MeasurementParameters, TextureLight
+from dockair.scenarios.measured_leds import MeasuredLeds, MeasurementParameters, TextureLight, View
 from dockair.scenarios.schema import load_scenario
 from dockair.sim.as_built import AsBuilt, AsBuiltParameters, draw_as_built
 from dockair.sim.camera.electronics import output_black, output_gain
+from dockair.sim.camera.point_spread import blur_px
 from dockair.sim.camera.radiometry import responses
 from dockair.sim.camera.sheets import CameraSheets
-from dockair.sim.faults import CameraDropOut, ExposureStuck, Faults, LedDim, LedOff, StuckFrame
+from dockair.sim.faults import CameraDropOut, DirtyWindow, ExposureStuck, Faults, LedDim, LedFlicker, LedOff, StuckFrame
 
 SHEETS = CameraSheets.load()
 PARAMETERS = load_parameters(SHEET, MeasurementParameters)
@@ -57,6 +59,13 @@ class Stand:
         )  # fmt: skip
         self.put(7.0)
 
+    def turn(self, rotvec) -> np.ndarray:
+        """Turn the drogue; return R_WD."""
+        angle = np.linalg.norm(rotvec)
+        self.data.mocap_quat[1] = [np.cos(angle / 2), *(np.sin(angle / 2) * np.asarray(rotvec) / angle)]
+        mujoco.mj_kinematics(self.model, self.data)
+        return self.data.xmat[self.model.body("drogue").id].reshape(3, 3)
+
     def put(self, depth_m: float, board_before: int | None = None, side_m: float = 0.1) -> None:
         """Put the drogue ahead of the lens and so far to the left, the board half-way to an LED."""
         R_WC, p_WC = self.built.mounting.R_BC, self.built.mounting.p_BC
@@ -86,6 +95,89 @@ def test_without_errors_each_led_is_where_the_as_built_camera_images_it():
         assert tuple(seen.led_numbers) == ALL
         np.testing.assert_allclose(seen.centroids_px, stand.true_px(), atol=1e-9)
         assert seen.time_stamp_s == 1.0
+
+
+def test_a_turned_drogue_turns_its_ring_and_where_its_leds_shine():
+    """cos^m of the angle between the LEDs' axis, aft, and the sight line; their place by the same rotation."""
+    stand = Stand()
+    straight = stand.leds.view(stand.data, 1.0, 20e-6)
+    R_WD = stand.turn([0.2, -0.5, 0.3])
+    turned, built = stand.leds.view(stand.data, 1.0, 20e-6), stand.built
+    leds_W = stand.data.mocap_pos[1] + built.ring_positions_D @ R_WD.T
+    p_C = (leds_W - built.mounting.p_BC) @ built.mounting.R_BC
+    np.testing.assert_allclose(turned.pixels_px, built.camera.pixels_from_points(p_C), atol=1e-9)
+    np.testing.assert_allclose(turned.depth_m, p_C[:, 0], rtol=1e-12)
+    aft_C = -(built.mounting.R_BC.T @ R_WD[:, 0])
+    straight_C = (stand.data.mocap_pos[1] + built.ring_positions_D - built.mounting.p_BC) @ built.mounting.R_BC
+    ratio = np.ones(8)
+    for p, axis_C, power in ((p_C, aft_C, 1.0), (straight_C, -built.mounting.R_BC[0], -1.0)):
+        range_m = np.linalg.norm(p, axis=1)
+        cosine = -(p @ axis_C) / range_m
+        ratio *= (cosine**SHEETS.leds.pattern_exponent / range_m**2) ** power
+    assert ratio.max() < 0.9  # so turned
+    np.testing.assert_allclose(turned.electrons / straight.electrons, ratio, rtol=2e-3)  # the filter's blue shift, too
+
+
+def test_air_between_takes_its_part_of_each_spot():
+    """Beer and Lambert along each sight line."""
+    clear, hazy = (Stand(extinction_1_m=extinction) for extinction in (0.0, 0.05))
+    views = [stand.leds.view(stand.data, 1.0, 20e-6) for stand in (clear, hazy)]
+    built = clear.built
+    range_m = np.linalg.norm(clear.data.mocap_pos[1] + built.ring_positions_D - built.mounting.p_BC, axis=1)
+    np.testing.assert_allclose(views[1].electrons / views[0].electrons, np.exp(-0.05 * range_m), rtol=1e-9)
+
+
+def test_a_flicker_faster_than_the_exposure_leaves_its_mean_light():
+    """Two whole periods in 200 us, bright for 0.3 of each."""
+    plain, flicker = Stand(), Stand(faults=[LedFlicker(frequency_hz=1e4, duty=0.3)])
+    views = [stand.leds.view(stand.data, 1.0, 200e-6) for stand in (plain, flicker)]
+    np.testing.assert_allclose(views[1].electrons / views[0].electrons, 0.3, rtol=1e-9)
+
+
+def test_dirt_dims_the_leds_behind_it_and_no_other():
+    stand = Stand(faults=[DirtyWindow(cover=0.5)])
+    middle = float(np.median(stand.true_px()[:, 0]))
+    smudge = SimpleNamespace(at=lambda pixels: np.where(pixels[:, 0] > middle, 0.25, 1.0))
+    stand.leds._defects = SimpleNamespace(dirt=lambda cover: smudge if cover == 0.5 else None)
+    clean, fault = stand.leds.view(stand.data, 1.0, 20e-6), stand.leds._faults.camera(1.0)
+    dirty = stand.leds.view(stand.data, 1.0, 20e-6, fault)
+    factor = np.where(clean.pixels_px[:, 0] > middle, 0.25, 1.0)
+    np.testing.assert_allclose(dirty.electrons, factor * clean.electrons, rtol=1e-12)
+
+
+@pytest.mark.parametrize("depth_m", [0.7, 3.0, 20.0])
+def test_a_spot_is_widened_by_the_disc_out_of_focus_and_the_dies_image(depth_m):
+    """A disc of diameter b has the variance b^2/16 on each axis, a square of side s has s^2/12."""
+    stand, p = Stand(), EXACT
+    camera = stand.built.camera
+    disc_px = blur_px(SHEETS.lens, camera, np.array([1.0 / depth_m]))[0]
+    die_px = camera.focal_length_px * SHEETS.leds.die_size_m / depth_m
+    view = View(pixels_px=np.array([[900.0, 500.0]]), depth_m=np.array([depth_m]), electrons=np.array([1e4]),
+                clear=np.array([True]))  # fmt: skip
+    levels, width_px = stand.leds.spots(view)
+    expected_px2 = p.spot_sigma_px**2 + p.widening_share * (disc_px**2 / 16.0 + die_px**2 / 12.0)
+    np.testing.assert_allclose(width_px**2, [expected_px2], rtol=1e-12)
+    black, gain = output_black(SHEETS.sensor), output_gain(SHEETS.sensor)
+    peak_e = min(1e4 / (2.0 * np.pi * expected_px2), SHEETS.sensor.full_well_e)
+    assert levels[0, 12] == min(np.floor(black + gain * peak_e), 255.0)
+    beside_e = 1e4 / (2.0 * np.pi * expected_px2) * np.exp(-0.5 / expected_px2)
+    assert levels[0, 11] == levels[0, 7] == min(np.floor(black + gain * beside_e), 255.0)
+
+
+def test_a_pixel_holds_no_more_than_its_full_well():
+    """Of a well half as deep as full scale needs, whatever falls on it."""
+    stand = Stand()
+    half = replace(SHEETS.sensor, full_well_e=0.5 * 255.0 / output_gain(SHEETS.sensor))
+    stand.leds._sheets = replace(SHEETS, sensor=half)
+    levels, _ = stand.leds.spots(stand.leds.view(stand.data, 1.0, SHEETS.exposure.longest_s))
+    assert levels.max() == np.floor(output_black(SHEETS.sensor) + 0.5 * 255.0)
+
+
+def test_a_spots_variance_is_that_of_floor_photons_background_and_texture():
+    p = replace(EXACT, sigma_floor_px=0.02, photon_factor=1.5, background_e=300.0)
+    variance, texture = Stand(p).leds.variances(np.array([1000.0]), np.array([0.8]), np.array([0]), np.array([50.0]))
+    assert texture[0] == pytest.approx((0.8 * 50.0 / 1000.0) ** 2, rel=1e-12)
+    assert variance[0] == pytest.approx(0.02**2 + 1.2**2 * 1300.0 / 1000.0**2 + texture[0], rel=1e-12)
 
 
 def test_a_board_before_an_led_hides_that_one_alone():
@@ -136,6 +228,37 @@ def test_errors_have_the_stated_spread_times_the_ratio():
     assert abs(z.mean()) < norm.ppf(1.0 - 5e-5) / np.sqrt(z.size)
 
 
+def test_errors_of_clipped_spots_have_a_ratio_of_their_own():
+    """Chi-square of 16 x 200 normals: a false alarm in 1e4 seeds; the seed is fixed."""
+    stand = Stand(replace(EXACT, clipped_error_over_sigma=0.7), [ExposureStuck(exposure_s=500e-6)])
+    frames = [stand.look(0.02 * k) for k in range(200)]
+    full = (stand.leds.spots(stand.leds.view(stand.data, 1.0, 500e-6))[0] == 255).any(axis=1)
+    assert full.all()
+    z = np.concatenate([(one.centroids_px - stand.true_px()) / (0.7 * one.sigma_px[:, None]) for one in frames])
+    low, high = chi2.ppf([5e-5, 1.0 - 5e-5], z.size)
+    assert low < (z**2).sum() < high
+
+
+def test_a_share_of_the_leds_is_put_in_a_wrong_place_as_far_off_as_the_sheet_says():
+    """Strays within five standard deviations of a binomial, their squares as chi-square has it; the seed is fixed."""
+    stand, frames = Stand(replace(EXACT, stray_share=0.2, stray_px=3.0)), 200
+    off = np.concatenate([stand.look(0.02 * k).centroids_px - stand.true_px() for k in range(frames)])
+    stray = np.abs(off).max(axis=1) > 1e-6
+    assert stray.mean() == pytest.approx(0.2, abs=5.0 * np.sqrt(0.2 * 0.8 / len(off)))
+    low, high = chi2.ppf([5e-5, 1.0 - 5e-5], off[stray].size)
+    assert low < ((off[stray] / 3.0) ** 2).sum() < high
+
+
+def test_a_ring_is_lost_in_proportion_to_the_texture_where_it_is_and_not_where_one_led_is():
+    """In dense haze there is texture before one LED at 3 m, which alone would lose it, and next to none at 7 m."""
+    p = replace(EXACT, no_ring_share=100.0, texture_exponent=1.5, texture_exposure_s=SHEETS.exposure.exposure_s)
+    stand = Stand(p, texture_light=TextureLight(extinction_1_m=1.0), automatic_exposure=False)
+    view = stand.leds.view(stand.data, 1.0, SHEETS.exposure.exposure_s)
+    one_near = replace(view, depth_m=np.array([3.0, *view.depth_m[1:]]))
+    stand.leds.view = lambda *_: one_near
+    assert len(stand.look().led_numbers) == 8
+
+
 def test_the_lasting_part_of_the_textures_error_is_correlated_over_its_time():
     """All error is texture's and half of it lasts: correlation 0.5 exp(-lag/T); 3000 frames give it to 0.05."""
     p = replace(
@@ -179,6 +302,14 @@ def test_leds_too_few_for_a_ring_are_named_while_one_is_followed_and_begin_none(
     assert {counts[k] for k in range(51, 60)} | {counts[k] for k in range(81, 100)} == {left}
     assert {counts[k] for k in range(61, 80)} | {counts[k] for k in range(101, 160)} == {0}
     assert len(Stand(faults=[LedOff(leds=dark)]).look().led_numbers) == 0
+
+
+@pytest.mark.parametrize(("later_s", "count"), [(0.5, 2), (0.51, 0)])
+def test_a_ring_is_followed_for_as_long_as_the_navigations_belief_may_be_used(later_s, count):
+    assert NavigatorSettings().usable_age_s == 0.5
+    stand = Stand(faults=[LedOff(leds=tuple(range(2, 8)), start_s=0.1)])
+    assert len(stand.look(0.0).led_numbers) == 8
+    assert len(stand.look(later_s).led_numbers) == count
 
 
 def test_an_led_dimmed_below_the_faintest_level_is_not_seen_and_above_it_is():
@@ -226,12 +357,31 @@ def test_a_camera_that_has_dropped_out_sends_nothing_and_a_stuck_one_the_same_ag
     assert stand.look(3.1) is not None
 
 
+def test_a_camera_that_is_stuck_from_its_first_frame_on_sends_that_one():
+    stand = Stand(PARAMETERS, [StuckFrame()])
+    first, second = stand.look(0.0), stand.look(0.02)
+    assert len(first.led_numbers) > 0
+    np.testing.assert_array_equal(second.centroids_px, first.centroids_px)
+
+
 def test_a_drop_out_leaves_the_numbers_of_later_frames_as_they_are():
     p = replace(PARAMETERS, texture_lasting_share=0.0)
     whole, broken = Stand(p, seed=3), Stand(p, [CameraDropOut(start_s=0.05, stop_s=0.07)], seed=3)
     series = [[stand.look(0.02 * k) for k in range(8)] for stand in (whole, broken)]
     assert series[1][3] is None
     np.testing.assert_array_equal(series[0][7].centroids_px, series[1][7].centroids_px)
+
+
+def test_a_drop_out_leaves_the_transfers_of_later_frames_as_they_are():
+    """Each frame takes a number of the stream, whether it arrives or not."""
+    taken = []
+    for faults in ((), [CameraDropOut(start_s=0.01, stop_s=0.03)]):
+        stand = Stand(faults=faults, automatic_exposure=False)
+        for k in range(3):
+            if (frame := stand.look(0.02 * k)) is not None:
+                latency_s = stand.leds.latency_s(frame)
+        taken.append(latency_s)
+    assert taken[0] == taken[1]
 
 
 def test_a_stuck_exposure_is_the_one_in_use():
@@ -313,6 +463,27 @@ def test_latency_follows_the_window_of_a_ring_that_is_tracked_and_the_full_frame
     rows = EXACT.window_heights * height_px + EXACT.window_margin_px
     row_s = SHEETS.sensor.row_clocks / SHEETS.sensor.clock_hz * 16 / SHEETS.sensor.outputs
     assert first - later == pytest.approx((1088 - rows) * row_s, abs=2.0 * row_s)
+
+
+def test_where_no_led_is_on_the_sensor_the_window_is_all_of_it_and_else_it_ends_with_the_sensor():
+    stand = Stand()
+    view = stand.leds.view(stand.data, 1.0, 20e-6)
+    height, width = stand.built.camera.height_px, stand.built.camera.width_px
+    assert stand.leds.window(replace(view, clear=np.zeros(8, bool))) == Window(0, height, 0, width)
+    for row_px in (0.0, height - 1.0):
+        at_the_edge = replace(view, pixels_px=np.column_stack([view.pixels_px[:, 0], np.full(8, row_px)]))
+        window = stand.leds.window(at_the_edge)
+        assert window.row_start >= 0 and window.row_stop <= height
+        half = 0.5 * EXACT.window_margin_px
+        assert window.row_stop - window.row_start == pytest.approx(half, abs=2.0)
+
+
+def test_a_ring_at_the_right_edge_of_the_wide_sensor_is_on_it():
+    """Farther right than the sensor is high: its 2048 columns count, not its 1088 rows."""
+    stand = Stand()
+    stand.put(7.0, side_m=-1.2)
+    assert stand.true_px()[:, 0].min() > stand.built.camera.height_px
+    assert tuple(stand.look().led_numbers) == ALL
 
 
 @pytest.mark.parametrize(
