@@ -1,5 +1,6 @@
 """What is read back from a message log is what was delivered, to the last bit."""
 
+import json
 import os
 import threading
 import time
@@ -174,6 +175,49 @@ def test_sheets_and_settings_come_back_bit_for_bit(hand_made):
     settings = decode(encode(Settings()))
     assert (settings.gain, settings.limits) == (Settings().gain, Settings().limits)
     assert np.isnan(settings.table["a"])
+
+
+@dataclass(frozen=True)
+class Derived:
+    given: float
+    made: float = field(init=False)
+
+    def __post_init__(self):
+        object.__setattr__(self, "made", 2.0 * self.given)
+
+
+@pytest.mark.parametrize(
+    "array",
+    [
+        np.arange(6.0).reshape(2, 3),
+        np.array([[np.nan, -np.inf, 5e-324]]),
+        np.empty((0, 2)),
+        np.array(3.5),
+        np.array([1, -2], dtype=np.int32),
+        np.array([True, False]),
+        np.float32([0.1, 0.2]),
+    ],
+)
+def test_an_array_comes_back_with_shape_and_kind_and_cannot_be_written(array):
+    back = decode(json.loads(json.dumps(encode(array), allow_nan=False)))
+    assert (back.shape, back.dtype, back.tobytes()) == (array.shape, array.dtype, array.tobytes())
+    assert not back.flags.writeable
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        (1, (2.0, "x"), [None, True]),
+        {"a": (1,), 3: [0.1 + 0.2]},
+        -0.0,
+        [Light.GREEN, Light.RED],
+        Derived(given=0.3),
+        PodSignal(time_stamp_s=1.5, light=Light.RED),
+    ],
+)
+def test_a_value_comes_back_of_the_kind_that_it_was(value):
+    """A tuple is no list, a light no number; what a class makes itself it makes again."""
+    assert repr(decode(json.loads(json.dumps(encode(value), allow_nan=False)))) == repr(value)
 
 
 def test_what_has_no_exact_form_is_refused():

@@ -8,9 +8,11 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from scipy.spatial.transform import Rotation
 
+from dockair.messages import ReceiverCommand
 from dockair.rotations import exp
-from dockair.scenarios.flight_log import FlightLog
+from dockair.scenarios.flight_log import FlightLog, standard_deviations
 from dockair.scenarios.judgement import metrics, result
 from dockair.scenarios.judgement.causes import flown_of
 from dockair.scenarios.judgement.hold import hold_of
@@ -284,6 +286,51 @@ def test_flight_parquet_holds_truth_and_belief_side_by_side(hand_made, tmp_path)
     np.testing.assert_allclose(table["nav_sigma_p_PD_B_y_m"].to_numpy(), 0.01)
     assert table["nav_leds_named"].to_pylist()[-1] == 8
     assert len(table["truth_p_WH_m"][0].as_py()) == 3 * 17
+
+
+def test_each_column_of_the_log_is_what_its_name_says(hand_made):
+    """One tick in which no two of these are alike."""
+    truth, imu, frame, solution = hand_made.tick(750)
+    vectors = ("v_WB", "w_WB_B", "alpha_WB_B", "a_WB", "specific_force_B", "v_WD", "w_WD_D", "gust_B_m_s", "gust_D_m_s")
+    truth = replace(truth, **{name: np.array([1.0, -2.0, 3.0]) + 10.0 * k for k, name in enumerate(vectors)})
+    samples = [replace(sample, specific_force_m_s2=sample.angular_rate_rad_s + 7.0) for sample in imu]
+    command = ReceiverCommand(velocity_m_s=np.array([0.1, 0.2, 0.3]), acceleration_m_s2=np.array([0.4, 0.5, 0.6]))
+    named = np.where(np.arange(8)[:, None] < 5, solution.led_pixels_px, np.nan)
+    seen = {"led_pixels_px": named, "heading_rad": 0.3, "heading_sigma_rad": 0.02, "contact_usable": False}
+    covariance = np.diag(np.arange(1.0, 10.0) ** 2)
+    solution = replace(solution, command=command, covariance=covariance, valid=False, phase_reason="why", **seen)
+    log = FlightLog()
+    log.append(truth, samples, frame, solution)
+    row = {name: values[0] for name, values in log.columns().items()}
+
+    def of(name, unit, letters="xyz"):
+        return [row[f"{name}_{letter}{unit}"] for letter in letters]
+
+    units = ("m_s", "rad_s", "rad_s2", "m_s2", "m_s2", "m_s", "rad_s", "m_s", "m_s")
+    for name, unit in zip(vectors, units, strict=True):
+        assert of(f"truth_{name.removesuffix('_m_s')}", f"_{unit}") == getattr(truth, name).tolist()
+    for name in ("p_WB", "p_WP", "p_WD", "p_WT"):
+        assert of(f"truth_{name}", "_m") == getattr(truth, name).tolist()
+    for name, R in (("truth_q_WB", truth.R_WB), ("truth_q_WD", truth.R_WD), ("nav_q_BD", solution.R_BD)):
+        w, x, y, z = of(name, "", "wxyz")
+        np.testing.assert_allclose(Rotation.from_quat([x, y, z, w]).as_matrix(), R, atol=1e-12)
+    np.testing.assert_allclose(row["truth_p_WH_m"].reshape(-1, 3), truth.p_WH)
+    assert (row["truth_reel_position_m"], row["truth_latched"]) == (truth.reel_position_m, True)
+    np.testing.assert_allclose(of("nav_sigma_phi", "_rad"), [1.0, 2.0, 3.0])
+    np.testing.assert_allclose(of("nav_sigma_p_PD_B", "_m"), [4.0, 5.0, 6.0])
+    np.testing.assert_allclose(of("nav_sigma_v_PD_B", "_m_s"), [7.0, 8.0, 9.0])
+    assert of("nav_v_PD_B", "_m_s") == solution.v_PD_B.tolist()
+    assert of("command_velocity", "_m_s") + of("command_acceleration", "_m_s2") == [0.1, 0.2, 0.3, 0.4, 0.5, 0.6]
+    assert of("gyro_w_WI_I", "_rad_s") == samples[-1].angular_rate_rad_s.tolist()  # of a tick's samples the newest
+    assert of("accelerometer_f_I", "_m_s2") == samples[-1].specific_force_m_s2.tolist()
+    assert (row["nav_leds_named"], row["nav_candidates"], row["camera_exposure_s"]) == (5, 9, 2e-5)
+    assert (row["nav_heading_rad"], row["nav_sigma_heading_rad"]) == (0.3, 0.02)
+    assert (row["nav_valid"], row["nav_contact_usable"], row["nav_phase_reason"]) == (False, False, "why")
+
+
+def test_a_variance_below_zero_has_no_root_and_none_is_drawn(hand_made):
+    solution = replace(hand_made.tick(1)[3], covariance=np.diag([-1.0, np.nan, *np.full(7, 4.0)]))
+    np.testing.assert_array_equal(standard_deviations([solution]), [[np.nan, np.nan, *np.full(7, 2.0)]])
 
 
 def test_every_column_of_the_log_stands_on_the_page_but_for_its_axis_and_unit(hand_made):

@@ -205,6 +205,7 @@ def test_a_solution_that_can_be_flown_is_passed_on(changes):
         ({"command": ReceiverCommand(acceleration_m_s2=None)}, "command.acceleration_m_s2"),
         ({"command": ReceiverCommand(velocity_m_s=np.zeros(2))}, "command.velocity_m_s"),
         ({"command": ReceiverCommand(climb_rad=float("nan"))}, "command.climb_rad: expected a finite number"),
+        ({"command": ReceiverCommand(turn_rate_rad_s=None)}, "command.turn_rate_rad_s: expected a finite number"),
         ({"p_PD_B": np.zeros(2)}, "p_PD_B: expected an array (3,) of numbers, got '[0.0, 0.0]'"),
         ({"p_PD_B": "here"}, "p_PD_B: expected an array"),
         (
@@ -230,6 +231,7 @@ def test_a_solution_that_can_be_flown_is_passed_on(changes):
         ({"frame_time_stamp_s": None}, "frame_time_stamp_s: expected a number, or NaN"),
         ({"heading_rad": None}, "heading_rad"),
         ({"exposure_s": -1.0}, "exposure_s: expected above 0, or NaN"),
+        ({"exposure_s": 0.0}, "exposure_s: expected above 0, or NaN"),
         ({"window": (0, 0, 10, 10)}, "window: expected a Window of whole numbers, or None"),
         ({"window": Window(0.5, 10, 0, 10)}, "window"),
     ],

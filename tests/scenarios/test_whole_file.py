@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from dockair.errors import DockairError, MachineError
 from dockair.scenarios.campaign import folder as campaign_folder
 from dockair.scenarios.campaign.journal import Journal
 from dockair.scenarios.whole_file import write_text, write_whole
@@ -108,3 +109,44 @@ def test_a_folder_that_no_one_can_open_or_wait_for_is_no_obstacle(monkeypatch):
     monkeypatch.setattr(os, "fsync", failing(errno.EIO))
     with pytest.raises(OSError, match="Input/output"):
         write_whole(Path("file"), b"three")
+
+
+def test_what_is_no_file_takes_the_text_as_it_is_and_a_link_stays_one():
+    os.mkfifo("pipe")
+    reader = os.open("pipe", os.O_RDONLY | os.O_NONBLOCK)
+    write_text("text", Path("pipe"))
+    assert os.read(reader, 99) == b"text" and Path("pipe").is_fifo()
+    os.close(reader)
+    Path("page").write_text("old")
+    for target in ("page", "none yet"):
+        Path("link").symlink_to(target)
+        write_text("new", Path("link"))
+        assert Path("link").is_symlink() and Path(target).read_text() == "new"
+        Path("link").unlink()
+    assert sorted(os.listdir()) == ["none yet", "page", "pipe"]
+
+
+@pytest.mark.parametrize(
+    ("number", "kind"), [(errno.ENOSPC, MachineError), (errno.EDQUOT, MachineError), (errno.EIO, OSError)]
+)
+def test_a_file_that_cannot_be_written_whole_is_as_it_was_and_nothing_lies_beside_it(monkeypatch, number, kind):
+    write_whole(Path("file"), b"old")
+
+    def refuse(file):
+        raise OSError(number, os.strerror(number))
+
+    monkeypatch.setattr(os, "fsync", refuse)
+    with pytest.raises(kind):
+        write_whole(Path("file"), b"new")
+    assert os.listdir() == ["file"] and Path("file").read_bytes() == b"old"
+
+
+def test_a_text_that_a_person_asked_for_is_refused_in_one_line(monkeypatch):
+    Path("folder").mkdir()
+    Path("file").write_text("")
+    for path, got in (("folder", "a folder"), ("file/page", "(Not a directory|File exists)")):
+        with pytest.raises(DockairError, match=f"^{path}: expected a file that can be written, got '{got}'"):
+            write_text("text", Path(path))
+    monkeypatch.setattr(os, "fsync", lambda file: (_ for _ in ()).throw(OSError(errno.ENOSPC, "full")))
+    with pytest.raises(MachineError):
+        write_text("text", Path("page"))
