@@ -11,7 +11,9 @@ from dockair.calibration import Camera, LedRing
 from dockair.errors import DockairError
 from dockair.messages import Window
 from dockair.nav.guidance.approach import GuidanceSettings
+from dockair.nav.guidance.bow_wave_push import BowWavePush
 from dockair.parameters import load_parameters
+from dockair.scenarios.assembly import parts as build_module
 from dockair.scenarios.assembly.buildable import require_buildable
 from dockair.scenarios.assembly.mounting_parameters import MountingParameters
 from dockair.scenarios.assembly.parts import build, guidance_settings
@@ -19,6 +21,10 @@ from dockair.scenarios.message_log import numbers
 from dockair.scenarios.schema import load_scenario
 from dockair.scenarios.tables.crew import Guidance
 from dockair.scenarios.truth_navigation import TruthNavigator
+from dockair.sim.air.atmosphere import standard_atmosphere
+from dockair.sim.aircraft.announcer import TankerSheet
+from dockair.sim.aircraft.flight_control import FlightControlParameters
+from dockair.sim.aircraft.tanker import TankerPathParameters
 from dockair.sim.hose.coupling import CouplingParameters
 
 SPARE_BEYOND_M, SPARE_M = 3.0, 0.5
@@ -83,6 +89,58 @@ def test_guidance_takes_the_scenarios_figures():
     assert settings.closure_speed_m_s == 1.0
     assert settings.limits.hold_s == 7.0
     assert settings.stand_off_m == 4.0
+
+
+def test_guidance_takes_every_figure_of_its_table():
+    table = {
+        "controller": "pid", "attempts_max": 7, "capture_radius_m": 0.2, "closure_speed_m_s": 1.1, "hold_s": 8.0,
+        "take_in_m": 1.75, "stabilise_s": 4.5,
+    }  # fmt: skip
+    assert set(table) == set(Guidance.model_fields)
+    settings = guidance_settings(load_scenario("default", {f"guidance.{key}": value for key, value in table.items()}))
+    for key, value in table.items():
+        told = settings if hasattr(settings, key) else settings.limits
+        assert getattr(told, key) == value, key
+
+
+def test_guidance_commands_no_more_than_most_of_what_the_flight_control_of_the_receiver_flies():
+    """0.95 of each of its limits forward, left, up, and forward no closer brake or start than that."""
+    unmanned = {"hardware.airframe": "unmanned", "flight.airspeed_m_s": 120.0, "flight.altitude_m": 3000.0}
+    for sheet, keys in (("flight_control", {}), ("flight_control_unmanned", unmanned)):
+        control = load_parameters(sheet, FlightControlParameters)
+        settings = guidance_settings(load_scenario("still_air", keys))
+        acceleration = 0.95 * control.acceleration_limit_m_s2
+        np.testing.assert_allclose(settings.acceleration_limit_m_s2, acceleration, rtol=1e-12)
+        np.testing.assert_allclose(settings.jerk_limit_m_s3, 0.95 * control.jerk_limit_m_s3, rtol=1e-12)
+        assert settings.closure_acceleration_m_s2 == min(0.6, settings.acceleration_limit_m_s2[0])
+        assert settings.closing == GuidanceSettings().closing.braked_at(settings.acceleration_limit_m_s2[0])
+    assert settings.response_s == (0.40, 0.25, 0.10)  # of the unmanned: slower forward and left than up
+    assert settings.predictive.straying_limit_m_s == (0.0, 0.0, 0.5)
+
+
+def test_guidance_expects_a_bow_waves_push_at_the_flights_dynamic_pressure():
+    """Half of rho V^2, of the standard atmosphere at the flight's altitude."""
+    push = guidance_settings(load_scenario("default", {"flight.airspeed_m_s": 150.0})).bow_wave
+    still = BowWavePush(source_from_tip_m=push.source_from_tip_m, radius_m=push.radius_m)
+    assert push == still.at_pressure(0.5 * standard_atmosphere(6000.0).density_kg_m3 * 150.0**2)
+    assert push != still
+
+
+def test_the_tankers_path_is_the_scenarios_in_radians_with_the_rates_of_its_sheet():
+    table = {
+        "tanker.manoeuvre": "racetrack", "tanker.starts_s": 7.0, "tanker.leg_s": 31.0, "tanker.bank_deg": 18.0,
+        "tanker.turns": "right", "tanker.descent_deg": 2.0,
+    }  # fmt: skip
+    world = SimpleNamespace(airspeed_m_s=180.0, tanker=SimpleNamespace(exit_m=np.array([-4.0, 0.0, -1.0])))
+    sheet = load_parameters("tanker_path", TankerSheet)
+    path, _ = build_module._tanker_path(load_scenario("still_air", table), 0, world)
+    assert path._parameters == TankerPathParameters(
+        manoeuvre="racetrack", starts_s=7.0, leg_s=31.0, bank_rad=float(np.pi / 10.0), turns_left=False,
+        descent_rad=float(np.pi / 90.0), roll_rate_rad_s=sheet.roll_rate_rad_s,
+        pull_over_rate_rad_s=sheet.pull_over_rate_rad_s,
+    )  # fmt: skip
+    assert sheet.roll_rate_rad_s != sheet.pull_over_rate_rad_s
+    np.testing.assert_allclose(path.at(0.0).p_WT, [4.0, 0.0, 1.0])  # the hose's exit is the world's origin
 
 
 def test_guidance_can_be_told_the_least_and_the_most_that_a_scenario_may_say():
