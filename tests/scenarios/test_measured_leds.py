@@ -14,7 +14,7 @@ from dockair.messages import Window
 from dockair.nav.navigator import NavigatorSettings
 from dockair.parameters import load_parameters
 from dockair.rotations import exp
-from dockair.scenarios.assembly.measured import SHEET, refuse_unmodelled
+from dockair.scenarios.assembly.measured import SHEET, measured_leds, refuse_unmodelled
 from dockair.scenarios.measured_leds import MeasuredLeds, MeasurementParameters, TextureLight, View
 from dockair.scenarios.schema import load_scenario
 from dockair.sim.as_built import AsBuilt, AsBuiltParameters, draw_as_built
@@ -497,6 +497,38 @@ def test_a_ring_at_the_right_edge_of_the_wide_sensor_is_on_it():
 def test_what_acts_through_the_picture_alone_is_refused(settings, reason):
     with pytest.raises(DockairError, match=reason):
         refuse_unmodelled(load_scenario("default", settings), Stand().built.camera, Stand().built.mounting)
+
+
+@pytest.mark.parametrize(("azimuth_deg", "is_refused"), [(0.0, True), (24.5, True), (-22.5, True), (29.5, False)])
+def test_the_sun_is_refused_as_far_beside_the_field_as_the_receivers_attitude_may_turn_it_in(azimuth_deg, is_refused):
+    """Half of the field's diagonal is 21.7 degrees, the camera looks 1.1 to the left, and 5 are added."""
+    scenario = load_scenario("default", {"sun.azimuth_deg": azimuth_deg, "sun.elevation_deg": 0.0})
+    mounting = Mounting(R_BC=exp(np.array([0.0, 0.0, 0.02])), p_BC=np.zeros(3), p_BP=np.zeros(3))
+    if is_refused:
+        with pytest.raises(DockairError, match="the Sun in the camera's field"):
+            refuse_unmodelled(scenario, Camera(), mounting)
+    else:
+        refuse_unmodelled(scenario, Camera(), mounting)
+
+
+@pytest.mark.parametrize("exposure", ["auto", "fixed"])
+def test_what_stands_in_place_of_the_camera_has_the_scenarios_air_and_exposure(exposure):
+    scenario = load_scenario("still_air", {"weather.visibility_m": 2000.0, "camera.exposure": exposure})
+    stand = Stand()
+    made = measured_leds(scenario, 0, stand.built, Faults((), 8), SimpleNamespace(model=stand.model))
+    electrons = [leds.view(stand.data, 1.0, 20e-6).electrons for leds in (made, stand.leds)]
+    range_m = np.linalg.norm(stand.data.mocap_pos[1] + stand.built.ring_positions_D - stand.built.mounting.p_BC, axis=1)
+    np.testing.assert_allclose(electrons[0] / electrons[1], np.exp(-3.912 / 2000.0 * range_m), rtol=1e-3)
+    for k in range(4):
+        made.expose(stand.data, 0.02 * k, k, None)
+    assert (made.exposure_s == SHEETS.exposure.exposure_s) is (exposure == "fixed")
+    assert made._followed_s == NavigatorSettings().usable_age_s
+
+
+def test_one_fault_in_the_picture_is_refused_among_others():
+    faults = [{"kind": "hot_pixels", "count": 9}, {"kind": "led_off", "leds": [1]}]
+    with pytest.raises(DockairError, match="hot pixels"):
+        refuse_unmodelled(load_scenario("default", {"faults": faults}), Stand().built.camera, Stand().built.mounting)
 
 
 def test_the_default_scenario_and_a_night_with_the_sun_below_are_not_refused():

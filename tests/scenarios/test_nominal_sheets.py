@@ -1,12 +1,14 @@
 """What the navigation is told of the start: the attitude without gusts, and nothing of this very flight."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from dockair.parameters import load_parameters
 from dockair.rotations import log, matrix_from_yaw_pitch_roll
 from dockair.scenarios.assembly import parts as build_module
-from dockair.scenarios.assembly.nominal_sheets import nominal_attitude
+from dockair.scenarios.assembly.nominal_sheets import _gyro_sheet, nominal_attitude
 from dockair.scenarios.assembly.parts import build
 from dockair.scenarios.schema import load_scenario
 from dockair.sim.air.atmosphere import standard_atmosphere
@@ -14,6 +16,7 @@ from dockair.sim.aircraft.aerodynamics import AirframeParameters
 from dockair.sim.aircraft.trim import level_trim
 from dockair.sim.hose.chain import DrogueParameters, HoseParameters
 from dockair.sim.hose.rest import rest_shape
+from dockair.sim.imu import ImuParameters
 
 QUIET = {"navigation.navigator": "truth", "start.sigma_m": [0.0, 0.0, 0.0], "bow_wave.present": False}
 
@@ -43,6 +46,35 @@ def test_the_nominal_attitude_is_that_of_a_start_in_the_wake_without_gusts(keys,
     """Under the wing the air turns about the path besides, and so does a drogue that is told without roll."""
     told, true = attitude(**keys)
     assert np.degrees(np.linalg.norm(log(true @ told.T))) < within_deg
+
+
+@pytest.mark.parametrize("grade", ["tactical", "mti", "consumer"])
+def test_the_data_sheet_that_is_told_is_the_imus_with_scale_and_misalignment_in_one(grade):
+    imu = load_parameters(f"imu_{grade}", ImuParameters)
+    imu = replace(imu, accelerometer_range_m_s2=50.0)  # for a grade without a limit, too
+    sheet = _gyro_sheet(imu, 400)
+    told = {
+        "rate_hz": 400,
+        "noise_density_rad_s_rthz": imu.gyro_noise_density_rad_s_rthz,
+        "bias_sigma_rad_s": imu.gyro_turn_on_bias_sigma_rad_s,
+        "bias_walk_rad_s_rts": imu.gyro_bias_walk_rad_s_rts,
+        "range_rad_s": imu.gyro_range_rad_s,
+        "accelerometer_noise_density_m_s2_rthz": imu.accelerometer_noise_density_m_s2_rthz,
+        "accelerometer_bias_sigma_m_s2": imu.accelerometer_turn_on_bias_sigma_m_s2,
+        "accelerometer_range_m_s2": 50.0,
+    }
+    assert {name: getattr(sheet, name) for name in told} == told
+    assert sheet.scale_factor_sigma >= max(imu.gyro_scale_factor_sigma, imu.gyro_misalignment_sigma_rad) > 0.0
+    assert sheet.scale_factor_sigma == pytest.approx(imu.gyro_scale_factor_sigma + imu.gyro_misalignment_sigma_rad)
+
+
+@pytest.mark.usefixtures("unsettled")
+def test_the_start_that_is_told_is_the_scenarios_in_radians():
+    keys = {"start__sigma_attitude_deg": [30.0, 18.0, 9.0], "start__aft_m": 6.0, "start__left_m": 1.0}
+    start = build(still_air(**keys), 0).sheets.start
+    np.testing.assert_allclose(start.sigma_R_rad, [np.pi / 6.0, np.pi / 10.0, np.pi / 20.0], rtol=1e-15)
+    np.testing.assert_array_equal(start.p_PD_B, [6.0, -1.0, 0.0])
+    assert not start.sigma_p_m.any()
 
 
 @pytest.fixture

@@ -66,6 +66,38 @@ def test_the_solution_is_marked_and_certain_and_has_seen_no_frame(monkeypatch):
     np.testing.assert_allclose(solution.R_BD, truth.R_WB.T @ truth.R_WD, atol=1e-12)
 
 
+def test_what_the_tips_velocity_changed_by_is_told_in_the_receivers_axes_and_unknown_at_first(monkeypatch):
+    first = turning_truth()
+    second = replace(first, v_WP=first.v_WP + np.array([0.03, -0.02, 0.01]))
+    monkeypatch.setattr(parts().navigator, "_v_WP", None)
+    _, state = handed_over(first, monkeypatch)
+    assert np.isnan(state.dv_WP_B).all()
+    monkeypatch.undo()
+    parts().navigator._v_WP = first.v_WP
+    _, state = handed_over(second, monkeypatch)
+    np.testing.assert_allclose(state.dv_WP_B, first.R_WB.T @ [0.03, -0.02, 0.01], atol=1e-15)
+    _, state = handed_over(second, monkeypatch)
+    np.testing.assert_array_equal(state.dv_WP_B, np.zeros(3))
+
+
+def test_what_is_announced_and_shown_reaches_guidance_and_its_reason_the_solution(monkeypatch):
+    navigator, heard = parts().navigator, []
+    for name in ("announce", "signal"):
+        monkeypatch.setattr(navigator._guidance, name, lambda message, name=name: heard.append((name, message)))
+    navigator.announce("a turn")
+    navigator.signal("red")
+    assert heard == [("announce", "a turn"), ("signal", "red")]
+    solution, _ = handed_over(turning_truth(), monkeypatch)
+    assert solution.phase_reason == navigator._guidance.phase_reason
+    guide = navigator._guidance.step
+    monkeypatch.setattr(
+        navigator._guidance,
+        "step",
+        lambda state: (guide(state), setattr(navigator._guidance, "phase_reason", "steady"))[0],
+    )
+    assert navigator.step((), None).phase_reason == "steady"
+
+
 def test_without_a_truth_it_does_not_navigate():
     navigator = build(load_scenario("truth_navigation"), 0).navigator
     with pytest.raises(AssertionError, match="the loop sets the truth"):
