@@ -59,6 +59,32 @@ def test_the_rim_is_that_of_the_ring_that_was_flown(hand_made, tmp_path):
         assert np.ptp(side.lines[4].get_ydata()) == pytest.approx(2.0 * rim_m, rel=0.02)  # the basket, nearly upright
 
 
+def test_from_behind_left_is_on_the_left_and_the_way_to_go_ends_at_nothing(hand_made, tmp_path):
+    """As the receiver sees it: the drogue's left to the left, up above; beyond the ring nothing is to go."""
+    flight, figure = _flight(tmp_path, [hand_made.tick(k) for k in range(400, 700, 10)]), Figure()
+    axes = figure.add_subplot()
+    draw_along_axis(figure, axes, flight, RefereeLimits())
+    path = tip_in_drogue_axes(flight)[: contact(flight)[1] + 1]
+    path = path[approach_begin(path[:, 0]) :]
+    (points,) = axes.collections
+    np.testing.assert_allclose(points.get_offsets(), path[:, 1:], atol=1e-12)
+    np.testing.assert_allclose(points.get_array(), np.maximum(-path[:, 0], 0.0), atol=1e-12)
+    assert path[0, 0] < -2.0 and path[-1, 0] > 0.0
+    assert axes.get_xlim()[0] > 0.0 > axes.get_xlim()[1]
+    assert axes.get_ylim()[0] < 0.0 < axes.get_ylim()[1]
+
+
+def test_from_the_left_the_probe_reaches_from_its_tip_aft_along_the_receiver(hand_made, tmp_path):
+    ticks = [hand_made.tick(k) for k in (500, 600, 660)]
+    flight, axes = _flight(tmp_path, ticks), Figure().add_subplot()
+    draw_side_view(axes, flight, RefereeLimits())
+    truth = ticks[-1][0]
+    tip = truth.p_WP - truth.p_WT + np.array([4.0, 0.0, 1.5])  # p_WT at the start: the exit is the origin
+    (probe,) = (line for line in axes.lines if line.get_label() == "probe")
+    np.testing.assert_allclose(probe.get_xydata()[0], tip[[0, 2]], atol=1e-9)
+    np.testing.assert_allclose(probe.get_xydata()[1], (tip - truth.R_WB[:, 0])[[0, 2]], atol=1e-9)
+
+
 @pytest.mark.parametrize("heading_deg", [0.0, 70.0])
 def test_level_axes_begin_in_the_hoses_exit_and_look_along_the_tankers_heading(hand_made, tmp_path, heading_deg):
     """From the second tick on everything is 9 km off and turned: paths lie where they would here."""

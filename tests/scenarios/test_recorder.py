@@ -71,6 +71,14 @@ def test_an_unknown_way_to_record_is_refused_with_the_known_ones(tmp_path):
 def test_the_summary_says_what_was_not_measured_instead_of_nan():
     result = fly(_short("truth_navigation", 0.1), 0)
     assert "nan" not in summary_of(replace(result, truth_navigation=False))
+    nav = replace(result.nav, frames_used=3, range_rmse_m=0.0124, lateral_rmse_m=0.0031, nees_mean=8.5)
+    lines = summary_of(replace(result, nav=nav, frames=5)).splitlines()
+    assert lines[0] == "# timeout"
+    for line in (
+        "| range error (RMS) | 12.4 mm |", "| lateral error (RMS) | 3.1 mm |", "| mean NEES (of 9) | 8.5 |",
+        "| frames used | 3 of 5 |",
+    ):  # fmt: skip
+        assert line in lines
 
 
 @pytest.mark.slow

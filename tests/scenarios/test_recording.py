@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 import pyarrow as pa
 import pytest
+from matplotlib.figure import Figure
 from PIL import Image
 from scipy.spatial.transform import Rotation
 
@@ -437,6 +438,36 @@ def test_a_picture_shows_a_frame_whose_range_is_known_though_a_navigator_of_ones
     monkeypatch.setattr(picture, "_draw_frame", lambda axes, *frame: drawn.append(frame))
     picture_of_flight(tmp_path)
     assert drawn[0][-1] == pytest.approx(4.005)  # the hand-made belief is 5 mm off
+
+
+def test_a_picture_shows_the_frame_with_most_leds_named_though_another_is_nearer_to_the_range(
+    hand_made, tmp_path, monkeypatch
+):
+    log, few = FlightLog(), np.arange(8)[:, None] < 7
+    with MessageLog(tmp_path, NavigatorRecipe(class_name="a:B", sheets=hand_made.sheets)) as messages:
+        for k in (400, 440, 480):
+            truth, imu, frame, solution = hand_made.tick(k)
+            if k == 480:
+                solution = replace(solution, led_pixels_px=np.where(few, solution.led_pixels_px, np.nan))
+            log.append(truth, imu, frame, solution)
+            messages.append(imu, frame, solution)
+    log.write_parquet(tmp_path)
+    drawn = []
+    monkeypatch.setattr(picture, "_draw_frame", lambda axes, pixels, *rest: drawn.append((pixels, *rest)))
+    picture_of_flight(tmp_path)
+    pixels, corner, leds, *_ = drawn[0]
+    _, _, frame, solution = hand_made.tick(440)
+    np.testing.assert_array_equal(pixels, frame.pixels)
+    assert corner == (frame.window.column_start, frame.window.row_start)
+    np.testing.assert_array_equal(leds, solution.led_pixels_px)
+
+
+def test_a_pixel_of_the_pictures_frame_has_its_centre_at_its_own_coordinates():
+    """As in the project, and as LEDs and candidates are drawn over it."""
+    axes = Figure().add_subplot()
+    picture._draw_frame(axes, np.zeros((20, 30), np.uint8), (100, 200), np.full((8, 2), np.nan), np.empty((0, 2)), 1.5)
+    assert axes.images[0].get_extent() == [99.5, 129.5, 219.5, 199.5]
+    assert axes.get_title().endswith("1.5 m to go")
 
 
 def test_a_picture_needs_no_frames(flown):
