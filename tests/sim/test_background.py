@@ -263,6 +263,25 @@ def test_haze_takes_the_solids_contrast_by_the_slant_range_and_leaves_the_sky(
     assert image[100, 350] == pytest.approx(WHITE_E * 0.2 * sky**4, rel=1e-5)
 
 
+def test_the_sky_is_asked_for_haze_along_the_lenss_axis_and_for_its_picture_from_the_cameras_place(
+    make: Callable[..., Background],
+) -> None:
+    class AskedSky(PlainSky):
+        def fill(self, out: np.ndarray, R_WC: np.ndarray, x: np.ndarray, y: np.ndarray, place_m: object = None) -> None:
+            super().fill(out, R_WC, x, y)
+            asked["place"] = place_m
+
+        def airlight(self, direction_W: np.ndarray) -> float:
+            asked["axis"] = direction_W
+            return self.air
+
+    asked, (model, data), place_m = {}, _scene(), np.array([1.0, 2.0, 3.0])
+    yaw = np.array([[0.8, -0.6, 0.0], [0.6, 0.8, 0.0], [0.0, 0.0, 1.0]])
+    background, window = make(model, sky=AskedSky()), Window(10, 20, 10, 20)
+    background.electrons(data, (yaw, np.zeros(3)), window, WHITE_E, extinction_1_m=0.05, place_m=place_m)
+    assert np.array_equal(asked["axis"], [0.8, 0.6, 0.0]) and asked["place"] is place_m
+
+
 def test_solids_take_their_light_from_the_sky(make: Callable[..., Background]) -> None:
     """A floor under the Sun at the zenith, a wall beside it: rho (ambient + direct), rho ambient; brighter than 1."""
     model, data = _scene(_box((10.0, 0.0, -2.0), (4.0, 6.0, 0.5), 0.9), _box((15.0, 0.0, 0.0), (0.5, 6.0, 6.0), 0.9))
