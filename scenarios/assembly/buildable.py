@@ -14,6 +14,7 @@ from dockair.scenarios.assembly.measured import require_measurable
 from dockair.scenarios.assembly.nominal_sheets import nominal_camera, nominal_ring
 from dockair.scenarios.plug_in import navigator_class_of
 from dockair.scenarios.schema import Scenario
+from dockair.sim.air.turbulence import gust_sigma
 from dockair.sim.basket import require_fit
 from dockair.sim.camera.camera_noise import CameraNoise
 from dockair.sim.camera.defects import Defects
@@ -26,12 +27,13 @@ from dockair.sim.hose.coupling import CouplingParameters
 
 
 def require_buildable(scenario: Scenario) -> None:
-    """Refuse a flight into the ground, a rate of the camera, sheets and faults that do not fit, and no navigator.
+    """Refuse a flight into the ground, gusts, a camera rate, sheets and faults that do not fit, and no navigator.
 
     Raises:
         DockairError: one of them does not, or the navigator's class is none.
     """
     _check_altitude(scenario)
+    _check_gusts(scenario)
     ring, own = nominal_ring(scenario), scenario.parameters
     drogue = load_parameters("drogue", DrogueParameters, own.get("drogue"))
     _check_ring(ring, drogue)
@@ -68,6 +70,17 @@ def _check_altitude(scenario: Scenario) -> None:
     if not flight.altitude_m > down_m:
         expected = f"more than {down_m:.1f} m, as far as the tanker goes down in flight.duration_s"
         raise DockairError("flight.altitude_m", expected=expected, got=flight.altitude_m)
+
+
+def _check_gusts(scenario: Scenario) -> None:
+    """Of how strong gusts of an intensity are there is a table, of some altitudes."""
+    turbulence = scenario.turbulence
+    if turbulence.model == "none" or turbulence.intensity is None:
+        return
+    try:
+        gust_sigma(turbulence.intensity, scenario.flight.altitude_m)
+    except DockairError as error:
+        raise error.at("flight.altitude_m") from None
 
 
 def _check_ring(ring: LedRing, drogue: DrogueParameters) -> None:

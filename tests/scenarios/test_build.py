@@ -223,6 +223,15 @@ def test_a_toboggan_into_the_ground_is_refused_with_how_far_down_it_goes():
     require_buildable(load_scenario("still_air", {"flight.altitude_m": 0.0}))
 
 
+def test_an_intensity_of_gusts_is_refused_below_the_altitudes_that_it_is_known_for_before_anything_is_built():
+    """A campaign asks before it flies: what every flight would be refused for is said once."""
+    low = {"turbulence.intensity": "light", "flight.altitude_m": 300.0}
+    with pytest.raises(DockairError, match=r"flight.altitude_m: expected an altitude from 610 to 24384 m, got 300"):
+        require_buildable(load_scenario("truth_navigation", low))
+    require_buildable(load_scenario("truth_navigation", low | {"turbulence.model": "none"}))
+    require_buildable(load_scenario("truth_navigation", {"turbulence.sigma_m_s": 1.0, "flight.altitude_m": 300.0}))
+
+
 def test_a_ring_that_does_not_fit_the_drogue_is_refused():
     with pytest.raises(DockairError, match="ring's own diameter, 0.5 m"):
         build(load_scenario("truth_navigation", {"parameters.drogue.ring_diameter_m": 0.6}), 0)
