@@ -9,7 +9,7 @@ from dockair.parameters import load_parameters
 from dockair.scenarios.assembly.air import air_motion
 from dockair.scenarios.schema import load_scenario
 from dockair.sim.air.discrete_gust import DiscreteGusts
-from dockair.sim.air.turbulence import DrydenField
+from dockair.sim.air.turbulence import DrydenField, gust_sigma
 
 SETTLE_S = 2.0
 POINTS_B = np.array([[0.0, 0.0, 0.0], [0.0, 4.0, 0.0], [0.0, -4.0, 0.0], [-5.0, 0.0, 0.0]])
@@ -58,6 +58,16 @@ def test_each_table_switches_on_one_source_and_no_other(make, settings, there):
         assert (getattr(air, f"_{name}") is not None) == (name == there)
 
 
+def test_an_intensity_is_that_of_the_flights_altitude(make):
+    """As MIL-F-8785C has it there; the field is otherwise the same."""
+    for altitude_m in (6000.0, 15000.0):
+        named = make({"turbulence.intensity": "moderate", "flight.altitude_m": altitude_m})
+        given = make({"turbulence.sigma_m_s": gust_sigma("moderate", altitude_m)})
+        np.testing.assert_array_equal(_at(named).tow_W, _at(given).tow_W)
+    assert gust_sigma("moderate", 6000.0) == pytest.approx(2.24, abs=0.01) != gust_sigma("moderate", 15000.0)
+    assert np.abs(_at(named).tow_W).max() > 0.0
+
+
 @pytest.mark.parametrize(("start_m", "least_m"), [(4.0, 70.0), (40.0, 106.0)])
 def test_a_field_that_ends_before_the_receivers_tail_is_refused(make, start_m, least_m):
     """Front 40 m, hose 15 m, the tail 11 m behind the tip."""
@@ -76,6 +86,7 @@ def test_the_sheets_values_of_the_scenario_reach_wake_and_bow_wave(make):
     """Twice the half-body's radius sends out four times the air; no lift on the tail takes its vortices away."""
     wide, plain = (make({"bow_wave.present": True, **more}) for more in ({"parameters.bow_wave.radius_m": 1.5}, {}))
     assert wide._bow_wave[3] == pytest.approx(4.0 * plain._bow_wave[3], rel=1e-12)
+    assert wide._bow_wave[3] == pytest.approx(180.0 * 1.5**2 / 4.0, rel=1e-12)  # V R^2/4
     bare = make({"wake.present": True, "parameters.wake.tail_circulation_fraction": 0.0})
     assert bare._wake[-1, 4] == 0.0 and bare._wake[0, 4] > 0.0
 

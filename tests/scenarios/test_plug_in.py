@@ -108,6 +108,14 @@ class Fails(Steps):
         return {}["nor such"]
 
 
+class FailsBelow(Steps):
+    def step(self, imu, frame):
+        return self.divide(0.0)
+
+    def divide(self, by):
+        return 1.0 / by  # the line that fails, not the one that called it
+
+
 class Ends(Steps):
     def step(self, imu, frame):
         raise SystemExit(7)
@@ -131,6 +139,7 @@ def _signal(navigator):
         (Fails, _step, np.linalg.LinAlgError, "np.linalg.inv("),
         (Fails, _announce, KeyError, 'return {}["no such'),
         (Fails, _signal, KeyError, 'return {}["nor such"]'),
+        (FailsBelow, _step, ZeroDivisionError, "return 1.0 / by"),
         (Ends, _step, SystemExit, "raise SystemExit(7)"),
     ],
 )
