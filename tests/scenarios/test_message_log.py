@@ -242,6 +242,20 @@ def test_a_full_disk_reaches_the_flight(hand_made, tmp_path, monkeypatch):
         log.close()
 
 
+def test_a_disk_that_refuses_only_the_last_ticks_reaches_the_flight_too(hand_made, tmp_path, monkeypatch):
+    """Fewer ticks than a row group has are written when the log is closed."""
+
+    def refuse(*_):
+        raise OSError("No space left on device")
+
+    monkeypatch.setattr(pq.ParquetWriter, "write_table", refuse)
+    log = MessageLog(tmp_path, NavigatorRecipe(class_name="a:B", sheets=hand_made.sheets))
+    for _, imu, frame, solution in hand_made.ticks(3):
+        log.append(imu, frame, solution)
+    with pytest.raises(MachineError, match="No space left"):
+        log.close()
+
+
 def test_a_flight_that_waits_for_the_encoder_goes_on_when_the_disk_refuses(hand_made, tmp_path, monkeypatch):
     """The first tick is refused while the flight waits with its third: it is told, and not left waiting."""
     waits = threading.Event()
