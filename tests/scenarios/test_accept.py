@@ -142,7 +142,8 @@ def test_the_acceptance_in_words_names_every_figure_asked_for():
         "contact, 70 % at the first attempt, 95 % within all, 100 % contact or clean departure, within 0.15 m, "
         "median offset 0.08 m, 90 % at 1 to 1.5 m/s, unsafe in at most 2"
     )
-    assert Accept().in_words == ""
+    assert Accept().in_words == Accept(unsafe_max=2).in_words == ""
+    assert Accept(radial_offset_max_m=0.15).in_words == "within 0.15 m"
 
 
 def test_what_could_not_be_measured_is_no_shortfall_where_nothing_is_asked_of_it():
