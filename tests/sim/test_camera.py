@@ -14,11 +14,14 @@ from dockair.rotations import exp
 from dockair.sim.as_built import AsBuilt
 from dockair.sim.camera.camera import NearInfraredCamera
 from dockair.sim.camera.radiometry import led_electrons, responses
+from dockair.sim.camera.readout import readout_time_s
 from dockair.sim.camera.sheets import CameraSheets
+from dockair.sim.faults import ExposureStuck, StuckFrame
 
 SHEETS = CameraSheets.load()
 BEHIND = np.array([-0.8, 0.0, 0.6])
 FULL = Window(0, 1088, 0, 2048)
+NO_DECK = {"sky": {"deck_cover": 0.0}}
 EXPOSURE_S = SHEETS.exposure.exposure_s
 Made = tuple[Any, NearInfraredCamera]
 
@@ -245,6 +248,60 @@ def test_the_message_says_when_how_long_and_how_much(make_camera: Callable[..., 
     latencies = np.array([camera.latency_s(frame) for _ in range(4000)])
     assert latencies.mean() == pytest.approx(10e-3, abs=1e-4)  # 6 standard errors
     assert latencies.std() == pytest.approx(1e-3, rel=0.08)
+
+
+def test_no_frame_arrives_before_its_rows_are_read_after_the_shortest_exposure(
+    make_camera: Callable[..., Made],
+) -> None:
+    """And where faults may send an old frame again, not before a frame without rows or exposure."""
+    window, sensor = Window(100, 300, 0, 50), SHEETS.sensor
+    _, sound = make_camera()
+    _, faulty = make_camera(faults=(StuckFrame(start_s=3.0),))
+    for asked, rows in ((window, 200), (None, 1088)):
+        least_s = 0.5 * SHEETS.exposure.shortest_s + readout_time_s(rows, sensor) + sensor.transfer_s
+        assert sound.least_latency_s(asked) == pytest.approx(least_s, rel=1e-12)
+        assert faulty.least_latency_s(asked) == pytest.approx(readout_time_s(0, sensor) + sensor.transfer_s, rel=1e-12)
+
+
+def test_jitter_that_has_been_drawn_is_not_drawn_again(make_camera: Callable[..., Made]) -> None:
+    (world, camera), (_, other) = make_camera(), make_camera()
+    frame = camera.expose(world.data, 0.0, 0, Window(0, 4, 0, 4))
+    assert frame is not None
+    first = camera.latency_s(frame, 0.25)
+    assert camera.latency_s(frame, 0.0) == pytest.approx(first - 0.25, abs=1e-12)
+    assert camera.transfer_jitter_s() == other.transfer_jitter_s()
+
+
+def test_an_exposure_asked_for_is_of_that_frame_alone_and_within_the_hardwares_limits(
+    make_camera: Callable[..., Made],
+) -> None:
+    """LEDs in view at 500 us clip; the control, had it metered that, would go down. A stuck exposure stays."""
+    world, camera = make_camera(automatic_exposure=True)
+    _, stuck = make_camera(faults=(ExposureStuck(exposure_s=5e-5),))
+    longest_s, window = SHEETS.exposure.longest_s, Window(350, 750, 820, 1220)
+    for asked_s, made_s in ((1e-4, 1e-4), (1.0, longest_s), (1e-9, SHEETS.exposure.shortest_s)):
+        frame, held = (c.expose(world.data, 0.0, 0, window, asked_s) for c in (camera, stuck))
+        assert frame is not None and frame.exposure_s == made_s
+        assert held is not None and held.exposure_s == 5e-5
+        assert camera.exposure_s() == EXPOSURE_S
+
+
+def test_as_time_passes_the_ground_is_that_of_a_place_farther_along_the_x_of_w(
+    make_camera: Callable[..., Made],
+) -> None:
+    """After 2 s at 200 m/s what is seen below is as from 400 m on, and not as from the start."""
+    window = Window(1048, 1088, 0, 400)
+    world, flown = make_camera(airspeed_m_s=200.0, overrides=NO_DECK)
+    at_start = flown.background_electrons(world.data, window)
+    world.data.time = 2.0
+    passed = flown.background_electrons(world.data, window)
+    moved_world, standing = make_camera(overrides=NO_DECK)
+    for name in ("receiver", "drogue", "tanker", "box"):
+        moved_world.data.qpos[moved_world.model.joint(name).qposadr[0]] += 400.0
+    mujoco.mj_forward(moved_world.model, moved_world.data)
+    moved = standing.background_electrons(moved_world.data, window)
+    assert np.isclose(passed, moved, rtol=1e-3).mean() > 0.99
+    assert np.isclose(at_start, moved, rtol=1e-3).mean() < 0.5
 
 
 def test_the_gain_turns_grey_levels_back_into_electrons(make_camera: Callable[..., Made]) -> None:
