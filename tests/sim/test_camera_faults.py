@@ -7,10 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from dockair.calibration import Camera
 from dockair.errors import DockairError
 from dockair.messages import CameraFrame, Window
 from dockair.sim import faults
 from dockair.sim.camera.camera import CameraNoise, NearInfraredCamera
+from dockair.sim.camera.defects import Defects
 from dockair.sim.camera.dirt import Dirt
 from dockair.sim.camera.sheets import CameraSheets
 
@@ -155,6 +157,27 @@ def test_more_hot_pixels_than_the_sensor_has_are_refused_before_the_flight(make_
     make_camera(faults=(half, replace(half, start_s=AFTER_S, stop_s=9.0)))
     with pytest.raises(DockairError, match=r"faults.count: expected up to 2228224 hot pixels, .* got 2400000"):
         make_camera(faults=(half, replace(half, start_s=AFTER_S - 0.1, stop_s=9.0)))
+
+
+def defects(*given: faults.Fault) -> Defects:
+    sheets, noise = CameraSheets.load(), CameraNoise.of(SEED)
+    return Defects(Camera(), sheets.glare, sheets.exposure, faults.Faults(given, 8), noise.dirt, noise.hot_pixels)
+
+
+def test_faults_at_the_very_limits_of_the_camera_can_be_and_one_below_the_shortest_exposure_cannot() -> None:
+    limits = CameraSheets.load().exposure
+    defects(*(faults.ExposureStuck(exposure_s=t) for t in (limits.shortest_s, limits.longest_s)))
+    defects(faults.HotPixels(count=2048 * 1088))
+    with pytest.raises(DockairError, match=r"faults\[0\].exposure_us: expected 14 to 500 us, .* got 13"):
+        defects(faults.ExposureStuck(exposure_s=13e-6))
+
+
+def test_as_many_pixels_are_hot_as_the_faults_of_the_moment_ask_for() -> None:
+    of_camera = defects()
+    for count in (7, 30, 0, 7):
+        pixels = np.zeros((1088, 2048), dtype=np.uint8)
+        of_camera.whiten(pixels, Window(0, 1088, 0, 2048), count)
+        assert (pixels == 255).sum() == count
 
 
 def test_a_camera_that_is_reset_has_no_frame_to_be_stuck_at(make_camera: Callable[..., Made]) -> None:
