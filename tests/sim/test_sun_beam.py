@@ -66,6 +66,33 @@ def test_solids_glints_and_stray_light_have_one_beam_under_broken_cloud(small_wo
     assert max(alone) > 0.25
 
 
+class _CloudAbove:
+    """Thick cloud where rays of a camera that looks along W's x point above the rows from one on."""
+
+    def __init__(self, row: float) -> None:
+        self._slope = -(row - Camera().principal_point_px[1]) / Camera().focal_length_px
+
+    def beam(self, directions_W: np.ndarray) -> np.ndarray:
+        return (directions_W[:, 2] < self._slope * directions_W[:, 0]).astype(float)
+
+
+@pytest.mark.parametrize("place", [(1023.5, 543.5), (60.0, 90.0), (-10.0, 500.0), (900.0, 1097.0), (2056.0, 3.0)])
+def test_the_patch_around_the_disc_holds_all_of_it_and_each_pixels_own_cloud(
+    small_world: Any, place: tuple[float, float]
+) -> None:
+    """Also where its middle is beside the frame. Drawn out by 1/cos^2 off the axis, with 6 px of blur."""
+    sun_W = Camera().rays_from_pixels(np.array([place]))[0]
+    view = SunView(small_world.model, Camera(), _CloudAbove(place[1] - 0.25), sun_W, RADIUS_RAD, 6.0)
+    found = view.patch(small_world.data, (np.eye(3), np.array([0.0, 0.0, 500.0])))
+    assert found is not None
+    seen, (row, column) = found
+    reach = (Camera().focal_length_px * math.tan(RADIUS_RAD) + 6.0) / sun_W[0] ** 2
+    for first, count, middle in ((row, seen.shape[0], place[1]), (column, seen.shape[1], place[0])):
+        assert first <= middle - reach and first + count - 1 >= middle + reach - 1.0
+    rows = row + np.arange(len(seen))
+    assert np.array_equal(seen, np.broadcast_to((rows > place[1] - 0.25)[:, None].astype(float), seen.shape))
+
+
 def test_without_cloud_all_of_the_sunlight_comes_through_to_the_bit() -> None:
     sky = SkyRadiance(SHEET, Weather(), SUN_W, 6000.0, 7)
     assert Lighting.toward(SUN_W, sky, RADIUS_RAD).direct == 1.0
