@@ -105,7 +105,7 @@ def find_circles(
     Args:
         points: (n, 2) candidates [px].
         radii: (m,) to try [px].
-        centre_gate: u, v and radius of the disc that may hold the centre [px].
+        centre_gate: u, v and radius of the disc that may hold the centre [px]; the square about it is searched.
         cell: width of a cell as a fraction of the radius.
         gate: half width of the band as a fraction of the radius.
         peaks: how many to return.
@@ -223,15 +223,14 @@ def _peaks(  # type: ignore[no-untyped-def]
             points = all_points[group == g]
             if len(points) < min_votes:
                 continue
+            # the centre of a ring of which at least four LEDs are seen may lie outside their box, by less than a radius
             for axis in range(2):
-                lower[axis] = max(points[:, axis].min(), gate_lower[axis])
-                upper[axis] = min(points[:, axis].max(), gate_upper[axis])
+                lower[axis] = max(points[:, axis].min() - r, gate_lower[axis])
+                upper[axis] = min(points[:, axis].max() + r, gate_upper[axis] + width)  # the last cells lie beyond it
             if lower[0] > upper[0] or lower[1] > upper[1]:
                 continue
-            # the centre of a ring of which at least four LEDs are seen may lie outside their box, by less than a radius
-            u0, v0 = lower[0] - r, lower[1] - r
-            rows = int((upper[1] - lower[1] + 2.0 * r) / width) + 1
-            columns = int((upper[0] - lower[0] + 2.0 * r) / width) + 1
+            u0, v0 = lower[0], lower[1]
+            rows, columns = int((upper[1] - v0) / width) + 1, int((upper[0] - u0) / width) + 1
             votes = _accumulate(points, r, u0, v0, rows, columns, width, gate)
             least = table[:, 4].min() if filled == capacity else -np.inf
             for i in range(rows):

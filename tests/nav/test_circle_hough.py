@@ -77,6 +77,27 @@ def test_the_gate_keeps_circles_elsewhere_out():
     assert len(find_circles(np.zeros((0, 2)), radius_row(50.0, 70.0), centre_gate=ANYWHERE).votes) == 0
 
 
+@pytest.mark.parametrize("reach", [1.0, 10.0, 80.0])
+@pytest.mark.parametrize("toward", [(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)])
+def test_a_gate_about_the_centre_holds_the_peak_of_a_ring_that_is_seen_on_one_side_alone(reach, toward):
+    """Four LEDs in a row, the nearest 38 px beside the centre: no gate narrower than that meets their box."""
+    angle = np.deg2rad([-67.5, -22.5, 22.5, 67.5]) + np.arctan2(toward[1], toward[0])
+    points = [900.0, 500.0] + 100.0 * np.column_stack([np.cos(angle), np.sin(angle)])
+    peaks = find_circles(points, np.array([100.0]), centre_gate=(900.0, 500.0, reach))
+    assert len(peaks.votes) > 0 and peaks.votes[0] == 4
+
+
+def test_no_peak_is_farther_outside_the_gate_than_a_cell():
+    """A ring of which the gate leaves the centre out by 80 px has all its votes there, and few within."""
+    angle = np.arange(8) * np.pi / 4
+    points = [900.0, 500.0] + 100.0 * np.column_stack([np.cos(angle), np.sin(angle)])
+    for toward in ([1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]):
+        u, v = np.array([900.0, 500.0]) + 100.0 * np.array(toward)
+        peaks = find_circles(points, np.array([100.0]), centre_gate=(u, v, 20.0), min_votes=1)
+        assert len(peaks.votes) > 0
+        assert np.abs(peaks.centre_px - [u, v]).max() <= 20.0 + 15.0
+
+
 def test_among_clutter_the_peak_least_likely_an_accident_is_the_ring():
     """Five LEDs of a small ring among thirty others: by votes large circles come first, by Eq. (2) the ring."""
     rng = np.random.default_rng(74)
