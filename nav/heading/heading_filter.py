@@ -152,6 +152,7 @@ class HeadingFilter:
             stamp_s = sample.time_stamp_s
             if not self._begun and np.isfinite(f_B).all() and np.isfinite(w_B).all() and np.isfinite(stamp_s):
                 self._begin(stamp_s, w_B, f_B)
+                R_NB = self._R_NB
             elif self._begun and np.isfinite(w_B).all() and stamp_s > self._stamp_s:
                 passed_s += self._take(stamp_s, w_B, f_B)
         self._spread(R_NB, passed_s)

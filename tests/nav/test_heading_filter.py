@@ -137,6 +137,19 @@ def test_it_may_begin_in_a_turn_or_before_one_with_a_bias_on_every_axis(starts_s
     assert wrong < 2.0
 
 
+def test_one_batch_of_samples_has_the_sigma_of_samples_one_by_one_from_the_first_on():
+    """A nose 30 degrees up in a bank: the gyros' axes are not those of the heading."""
+    level = matrix_from_yaw_pitch_roll(0.0, -30.0 * DEGREE, -40.0 * DEGREE).T @ [0.0, 0.0, G]
+    samples = [
+        ImuSample(time_stamp_s=k / RATE_HZ, angular_rate_rad_s=NONE, specific_force_m_s2=level) for k in range(60)
+    ]
+    at_once, by_one = (HeadingFilter(gyro(), PLAIN, 1e-6) for _ in range(2))
+    at_once.propagate(samples)
+    for sample in samples:
+        by_one.propagate([sample])
+    np.testing.assert_allclose(at_once._P, by_one._P, rtol=1e-9, atol=1e-15)
+
+
 def test_without_frames_such_a_gyro_is_lost():
     """The control of the test before."""
     turn = Turn(60.0)
