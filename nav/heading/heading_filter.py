@@ -150,7 +150,8 @@ class HeadingFilter:
             w_B = self._R_BI @ np.asarray(sample.angular_rate_rad_s, dtype=float)
             f_B = self._R_BI @ np.asarray(sample.specific_force_m_s2, dtype=float)
             stamp_s = sample.time_stamp_s
-            if not self._begun and np.isfinite(f_B).all() and np.isfinite(w_B).all() and np.isfinite(stamp_s):
+            # accelerometers that are off say 0, and not where up is
+            if not self._begun and f_B.any() and np.isfinite([*f_B, *w_B, stamp_s]).all():
                 self._begin(stamp_s, w_B, f_B)
                 R_NB = self._R_NB
             elif self._begun and np.isfinite(w_B).all() and stamp_s > self._stamp_s:

@@ -150,6 +150,17 @@ def test_one_batch_of_samples_has_the_sigma_of_samples_one_by_one_from_the_first
     np.testing.assert_allclose(at_once._P, by_one._P, rtol=1e-9, atol=1e-15)
 
 
+@pytest.mark.parametrize("first", [np.zeros(3), np.full(3, np.nan)])
+def test_accelerometers_that_begin_late_and_miss_samples_level_as_soon(first):
+    """The first says nothing, later every second does not either: up is known 4 s after the first that does."""
+    filter_, up = HeadingFilter(gyro(), PLAIN, V), np.array([0.0, 0.0, G])
+    for k in range(4 * RATE_HZ + 4):
+        force = first if k == 0 else up if k % 2 else np.full(3, np.nan)
+        filter_.propagate([ImuSample(time_stamp_s=k / RATE_HZ, angular_rate_rad_s=NONE, specific_force_m_s2=force)])
+    assert filter_.is_level
+    np.testing.assert_allclose(filter_.R_LB, np.eye(3), atol=1e-9)
+
+
 def test_without_frames_such_a_gyro_is_lost():
     """The control of the test before."""
     turn = Turn(60.0)
