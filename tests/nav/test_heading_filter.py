@@ -137,6 +137,24 @@ def test_it_may_begin_in_a_turn_or_before_one_with_a_bias_on_every_axis(starts_s
     assert wrong < 2.0
 
 
+def test_one_average_of_up_leaves_of_roll_and_pitch_what_two_measurements_leave():
+    """Start and average are independent: their inverse variances add up."""
+    filter_, start, up = HeadingFilter(gyro(1e-9), PLAIN, 1e-6), 0.3, 0.07
+    for k in range(4 * RATE_HZ + 1):
+        filter_.propagate(
+            [ImuSample(time_stamp_s=k / RATE_HZ, angular_rate_rad_s=NONE, specific_force_m_s2=np.array([0.0, 0.0, G]))]
+        )
+    assert filter_.is_level
+    np.testing.assert_allclose(np.diag(filter_._P)[:2], 1.0 / (start**-2 + up**-2), rtol=1e-4)
+
+
+def test_the_first_sample_of_a_turn_levels_it_to_a_hundredth_of_its_bank():
+    """Three rounds, each of which leaves a fifth of the error or less."""
+    turn, filter_ = Turn(1.0), HeadingFilter(gyro(), PLAIN, V)
+    filter_.propagate(turn.samples()[:1])
+    assert np.linalg.norm(log(without_yaw(turn.attitudes[0]).T @ filter_.R_LB)) < 0.01 * abs(BANK)
+
+
 def test_one_batch_of_samples_has_the_sigma_of_samples_one_by_one_from_the_first_on():
     """A nose 30 degrees up in a bank: the gyros' axes are not those of the heading."""
     level = matrix_from_yaw_pitch_roll(0.0, -30.0 * DEGREE, -40.0 * DEGREE).T @ [0.0, 0.0, G]
@@ -150,6 +168,35 @@ def test_one_batch_of_samples_has_the_sigma_of_samples_one_by_one_from_the_first
     np.testing.assert_allclose(at_once._P, by_one._P, rtol=1e-9, atol=1e-15)
 
 
+def test_a_correction_of_roll_and_pitch_is_told_once_in_axes_along_the_heading():
+    """The nose 15 degrees up, 1.6 rad of turn before up is averaged; the first sample was askew."""
+    R_LB = matrix_from_yaw_pitch_roll(0.0, -15.0 * DEGREE, 0.0)
+    level, rate = R_LB.T @ [0.0, 0.0, G], R_LB.T @ [0.0, 0.0, 0.4]
+    askew = exp(np.array([4.0, -3.0, 0.0]) * DEGREE) @ level
+    corrected, never = (HeadingFilter(gyro(1e-6), PLAIN, 1e-6, HeadingFilterSettings(up_every_s=t)) for t in (4.0, 1e6))
+    for k in range(4 * RATE_HZ + 1):
+        force = askew if k == 0 else level
+        sample = ImuSample(time_stamp_s=k / RATE_HZ, angular_rate_rad_s=rate, specific_force_m_s2=force)
+        corrected.propagate([sample])
+        never.propagate([sample])
+    assert corrected.is_level and corrected.heading_rad == pytest.approx(1.6, abs=0.05)
+    tilt = corrected.tilt_L()
+    np.testing.assert_allclose(tilt[:2], log(corrected.R_LB @ never.R_LB.T)[:2], atol=0.2 * DEGREE)
+    assert np.linalg.norm(tilt) > 4.0 * DEGREE and tilt[2] == 0.0
+    assert (corrected.tilt_L() == 0.0).all()
+
+
+def test_roll_and_pitch_of_a_frame_s_own_time_are_those_of_the_past():
+    """Rolling at 0.2 rad/s, with the nose up: 0.3 s before the newest sample."""
+    filter_, before = HeadingFilter(gyro(), PLAIN, 1e-6), matrix_from_yaw_pitch_roll(0.0, -0.3, 0.0)
+    for k in range(2 * RATE_HZ + 1):
+        rate, force = np.array([0.2, 0.0, 0.0]), before.T @ [0.0, 0.0, G]
+        filter_.propagate([ImuSample(time_stamp_s=k / RATE_HZ, angular_rate_rad_s=rate, specific_force_m_s2=force)])
+    for ago_s in (0.0, 0.3):
+        then = matrix_from_yaw_pitch_roll(0.0, -0.3, 0.2 * (2.0 - ago_s))
+        np.testing.assert_allclose(filter_.R_LB_at(2.0 - ago_s), then, atol=1e-9)
+
+
 @pytest.mark.parametrize("first", [np.zeros(3), np.full(3, np.nan)])
 def test_accelerometers_that_begin_late_and_miss_samples_level_as_soon(first):
     """The first says nothing, later every second does not either: up is known 4 s after the first that does."""
@@ -159,6 +206,34 @@ def test_accelerometers_that_begin_late_and_miss_samples_level_as_soon(first):
         filter_.propagate([ImuSample(time_stamp_s=k / RATE_HZ, angular_rate_rad_s=NONE, specific_force_m_s2=force)])
     assert filter_.is_level
     np.testing.assert_allclose(filter_.R_LB, np.eye(3), atol=1e-9)
+
+
+def test_accelerometers_that_fail_in_flight_leave_the_attitude_as_it_is():
+    filter_ = HeadingFilter(gyro(), PLAIN, V)
+    for k in range(10 * RATE_HZ):
+        force = np.array([0.0, 0.0, G if k == 0 else 0.0])
+        filter_.propagate([ImuSample(time_stamp_s=k / RATE_HZ, angular_rate_rad_s=NONE, specific_force_m_s2=force)])
+    np.testing.assert_array_equal(filter_.R_LB, np.eye(3))
+    assert not filter_.is_level and np.isfinite(filter_.sigma_rad)
+
+
+@pytest.mark.parametrize(("sigmas", "believed"), [(4.9, True), (-4.9, True), (5.1, False), (-5.1, False)])
+def test_a_turn_is_believed_up_to_five_sigmas_of_what_it_may_be_off_by(sigmas, believed):
+    """Pairs of frames so bad that nothing else counts: sigma is q sqrt(dt)."""
+    settings = HeadingFilterSettings(walk_rad_rts=0.05)
+    filter_ = HeadingFilter(gyro(1e-9), PLAIN, V, settings)
+    turn = Turn(3.0, STRAIGHT)
+    filter_.propagate(turn.samples()[: RATE_HZ + 1])
+    filter_.see(1.0, None)
+    filter_.propagate(turn.samples()[RATE_HZ + 1 :])
+    assert filter_.see(3.0, sigmas * 0.05 * np.sqrt(2.0)) == believed
+
+
+def test_gyros_are_refused_from_the_bias_on_that_may_seem_to_be_the_largest_tilt():
+    limit_deg_s = HeadingFilterSettings().largest_tilt_rad * G / V / DEGREE
+    HeadingFilter(gyro(0.99 * limit_deg_s), PLAIN, V)
+    with pytest.raises(DockairError, match=r"heading\.gyro"):
+        HeadingFilter(gyro(1.01 * limit_deg_s), PLAIN, V)
 
 
 def test_without_frames_such_a_gyro_is_lost():
@@ -274,10 +349,11 @@ def test_samples_without_numbers_out_of_order_or_gone_do_little(wrong):
     assert filters[1].heading_rad == pytest.approx(filters[0].heading_rad, abs=0.02 * DEGREE)
 
 
-def test_after_a_long_gap_it_is_lost():
-    filter_, samples = HeadingFilter(gyro(), PLAIN, V), Turn(20.0).samples()
-    filter_.propagate(samples[:100] + samples[100 + round(0.6 * RATE_HZ) :])
-    assert filter_.is_lost
+@pytest.mark.parametrize(("gap_s", "lost"), [(0.45, False), (0.55, True)])
+def test_after_a_long_gap_it_is_lost(gap_s, lost):
+    filter_, samples = HeadingFilter(gyro(), PLAIN, V), Turn(10.0).samples()
+    filter_.propagate(samples[:101] + samples[100 + round(gap_s * RATE_HZ) :])
+    assert filter_.is_lost is lost
 
 
 def test_it_begins_with_the_first_sample_that_has_accelerations():

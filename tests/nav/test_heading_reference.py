@@ -100,6 +100,81 @@ def test_in_a_coordinated_turn_an_error_of_bank_enters_by_its_square(wrong_deg):
     assert rate / TURN_RAD_S - 1.0 == pytest.approx(-0.5 * (wrong_deg * DEGREE) ** 2, rel=1e-3)
 
 
+def test_the_bias_across_the_vertical_is_what_the_attitude_s_own_steps_do_not_explain():
+    """Eq. (2) at once, T being the first step's time, while roll, pitch and heading all move."""
+    rng, dt = np.random.default_rng(2), 1e-3
+    for _ in range(20):
+        angles, rates = rng.uniform([-3.0, -0.5, -1.0], [3.0, 0.5, 1.0]), rng.normal(size=3)
+        before, after = (matrix_from_yaw_pitch_roll(*(angles + t * rates)) for t in (0.0, dt))
+        bias, levelling = 0.1 * rng.normal(size=3), Levelling(60.0)
+        w_B = log(before.T @ after) / dt + bias
+        for stamp_s, R in ((0.0, before), (dt, after)):
+            levelling.heading_rate_rad_s(w_B, without_yaw(R))
+            levelling.average(stamp_s, without_yaw(R), 0.0, 100.0)
+        left = without_yaw(after) @ (bias - levelling.bias_B)
+        x = without_yaw(after)[:, 0]
+        # what is left of the bias is about the vertical, and what of it the heading's rate takes for turning
+        np.testing.assert_allclose(left[:2], 0.0, atol=5e-3)
+        across = without_yaw(after) @ bias
+        assert left[2] == pytest.approx(across[2] - across[0] * x[2] / x[0], abs=5e-3)
+
+
+def levelled_at_rest(levelling, steps, rate_B, first=0, correction_rad_s=0.0):
+    """Steps of 1 s with level attitude; the bias afterwards."""
+    for k in range(first, first + steps):
+        levelling.heading_rate_rad_s(np.asarray(rate_B), np.eye(3))
+        levelling.average(float(k), np.eye(3), correction_rad_s, 0.1)
+    return levelling.bias_B
+
+
+def test_a_later_change_of_the_bias_counts_by_its_step_over_the_longest_time():
+    levelling = Levelling(20.0)
+    assert (levelled_at_rest(levelling, 60, np.zeros(3)) == 0.0).all()
+    np.testing.assert_allclose(levelled_at_rest(levelling, 1, [0.02, -0.04, 0.0], 60), [0.001, -0.002, 0.0], rtol=1e-9)
+
+
+@pytest.mark.parametrize(("turn", "correction", "learns"), [(0.2, 0.0, False), (0.2, -0.15, True), (0.0, 0.2, False)])
+def test_in_a_turn_as_corrected_levelling_rests(turn, correction, learns):
+    bias = levelled_at_rest(Levelling(20.0), 5, [0.02, 0.0, turn], 0, correction)
+    np.testing.assert_allclose(bias, [0.02 * learns, 0.0, 0.0], atol=1e-12)
+
+
+@pytest.mark.parametrize(("fewest", "ends_s"), [(2, 22.0), (7, 24.0)])
+def test_an_alignment_begins_anew_at_a_refused_frame_and_ends_by_time_and_by_frames(fewest, ends_s):
+    """Frames every 2 s, that at 10 s refused, alignment of 12 s; the stamps begin at 100 s."""
+    eyes = Eyes(lambda stamp_s: 0.0)
+    settings = HeadingSettings(align_s=12.0, fewest_aligned=fewest)
+    reference = HeadingReference(Camera(), MOUNTING, RATE_HZ, settings, 1.0, eyes)
+    ended = []
+    for k in range(1, round(26.0 * RATE_HZ)):
+        t = k / RATE_HZ
+        eyes.refuses = t == 10.0
+        sample = ImuSample(time_stamp_s=100.0 + t, angular_rate_rad_s=np.array([0.0, 0.0, 5.0 * DEGREE]))
+        frame = _frame(100.0 + t) if k % round(2.0 * RATE_HZ) == 0 else None
+        solution = reference.step([sample], np.eye(3), frame)
+        if solution.status is not HeadingStatus.ALIGNING and not ended:
+            ended.append(t)
+            assert solution.heading_rad == pytest.approx(1.0, abs=0.01 * DEGREE)  # from the first sample on
+    assert ended == [ends_s]
+
+
+def test_a_visual_heading_waits_for_the_next_sample_as_it_will_be_there():
+    """A turn of 0.1 rad/s, a bias of 0.02 rad/s that is corrected, frames 0.4 s late; a refused one leaves nothing."""
+    eyes = Eyes(lambda stamp_s: 0.1 * stamp_s)
+    reference = HeadingReference(Camera(), MOUNTING, RATE_HZ, HeadingSettings(align_s=0.0), 0.0, eyes)
+    reference._vdr._hdr.correction_rad_s = -0.02
+    for k in range(1, 101):
+        sample = ImuSample(time_stamp_s=k / RATE_HZ, angular_rate_rad_s=np.array([0.0, 0.0, 0.12]))
+        reference.step([sample], np.eye(3))
+        reference._vdr._hdr.correction_rad_s = -0.02
+    for stamp_s in (3.2, 3.6):
+        assert reference.step([], np.eye(3), _frame(stamp_s)).turn is TurnStatus.MEASURED
+        assert reference._pending_rad == pytest.approx(0.1 * (4.0 + 1.0 / RATE_HZ), abs=1e-9)
+    reference._pending_rad, eyes.refuses = None, True
+    reference.step([], np.eye(3), _frame(3.9))
+    assert reference._pending_rad is None
+
+
 def test_a_gyro_off_by_five_degrees_a_second_on_all_axes_is_aligned_and_keeps_the_heading_through_a_turn(flight):
     headings, statuses, reference = flight.fly()
     errors = headings - flight.heading[1:]

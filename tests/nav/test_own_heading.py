@@ -73,6 +73,14 @@ def test_one_camera_period_in_two_seconds_is_asked_for():
     assert asked[0] == 500e-6
 
 
+@pytest.mark.parametrize("first", range(12))
+def test_rounding_of_the_time_asks_for_no_third_tick(first):
+    """0.07 + 0.02 is more than 0.09 in double precision."""
+    heading = levelled()
+    asked = [heading.ask(0.01 * k) for k in range(first, first + 6)]
+    assert np.flatnonzero(np.isfinite(asked)).tolist() == [0, 1]
+
+
 def test_leds_are_left_a_frame():
     """Of a camera of 2 Hz each frame would be asked for every 0.5 s, and the drogue never seen."""
     slow = replace(SHEETS, camera_rate_hz=2)
@@ -109,6 +117,37 @@ def test_features_lie_below_the_level_and_off_drogue_and_probe():
     on_probe_C = mounting.R_BC.T @ (mounting.p_BP - [0.8, 0.0, 0.0] - mounting.p_BC)
     column, row = CAMERA.pixels_from_points(on_probe_C)[0]
     assert row > 560 and not mask[round(row), round(column)]
+
+
+def test_a_mask_of_a_camera_that_is_mounted_askew_is_that_of_the_body_s_level_and_probe():
+    """The camera is banked by 20 degrees and stands above the probe, whose axis is the body's x."""
+    R_BC = matrix_from_yaw_pitch_roll(0.1, 0.05, 0.35)
+    mounting = Mounting(R_BC=R_BC, p_BC=np.array([3.3, -0.9, 0.75]), p_BP=SHEETS.mounting.p_BP)
+    heading = OwnHeading(replace(SHEETS, mounting=mounting), SETTINGS)
+    mask, R_LB = heading._mask(np.eye(3), -DROGUE_C), np.eye(3)
+    corners = np.array([[100.0, 100.0], [100.0, 900.0], [1900.0, 100.0], [700.0, 60.0], [1000.0, 300.0]])
+    below = (CAMERA.rays_from_pixels(corners) @ (R_LB @ R_BC).T)[:, 2] < 0.0
+    assert 0 < below.sum() < len(below)
+    np.testing.assert_array_equal(mask[tuple(corners.astype(int).T[::-1])], below)
+    behind_m = np.linspace(0.0, 1.6, 9)
+    probe_C = (mounting.p_BP - np.outer(behind_m, [1.0, 0.0, 0.0]) - mounting.p_BC) @ R_BC
+    pixels = np.round(CAMERA.pixels_from_points(probe_C)).astype(int)
+    inside = ((pixels >= 0) & (pixels < [CAMERA.width_px, CAMERA.height_px])).all(axis=1)
+    assert inside.sum() >= 5
+    assert not mask[tuple(pixels[inside].T[::-1])].any()
+
+
+def test_pictures_of_before_are_tilted_in_axes_of_the_visual_heading_s_own_zero(monkeypatch):
+    """Filter and vision count their headings from different moments; a tilt is told along the heading at the frame."""
+    told, tilt = [], np.array([0.1, -0.05, 0.0])
+    heading = levelled()
+    heading._visual.heading_rad = 2.0
+    monkeypatch.setattr(heading._filter, "tilt_L", lambda: tilt)
+    monkeypatch.setattr(heading._filter, "predicted_turn_rad", lambda stamp_s: 0.3)
+    monkeypatch.setattr(VisualHeading, "tilt", lambda self, theta, R_BC: told.append(theta))
+    heading.step([], frame(500e-6, stamp_s=0.0), DROGUE_C)
+    c, s = np.cos(2.3), np.sin(2.3)
+    np.testing.assert_allclose(told, [[0.1 * c + 0.05 * s, 0.1 * s - 0.05 * c, 0.0]], atol=1e-12)
 
 
 def test_a_drogue_believed_far_out_of_view_masks_nothing():
