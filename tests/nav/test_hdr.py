@@ -44,6 +44,14 @@ def test_a_turn_above_the_switch_is_left_alone(loop):
     assert hdr.correction_rad_s == 0.0
 
 
+def test_the_closed_loop_gives_the_raw_rate_and_its_correction_whose_low_pass_drives_it():
+    """0.1 rad/s corrected by -0.3: what comes out is -0.2 at once, without lag, so that the correction shrinks."""
+    hdr = HeuristicDriftReduction(RATE_HZ, HeuristicDriftSettings(loop="closed", step_rad_s=1e-6))
+    hdr.correction_rad_s = -0.3
+    np.testing.assert_allclose(hdr.run(np.full(10, 0.1)), -0.2, atol=1e-5)
+    assert hdr.correction_rad_s > -0.3
+
+
 @pytest.mark.parametrize("loop", ["printed", "closed"])
 def test_stepping_gives_the_record_s_bits_and_left_is_right_mirrored(loop):
     rates = straight_rates_rad_s(3, noise_deg_s=0.2)

@@ -7,7 +7,7 @@ import pytest
 
 from dockair.calibration import Camera
 from dockair.nav.heading.features import Features
-from dockair.nav.heading.turn import HeadingLine, TurnStatus, VisualSettings, turn_between
+from dockair.nav.heading.turn import HeadingLine, TurnStatus, VisualSettings, _shared, turn_between
 from dockair.nav.heading.visual import VisualHeading
 from dockair.rotations import matrix_from_yaw_pitch_roll
 
@@ -50,6 +50,7 @@ def test_the_way_over_ground_takes_nothing_of_the_turn(turn_deg, left_m):
     turn = turn_between(one, two, CAMERA, AIRCRAFT)
     assert turn.status is TurnStatus.MEASURED
     assert turn.turn_rad == pytest.approx(turn_deg * DEGREE, abs=0.01 * DEGREE)
+    assert turn.shift_px == pytest.approx(CAMERA.focal_length_px * turn.turn_rad)
 
 
 def test_without_the_model_of_the_ground_the_same_images_are_off_by_more():
@@ -70,6 +71,59 @@ def test_sigma_of_the_turn_over_ground_is_its_scatter():
         turns.append(turn_between(*noisy, CAMERA, AIRCRAFT))
     scatter, sigma = np.std([t.turn_rad for t in turns]), np.mean([t.sigma_rad for t in turns])
     assert 0.75 < scatter / sigma < 1.25
+
+
+def test_the_way_sideways_alone_has_a_prior():
+    """Where it is known there is none, the turn is surer; the way forward is 0.07 of the height, and free."""
+    one, two = _over_ground(forward_m=360.0, left_m=0.0, noise_px=0.2)
+    known, free = (turn_between(one, two, CAMERA, replace(AIRCRAFT, sideways=s)) for s in (1e-6, 1e3))
+    assert known.turn_rad == pytest.approx(TURN, abs=0.02 * DEGREE)
+    assert known.sigma_rad < 0.7 * free.sigma_rad
+
+
+def test_what_stands_above_the_level_stays_and_shares_the_turn():
+    """Clouds at any height beside the ground: all of them turn alike, and none is left out."""
+    one, two = _over_ground(forward_m=360.0, left_m=0.0)
+    rng, level = np.random.default_rng(8), one.R_HC
+    azimuth, elevation = rng.uniform(-12.0, 12.0, 60) * DEGREE, rng.uniform(1.0, 5.0, 60) * DEGREE
+    clouds = np.column_stack([np.cos(azimuth), np.sin(azimuth), np.tan(elevation)])
+    both = []
+    for features, sign in ((one, -0.5), (two, 0.5)):
+        pixels = CAMERA.pixels_from_points(clouds @ matrix_from_yaw_pitch_roll(sign * TURN, 0.0, 0.0) @ level)
+        more = _features(pixels, np.arange(1000, 1060))
+        both.append(
+            replace(
+                features,
+                pixels=np.vstack([features.pixels, more.pixels]),
+                descriptors=np.vstack([features.descriptors, more.descriptors]),
+            )
+        )
+    turn = turn_between(*both, CAMERA, AIRCRAFT)
+    assert turn.turn_rad == pytest.approx(TURN, abs=0.01 * DEGREE)
+    assert len(turn.pixels[0]) == turn.matches == len(both[0].pixels)
+
+
+def test_of_a_plain_mean_those_within_three_robust_sigmas_count_and_sigma_is_the_mean_s():
+    """Alternating +-1, whose robust sigma is 1.4826: 4.3 is within three of these, 4.6 is not."""
+    values = np.concatenate([np.tile([1.0, -1.0], 20), [4.3, -4.3, 4.6, -4.6]])
+    inside, mean, sigma = _shared(np.ones((44, 1)), values, 0.1, np.zeros((1, 1)))
+    np.testing.assert_array_equal(inside, np.abs(values) < 4.5)
+    assert mean == pytest.approx(0.0, abs=1e-12)
+    assert sigma == pytest.approx(np.sqrt((40.0 + 2.0 * 4.3**2) / 41.0 / 42.0), rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("share_it", "others", "least_share", "status"),
+    [(10, 4, 0.35, TurnStatus.DISAGREE), (12, 4, 0.35, TurnStatus.MEASURED), (28, 12, 0.72, TurnStatus.DISAGREE),
+     (28, 12, 0.68, TurnStatus.MEASURED)],
+)  # fmt: skip
+def test_matches_disagree_where_too_few_or_too_small_a_share_have_one_shift(share_it, others, least_share, status):
+    numbers = np.arange(share_it + others)
+    far = np.where(numbers < share_it, 0.0, 100.0 + 40.0 * numbers)
+    images = [(PLACES[numbers], numbers), (PLACES[numbers] + SHIFT + far[:, None] * [1.0, 0.0], numbers)]
+    settings = VisualSettings(spreads=False, least_share=least_share)
+    turn = turn_between(*(_features(*image) for image in images), LINE, settings)
+    assert turn.status is status and turn.matches == len(numbers)
 
 
 def test_a_turn_whose_sigma_is_too_large_is_refused():

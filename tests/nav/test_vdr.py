@@ -125,6 +125,42 @@ def test_after_a_turn_the_correction_of_its_beginning_or_end_is_kept_that_vision
     assert vdr.correction_rad_s == kept_rad_s
 
 
+def test_the_switch_closes_after_its_time_and_opens_when_vision_is_too_old():
+    """Theta is 1 s, 100 samples of one sign; the last visual heading comes with sample 150 of the run."""
+    vdr = VisionDriftReduction(RATE_HZ, VisionDriftSettings(turn_after_s=1.0, oldest_visual_s=2.0))
+    vdr._hdr = Heuristic(0.0)
+    vdr.step(-0.1, 7.0)
+    turning = []
+    for k in range(1, 501):
+        vdr.step(0.1, 7.0 + 0.1 * k / RATE_HZ if k <= 150 else None)
+        turning.append(vdr.is_turning)
+    closed = 1 + np.flatnonzero(turning)
+    assert closed[0] == 100 and abs(closed[-1] - 350) <= 1  # 200 periods of 0.01 s, added up
+    assert len(closed) == closed[-1] - 99
+
+
+def test_what_the_heading_is_behind_it_makes_good_at_the_rate_allowed():
+    """Vision turns by 0.5 rad more; the gyro goes on with the correction of the turn's beginning."""
+    settings = VisionDriftSettings(turn_after_s=1.0, correction_rate_rad_s=0.2, visual_share=1.0)
+    vdr = VisionDriftReduction(RATE_HZ, settings)
+    vdr._hdr = Heuristic(0.01)
+    vdr.step(-0.1, 0.0)
+    headings = []
+    for k in range(1, 201):
+        headings.append(vdr.step(0.1, 0.5 + 0.1 * k / RATE_HZ))
+        vdr._hdr.correction_rad_s = -0.04
+    steps = RATE_HZ * np.diff(headings)
+    np.testing.assert_allclose(steps[:98], 0.1 - 0.04, atol=1e-9)
+    np.testing.assert_allclose(steps[98:], 0.1 + 0.01 + 0.2, atol=1e-9)
+
+
+def test_from_where_vision_counts_does_not_matter():
+    rates, true = oval_rates_rad_s(3, noise_deg_s=0.1)
+    visual = {k: heading for k, heading in _visual(true, 1.0, 0.3, 3).items() if k < 4000}
+    moved = {k: 5.0 + heading for k, heading in visual.items()}
+    np.testing.assert_allclose(_fly(rates[:4000], moved)[0], _fly(rates[:4000], visual)[0], atol=1e-9)
+
+
 @pytest.mark.parametrize("share", [0.1, 0.5, 1.0])
 def test_of_a_new_visual_heading_its_share_is_taken(share):
     """0.4 rad farther in the middle of a turn, nothing between the two: what differs is the share of that."""
