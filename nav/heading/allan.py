@@ -104,8 +104,8 @@ def identify_gyro_noise(
     """
     if not terms or set(terms) - set("QNBK") or len(set(terms)) < len(terms):
         raise DockairError("terms", expected="letters of the terms, each once", got=terms, exists=tuple("QNBK"))
-    if bias_correlation_s is not None and not bias_correlation_s > 0.0:
-        raise DockairError("bias_correlation_s", expected="a time > 0", got=bias_correlation_s)
+    if bias_correlation_s is not None and not 0.0 < bias_correlation_s < _LARGEST:
+        raise DockairError("bias_correlation_s", expected=f"a time > 0, below {_LARGEST:g} s", got=bias_correlation_s)
     curve = allan_deviation(rates_rad_s, sample_rate_hz)
     if not np.ptp(np.asarray(rates_rad_s, dtype=float), axis=0).all():
         raise DockairError("rates", expected="records of gyros that are on", got="one whose samples are all alike")

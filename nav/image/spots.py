@@ -68,7 +68,7 @@ class Spots:
     """The spots of a frame, in raster order of their first pixel."""
 
     runs: Runs  #: their pixels
-    threshold_dn: NDArray[np.int64]  #: (n,) t of Eq. (2): the pixels are above
+    threshold_dn: NDArray[np.int64]  #: (n,) t of Eq. (3): the pixels are above
     background_dn: Array  #: (n,) b
 
 

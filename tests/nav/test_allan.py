@@ -133,6 +133,8 @@ def test_a_bias_without_white_noise_is_found_at_averaging_times_far_below_its_ow
         ("taus_s", lambda: allan_deviation(NBS14, 1.0, [0.1])),
         ("terms", lambda: identify_gyro_noise(NBS14, 1.0, terms="NX")),
         ("bias_correlation_s", lambda: identify_gyro_noise(NBS14, 1.0, bias_correlation_s=-1.0)),
+        ("bias_correlation_s", lambda: identify_gyro_noise(NBS14, 1.0, bias_correlation_s=np.inf)),
+        ("bias_correlation_s", lambda: identify_gyro_noise(NBS14, 1.0, bias_correlation_s=1e300)),
     ],
 )
 def test_what_cannot_be_is_refused_by_name(where, make):
