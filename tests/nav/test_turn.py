@@ -141,13 +141,13 @@ SHIFT = np.array([1000.0 * DEGREE, 0.0])  # of a degree
 
 
 def _seen_heading(monkeypatch, images):
-    """Heading after three images (pixels, numbers), and the key frames."""
+    """Heading after images (pixels, numbers), the key frames, and the last turn; the gyro says 0.05 rad an image."""
     features = iter([_features(*image) for image in images])
     monkeypatch.setattr("dockair.nav.heading.visual.features_of", lambda *_: next(features))
     visual = VisualHeading(LINE, VisualSettings(spreads=False))
-    for _ in range(3):
-        visual.step(np.zeros((16, 16), np.uint8))
-    return visual.heading_rad, visual.key_frames
+    for _ in images:
+        turn = visual.step(np.zeros((16, 16), np.uint8), predicted_turn_rad=0.05)
+    return visual.heading_rad, visual.key_frames, turn
 
 
 def test_an_image_that_shares_nothing_with_the_key_frame_is_measured_from_the_one_before(monkeypatch):
@@ -167,6 +167,22 @@ def test_an_image_misled_against_the_key_frame_is_mended_by_the_one_before(monke
     images = [(PLACES[numbers[0]], numbers[0]), (PLACES[numbers[1]] + SHIFT, numbers[1]), (third, numbers[2])]
     alone = turn_between(_features(*images[0]), _features(*images[2]), LINE, VisualSettings(spreads=False))
     assert alone.turn_rad == pytest.approx(2.0 * DEGREE + 0.03, abs=1e-6)
-    heading, key_frames = _seen_heading(monkeypatch, images)
+    heading, key_frames, turn = _seen_heading(monkeypatch, images)
     assert heading == pytest.approx(2.0 * DEGREE + 0.03 * 21.6 / 161.6, abs=1e-6)
     assert key_frames == 1
+    assert turn.turn_rad == heading  # from the key frame, as both pairs have it
+
+
+@pytest.mark.parametrize(("shared", "key_frames"), [(39, 2), (40, 1)])
+def test_an_image_that_shares_too_little_with_the_key_frame_takes_its_place(monkeypatch, shared, key_frames):
+    """Though it has turned by a degree alone."""
+    numbers = np.arange(100), np.arange(100 - shared, 200 - shared)
+    images = [(PLACES[numbers[0]], numbers[0]), (PLACES[numbers[1]] + SHIFT, numbers[1])]
+    assert _seen_heading(monkeypatch, images)[:2] == (pytest.approx(DEGREE, abs=1e-6), key_frames)
+
+
+def test_after_a_refused_image_the_next_is_measured_from_that_one(monkeypatch):
+    numbers = np.arange(100), np.arange(100, 200), np.arange(100, 200)
+    images = [(PLACES[n] + k * SHIFT, n) for k, n in enumerate(numbers)]
+    heading, key_frames, _ = _seen_heading(monkeypatch, images)
+    assert heading == pytest.approx(0.05 + DEGREE, abs=1e-6) and key_frames == 2
