@@ -120,6 +120,42 @@ def _merged(image, u, v, R):
     return max(0.0, longer - shorter - 1.5 * noise - 0.07 * (longer + shorter))
 
 
+def test_what_the_background_varies_by_beyond_noise_and_the_lens_s_rings_counts_twice():
+    """Levels 18 and 22 by turns: s_t^2 = 2 (4 - (0.02 x 20 + 0.4^2) - (0.01 x 100)^2) in Eqs. (2) and (3)."""
+    rows, columns = np.indices((21, 21))
+    image = (20 + 2 * (-1) ** (rows + columns)).astype(np.uint8)
+    image[9:12, 9:12] = [[50, 80, 60], [70, 120, 90], [50, 60, 50]]
+    blob = measure_blobs(image, foreground_runs(image, 40), 40, NOISE, background_dn=0.0)
+    near = np.maximum(abs(rows - 10), abs(columns - 10)) <= 2
+    w, own = near * (image - 20.0), 0.02 * 20.0 + 0.4**2
+    texture = 2.0 * (4.0 - own - 1.0)
+    s2 = 0.02 * image + 0.4**2 + texture
+    variances = []
+    for x, centre in zip((columns, rows), blob.centroids_px[0], strict=True):
+        assert centre == pytest.approx((w * x).sum() / w.sum(), abs=1e-12)
+        off = near * (x - centre)
+        variances.append(((off**2 * s2).sum() + (own + texture) / 56 * off.sum() ** 2) / w.sum() ** 2)
+    assert blob.sigma_px[0] == pytest.approx(np.sqrt(max(variances)), rel=1e-9)
+
+
+def test_the_window_of_two_pixels_is_as_wide_as_that_of_the_least_spot():
+    """R = 1.9 px, not 1.9 equivalent radii, which are 1.5 px: Eq. (4) of two levels by hand."""
+    image = np.zeros((9, 21), np.uint8)
+    image[4, 10], image[4, 11] = 100, 50
+    blob = measure_blobs(image, foreground_runs(image, 20), 20, NOISE, background_dn=0.0, windowed=True)
+    d = np.array([10.0, 11.0]) - blob.centroids_px[0, 0]
+    assert ((1.0 - d**2 / 1.9**2) ** 2 * [100.0, 50.0] * d).sum() == pytest.approx(0.0, abs=1e-6)
+
+
+@pytest.mark.parametrize(("columns", "background"), [(7, 7.0), (8, 10.0)])
+def test_fewer_than_twelve_pixels_around_a_blob_say_less_of_the_background_than_the_frame(columns, background):
+    """A blob of 3 x 3 pixels and what touches it fill 25; of 5 rows of 7 or 8 columns are left 10 or 15."""
+    image = np.full((5, columns), 10, np.uint8)
+    image[1:4, 2:5] = 100
+    blob = measure_blobs(image, foreground_runs(image, 50), 50, NOISE, background_dn=7.0)
+    assert blob.flux[0] == pytest.approx((image[:, 1:6] - background).sum())
+
+
 def test_structure_around_a_merged_spot_does_not_take_its_doubt_away():
     """Beside canopy the background varies; that is no noise of the moments, and Eq. (6) has to see past it."""
     rows, columns = np.indices((21, 21))

@@ -166,6 +166,29 @@ def test_a_spot_s_threshold_is_reported_and_lies_between_background_and_peak(ren
     assert detect(np.zeros((9, 9), np.uint8)).threshold_dn == -1
 
 
+@pytest.mark.parametrize("local_background", [True, False])
+def test_what_is_dropped_for_its_area_changes_nothing_of_what_is_said_of_others(local_background):
+    """A disc of 69 pixels before a spot on a brighter background, where 40 pixels are allowed."""
+    settings = DetectSettings(max_area_px=40, local_background=local_background)
+    rows, columns = np.indices((60, 120))
+    spot = 40.0 + 90.0 * np.exp(-((columns - 95.3) ** 2 + (rows - 40.2) ** 2) / (2 * 0.7**2))
+    alone = np.rint(np.where(columns < 60, 5.0, spot)).astype(np.uint8)
+    beside = np.where(np.hypot(columns - 25, rows - 15) <= 4.6, 255, alone).astype(np.uint8)
+    assert len(detect(beside)) == 2
+    one, other = detect(alone, settings), detect(beside, settings)
+    assert len(one) == len(other) == 1
+    for field in ("centroids_px", "area_px", "peak", "sigma_px", "clipped", "flux", "thresholds_dn", "threshold_dn"):
+        np.testing.assert_array_equal(getattr(other, field), getattr(one, field))
+
+
+@pytest.mark.parametrize(("dtype", "clipped"), [(np.uint8, True), (np.uint16, False)])
+def test_a_pixel_is_clipped_at_the_largest_level_of_its_own_word(dtype, clipped):
+    rows, columns = np.indices((40, 40))
+    image = np.rint(5.0 + 250.0 * np.exp(-((columns - 20) ** 2 + (rows - 20) ** 2) / (2 * 0.7**2))).astype(dtype)
+    assert image.max() == 255
+    assert detect(image).clipped.tolist() == [clipped]
+
+
 def test_gaps_in_cloud_are_dropped_by_their_softness_and_an_led_before_them_is_kept():
     """Gaussians of sigma 1.8 px: flux over peak is 2 pi sigma^2 = 20 pixels, where 7 are allowed."""
     rng = np.random.default_rng(18)
