@@ -158,6 +158,36 @@ def test_an_alignment_begins_anew_at_a_refused_frame_and_ends_by_time_and_by_fra
     assert ended == [ends_s]
 
 
+def test_gyros_and_camera_that_are_mounted_askew_are_read_in_body_axes_and_a_frame_in_its_own_attitude():
+    """The yaw of what is given as roll and pitch is ignored."""
+    given = []
+
+    class Asked(Eyes):
+        def step(self, image, *, R_HC=None, **keys):
+            given.append(R_HC)
+            return super().step(image, R_HC=R_HC, **keys)
+
+    R_BI, R_BC = matrix_from_yaw_pitch_roll(0.4, -0.3, 0.2), matrix_from_yaw_pitch_roll(-0.1, 0.2, 0.5)
+    mounting = Mounting(R_BC=R_BC, p_BC=np.zeros(3), p_BP=np.zeros(3), R_BI=R_BI)
+    settings = HeadingSettings(align_s=0.0)
+    reference = HeadingReference(Camera(), mounting, RATE_HZ, settings, 0.0, Asked(lambda stamp_s: 0.0))
+    now, then = (matrix_from_yaw_pitch_roll(0.7, *angles) for angles in ((0.0, 0.3), (-0.1, -0.2)))
+    for k in range(1, 26):
+        w_I = R_BI.T @ now.T @ [0.0, 0.0, 0.1]
+        sample = ImuSample(time_stamp_s=k / RATE_HZ, angular_rate_rad_s=w_I)
+        frame = _frame(0.9) if k == 25 else None
+        solution = reference.step([sample], now, frame, frame_R_LB=then)
+    assert solution.heading_rad == pytest.approx(0.1, rel=1e-3)
+    np.testing.assert_allclose(given, [without_yaw(then) @ R_BC], atol=1e-12)
+
+
+@pytest.mark.parametrize(("missing", "lost"), [(12, False), (13, True)])
+def test_half_a_second_of_missing_samples_is_the_longest_gap(missing, lost):
+    reference = HeadingReference(Camera(), MOUNTING, RATE_HZ, HeadingSettings(align_s=0.0))
+    solution = reference.step(_samples(100, gone=range(40, 40 + missing)), np.eye(3))
+    assert (solution.status is HeadingStatus.LOST) == lost
+
+
 def test_a_visual_heading_waits_for_the_next_sample_as_it_will_be_there():
     """A turn of 0.1 rad/s, a bias of 0.02 rad/s that is corrected, frames 0.4 s late; a refused one leaves nothing."""
     eyes = Eyes(lambda stamp_s: 0.1 * stamp_s)
