@@ -223,8 +223,9 @@ def read_messages(out_dir: str | Path, *, pixels: bool = True) -> Iterator[TickM
     Raises:
         DockairError: nothing was recorded there, or what is there is damaged.
     """
+    path = Path(out_dir) / MESSAGES
     for row in _rows(Path(out_dir), MESSAGES, set(_MESSAGE_SCHEMA.names) - _LATER_COLUMNS):
-        yield _tick_from_row(row, pixels)
+        yield _tick_from_row(row, pixels, path)
 
 
 def _rows(out_dir: Path, name: str, needed: set[str]) -> Iterator[dict[str, Any]]:
@@ -239,7 +240,7 @@ def _rows(out_dir: Path, name: str, needed: set[str]) -> Iterator[dict[str, Any]
         raise DockairError(str(path), expected=expected, got=str(error).partition("\n")[0]) from None
 
 
-def _tick_from_row(row: dict[str, Any], pixels: bool) -> TickMessages:
+def _tick_from_row(row: dict[str, Any], pixels: bool, path: Path) -> TickMessages:
     rates = np.array(row["gyro_angular_rate_rad_s"], dtype=np.float64).reshape(-1, 3)
     forces = np.array(row["accelerometer_specific_force_m_s2"], dtype=np.float64).reshape(-1, 3)
     imu = tuple(
@@ -255,7 +256,7 @@ def _tick_from_row(row: dict[str, Any], pixels: bool) -> TickMessages:
     window = Window(*(row[name] for name in _WINDOW_COLUMNS))
     frame = CameraFrame(
         time_stamp_s=row["frame_time_stamp_s"],
-        pixels=pixels_from_png(png) if pixels else np.empty((0, 0), np.uint8),
+        pixels=pixels_from_png(png, path) if pixels else np.empty((0, 0), np.uint8),
         window=window,
         exposure_s=row["exposure_s"],
         gain=row["gain"],
@@ -271,15 +272,19 @@ def png_from_pixels(pixels: NDArray[np.uint8]) -> bytes:
     return png.tobytes()
 
 
-def pixels_from_png(png: bytes) -> NDArray[np.uint8]:
+def pixels_from_png(png: bytes, path: str | Path = MESSAGES) -> NDArray[np.uint8]:
     """(rows, columns) pixels of a stored frame.
+
+    Args:
+        png: the frame.
+        path: where it is stored.
 
     Raises:
         DockairError: the frame is damaged.
     """
     pixels = cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_UNCHANGED) if png else None
     if pixels is None:
-        raise DockairError(MESSAGES, expected="frames as a flight records them", got="a PNG that cannot be decoded")
+        raise DockairError(str(path), expected="frames as a flight records them", got="a PNG that cannot be decoded")
     return np.asarray(pixels, dtype=np.uint8)
 
 

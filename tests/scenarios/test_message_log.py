@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import threading
 import time
 from contextlib import suppress
@@ -296,3 +297,13 @@ def test_a_frame_that_is_damaged_is_said_to_be(damage):
     np.testing.assert_array_equal(pixels_from_png(png), np.arange(12).reshape(3, 4))
     with pytest.raises(DockairError, match=r"messages\.parquet: expected frames .* cannot be decoded"):
         pixels_from_png(damage(png))
+
+
+def test_a_damaged_frame_of_a_recording_is_told_with_its_file(hand_made, tmp_path, monkeypatch):
+    _, imu, frame, solution = hand_made.tick(2)
+    monkeypatch.setattr(message_log, "png_from_pixels", lambda pixels: b"no picture")
+    with MessageLog(tmp_path, NavigatorRecipe(class_name="a:B", sheets=hand_made.sheets)) as log:
+        log.append(imu, frame, solution)
+    path = re.escape(str(tmp_path / message_log.MESSAGES))
+    with pytest.raises(DockairError, match=rf"^{path}: expected frames .* cannot be decoded"):
+        list(read_messages(tmp_path))
