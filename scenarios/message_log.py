@@ -235,7 +235,8 @@ def _rows(out_dir: Path, name: str, needed: set[str]) -> Iterator[dict[str, Any]
             if missing := sorted(needed - set(file.schema_arrow.names)):
                 raise DockairError(str(path), expected=expected, got=f"none with the column {missing[0]}")
             for group in range(file.num_row_groups):
-                yield from file.read_row_group(group).to_pylist()
+                # without threads: one that lets go of the file as Python ends aborts the process, and groups are small
+                yield from file.read_row_group(group, use_threads=False).to_pylist()
     except (pa.ArrowException, OSError) as error:  # cut off, or of another kind
         raise DockairError(str(path), expected=expected, got=str(error).partition("\n")[0]) from None
 
