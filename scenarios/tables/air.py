@@ -25,7 +25,7 @@ class Turbulence(Table):
 
     model: Literal["none", "dryden"] = "none"  #: "dryden" as soon as one of the others is given; "none" overrules them
     sigma_m_s: float | None = Field(default=None, ge=0.0, le=15.0)  #: standard deviation of each component of the gusts
-    intensity: Literal["light", "moderate", "severe"] | None = None  #: MIL-F-8785C, at the flight's altitude
+    intensity: Literal["light", "moderate", "severe"] | None = None  #: MIL-F-8785C, at the altitude, from 610 m on
 
     @model_validator(mode="before")
     @classmethod

@@ -36,7 +36,7 @@ def test_a_key_is_told_with_unit_range_default_and_the_comment_beside_it():
         "",
         "light, moderate, severe",
         "none",
-        "MIL-F-8785C, at the flight's altitude",
+        "MIL-F-8785C, at the altitude, from 610 m on",
     )
     assert told("gusts[].at_s") == ("s", "0 to 600", "", "when its front meets the drogue")
     assert told("faults[].stop_s")[:3] == ("s", "above 0", "none")
