@@ -1,9 +1,11 @@
 from collections.abc import Callable
+from functools import lru_cache
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scipy.special import erf
+from scipy.special import erf, ndtr
+from scipy.stats import poisson
 
 from dockair.calibration import Camera, LedRing
 from dockair.rotations import Array, matrix_from_yaw_pitch_roll
@@ -19,10 +21,15 @@ def _render(
     rng: np.random.Generator,
     *,
     sigma_px: float = 0.7,
-    background_e: float = 100.0,
+    background_e: float | Array = 100.0,
 ) -> NDArray[np.uint8]:
     """8-bit frame of pixel-integrated Gaussian spots (u, v, electrons): shot noise, clip, read noise, quantisation."""
-    electrons = np.full(shape, background_e)
+    uneven = isinstance(background_e, np.ndarray)
+    frame, light_e, drawn = np.zeros(shape, np.uint8), np.zeros(shape), np.full(shape, uneven)
+    if not uneven:
+        beside = rng.integers(0, 2**32, shape, dtype=np.uint32)
+        for begins in _levels_begin(background_e):
+            frame += beside >= begins
     reach = int(np.ceil(6.0 * sigma_px)) + 2
     for u, v, total in spots:
         rows = np.arange(max(round(v) - reach, 0), min(round(v) + reach + 1, shape[0]))
@@ -31,9 +38,26 @@ def _render(
             0.5 * (erf((x + 0.5 - c) / (sigma_px * np.sqrt(2.0))) - erf((x - 0.5 - c) / (sigma_px * np.sqrt(2.0))))
             for x, c in ((rows, v), (columns, u))
         ]
-        electrons[np.ix_(rows, columns)] += total * np.outer(*parts)
-    electrons = np.minimum(rng.poisson(electrons), FULL_WELL_E) + READ_NOISE_E * rng.standard_normal(shape)
-    return np.clip(np.rint(electrons * GAIN), 0, 255).astype(np.uint8)
+        light_e[np.ix_(rows, columns)] += total * np.outer(*parts)
+        drawn[np.ix_(rows, columns)] = True
+    received_e = np.broadcast_to(background_e, shape)[drawn] + light_e[drawn]
+    electrons = np.minimum(rng.poisson(received_e), FULL_WELL_E)
+    electrons += READ_NOISE_E * rng.standard_normal(len(electrons))
+    frame[drawn] = np.clip(np.rint(electrons * GAIN), 0, 255)
+    return frame
+
+
+@lru_cache
+def _levels_begin(background_e: float) -> NDArray[np.uint32]:
+    """2^32 times the probability that a pixel without a spot has less than level 1, 2, ...
+
+    By these a draw of the frame's law takes a whole number and no Poisson variate for each of two million pixels.
+    """
+    counts = np.arange(poisson.ppf(1e-13, background_e), poisson.isf(1e-13, background_e) + 1)
+    below_e = (np.arange(255) + 0.5)[:, np.newaxis] / GAIN - np.minimum(counts, FULL_WELL_E)
+    below = ndtr(below_e / READ_NOISE_E) @ poisson.pmf(counts, background_e)
+    begin = np.rint(2.0**32 * below)
+    return begin[begin < 2.0**32].astype(np.uint32)
 
 
 @pytest.fixture(name="render")
