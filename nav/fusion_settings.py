@@ -94,9 +94,8 @@ class FusionSettings:
             raise DockairError("fusion.coupling", expected="one that exists", got=self.coupling, exists=exists)
         exact = [field.name for field in fields(self) if {"sigma", "density", "walk"} & set(field.name.split("_"))]
         exact.remove("held_rate_sigma_rad_s")  # of a rate that is not measured something is always unknown
-        check_numbers("fusion", self, zero=(*exact, "swing_damping", "led_place_share"))
-        if not self.gate_probability < 1.0:
-            raise DockairError("fusion.gate_probability", expected="a number below 1", got=self.gate_probability)
+        none = *exact, "swing_damping", "led_place_share"
+        check_numbers("fusion", self, zero=none, below_one=("gate_probability",))
         if not self.gust_time_s > self.longest_step_s:
             expected = f"a number above longest_step_s = {self.longest_step_s:g}"
             raise DockairError("fusion.gust_time_s", expected=expected, got=self.gust_time_s)

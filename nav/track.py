@@ -77,9 +77,8 @@ class TrackSettings:
 
     def __post_init__(self) -> None:
         still = "process_variance", "acceleration_radii_s2", "roll_acceleration_rad_s2"
-        check_numbers("track", self, zero=(*still, "window_margin_px", "window_margin_radii"))
-        if not self.gate_probability < 1.0:
-            raise DockairError("track.gate_probability", expected="a number below 1", got=self.gate_probability)
+        margins = "window_margin_px", "window_margin_radii"
+        check_numbers("track", self, zero=(*still, *margins), below_one=("gate_probability",))
 
 
 class RingTracker:

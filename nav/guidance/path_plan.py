@@ -27,7 +27,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dockair.errors import DockairError, check_numbers
+from dockair.errors import check_numbers
 from dockair.kernels import njit
 from dockair.rotations import Array
 
@@ -55,10 +55,8 @@ class PlanSettings:
     error_max_m: float = 0.75  # a drogue farther off is gone to, not rushed at
 
     def __post_init__(self) -> None:
-        check_numbers("guidance.predictive.plan", self, zero=("half_way_s", "on_the_way", "kept_back"))
-        if not self.kept_back < 1.0:
-            expected = "a number from 0 on, below 1"
-            raise DockairError("guidance.predictive.plan.kept_back", expected=expected, got=self.kept_back)
+        none = "half_way_s", "on_the_way", "kept_back"
+        check_numbers("guidance.predictive.plan", self, zero=none, below_one=("kept_back",))
 
 
 class PathPlan:

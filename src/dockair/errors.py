@@ -89,6 +89,7 @@ def check_numbers(
     zero: Collection[str] = (),
     signed: Collection[str] = (),
     infinite: Collection[str] = (),
+    below_one: Collection[str] = (),
 ) -> None:
     """Refuse a dataclass with a number in it that is not finite and above 0.
 
@@ -99,6 +100,7 @@ def check_numbers(
         zero: fields that may be 0, too.
         signed: fields that may be any finite number.
         infinite: fields that may be infinite, too.
+        below_one: fields that have to be below 1, too: probabilities and shares.
     """
     for field in fields(settings):
         name, value, types = f"{where}.{field.name}", getattr(settings, field.name), get_args(field.type)
@@ -113,6 +115,8 @@ def check_numbers(
             if field.name in zero:
                 least, text = math.nextafter(0.0, -1.0), " from 0 on"
             most, kind = (math.inf, "number") if field.name in infinite else (sys.float_info.max, "finite number")
+            if field.name in below_one:
+                most, kind, text = math.nextafter(1.0, 0.0), "number", f"{text}, below 1"
             if not all(_is_number(one) and least < float(one) <= most for one in numbers):
                 raise DockairError(name, expected=f"{kind}s{text}" if is_vector else f"a {kind}{text}", got=value)
 

@@ -78,6 +78,8 @@ class _Settings:
     from_zero: float = 0.0
     signed: float = -1.0
     endless: float = math.inf
+    share: float = 0.0
+    sure: float = 0.9
     count: int = 1
     vector: tuple[float, float] = (1.0, 2.0)
     many: tuple[float, ...] = (1.0,)
@@ -86,7 +88,14 @@ class _Settings:
     maybe: float | None = None
 
     def __post_init__(self) -> None:
-        check_numbers("here", self, zero=("from_zero",), signed=("signed",), infinite=("endless",))
+        check_numbers(
+            "here",
+            self,
+            zero=("from_zero", "share"),
+            signed=("signed",),
+            infinite=("endless",),
+            below_one=("share", "sure"),
+        )
 
 
 @pytest.mark.parametrize(
@@ -102,6 +111,10 @@ class _Settings:
         ({"signed": -math.inf}, "here.signed: expected a finite number, got -inf"),
         ({"endless": math.nan}, "here.endless: expected a number above 0, got nan"),
         ({"endless": -math.inf}, "here.endless: expected a number above 0, got -inf"),
+        ({"share": 1.0}, "here.share: expected a number from 0 on, below 1, got 1.0"),
+        ({"share": -0.1}, "here.share: expected a number from 0 on, below 1, got -0.1"),
+        ({"sure": 0.0}, "here.sure: expected a number above 0, below 1, got 0.0"),
+        ({"sure": math.nan}, "here.sure: expected a number above 0, below 1, got nan"),
         ({"count": 0}, "here.count: expected an integer from 1 on, got 0"),
         ({"vector": (1.0, 0.0)}, "here.vector: expected finite numbers above 0, got (1.0, 0.0)"),
         ({"vector": (1.0, 2.0, 3.0)}, "here.vector: expected 2 numbers, got (1.0, 2.0, 3.0)"),
@@ -124,6 +137,7 @@ def test_a_number_of_settings_that_is_none_or_too_small_is_refused_in_one_line(v
     [
         {},
         {"above": 3, "count": np.int64(2)},
+        {"sure": math.nextafter(1.0, 0.0), "share": 0.5},
         {"above": np.float32(0.5), "vector": np.array([1.0, 2.0])},
         {"vector": [1, 2], "many": (1.0, 2.0, 3.0)},
         {"maybe": -1.0, "name": "any"},
