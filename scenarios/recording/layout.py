@@ -32,6 +32,7 @@ AXES = [[255, 69, 58], [48, 209, 88], [10, 132, 255]]
 ERROR_SHOWN_MM = 50.0  #: beyond it a drogue that was lost would make a flat line of all that came before
 OFFSET_SHOWN_M = 0.5  #: three times what a docking may be off the centre
 
+PIXEL_CENTRE = 0.5  #: the viewer puts the top left corner of the top left pixel at (0, 0), the project its centre
 CLOSE_UP = "camera/close_up"  #: an entity at the believed ring's centre; the close-up view looks from there
 _CLOSE_UP_HALF_PX = 330  # the ring fills it at about 2.4 m, where the camera stands at contact
 

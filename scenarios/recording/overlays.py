@@ -11,9 +11,7 @@ from dockair.calibration import NavigationSheets
 from dockair.messages import NavSolution
 from dockair.rotations import Array
 from dockair.scenarios.flight_log import FlightLog
-from dockair.scenarios.recording.layout import BELIEF, CLOSE_UP, FOUND, NEUTRAL
-
-_PIXEL_CENTRE = 0.5  # the viewer puts the top left corner of the top left pixel at (0, 0), the project its centre
+from dockair.scenarios.recording.layout import BELIEF, CLOSE_UP, FOUND, NEUTRAL, PIXEL_CENTRE
 
 
 def log_overlay_looks(recording: Any, sheets: NavigationSheets) -> None:
@@ -46,18 +44,18 @@ def log_overlays(
     missing, send = frame_missing(log, sheets), recording.send_columns
     solutions = [_unseeing(log.solutions[k]) if missing[k] else log.solutions[k] for k in ticks]
 
-    found = [s.candidates_px + _PIXEL_CENTRE for s in solutions]
+    found = [s.candidates_px + PIXEL_CENTRE for s in solutions]
     sizes = [len(points) for points in found]
     columns = rr.Ellipses2D.columns(centers=_stacked(found, 2), half_sizes=np.full((sum(sizes), 2), 9.0))
     send("camera/candidates", times, columns.partition(sizes))
 
     seen = [np.flatnonzero(np.isfinite(s.led_pixels_px[:, 0])) for s in solutions]
     sizes = [len(numbers) for numbers in seen]
-    leds = [s.led_pixels_px[k] + _PIXEL_CENTRE for s, k in zip(solutions, seen, strict=True)]
+    leds = [s.led_pixels_px[k] + PIXEL_CENTRE for s, k in zip(solutions, seen, strict=True)]
     labels = [str(k) for numbers in seen for k in numbers]
     send("camera/leds", times, rr.Points2D.columns(positions=_stacked(leds, 2), labels=labels).partition(sizes))
 
-    rings = [believed_ring_px(s, sheets) + _PIXEL_CENTRE for s in solutions]
+    rings = [believed_ring_px(s, sheets) + PIXEL_CENTRE for s in solutions]
     send("camera/ring", times, rr.LineStrips2D.columns(strips=rings))
 
     centres = np.array([ring.mean(axis=0) for ring in rings]).reshape(-1, 2)

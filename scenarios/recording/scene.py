@@ -13,7 +13,7 @@ import numpy as np
 from dockair.calibration import NavigationSheets
 from dockair.rotations import Array, matrix_from_yaw_pitch_roll, quaternion_from_matrix
 from dockair.scenarios.flight_log import FlightLog
-from dockair.scenarios.recording.layout import BELIEF, TRUTH
+from dockair.scenarios.recording.layout import BELIEF, PIXEL_CENTRE, TRUTH
 from dockair.sim.shapes import Shape
 from dockair.sim.truth import Truth
 
@@ -153,7 +153,7 @@ def _log_receiver_fittings(recording: Any, sheets: NavigationSheets) -> None:
         focal_length=camera.focal_length_px,
         width=camera.width_px,
         height=camera.height_px,
-        principal_point=camera.principal_point_px,
+        principal_point=np.add(camera.principal_point_px, PIXEL_CENTRE),
         camera_xyz=rr.ViewCoordinates.FLU,
         image_plane_distance=_FRUSTUM_M,
     )

@@ -204,6 +204,16 @@ def test_overlays_lie_on_the_pixels_of_the_solution_and_the_close_up_looks_at_th
     assert outline["Boxes2D:half_sizes"] == [[0.5 * frame.pixels.shape[1], 0.5 * frame.pixels.shape[0]]]
 
 
+def test_the_camera_in_the_scene_looks_as_the_sheet_has_it_in_the_viewers_pixels(flown, hand_made):
+    """Half a pixel is added to the principal point, as to what is drawn over the pixels."""
+    folder, log, _ = flown
+    (flat,) = _columns(_write(folder, log, hand_made.sheets))["/world/receiver/camera:Pinhole:image_from_camera"]
+    camera = hand_made.sheets.camera
+    ahead = np.array([10.0, -0.7, 0.4])  # FLU; the viewer's matrix takes right, down, ahead
+    seen = np.array(flat).reshape(3, 3).T @ [-ahead[1], -ahead[2], ahead[0]]
+    np.testing.assert_allclose(seen[:2] / seen[2], camera.pixels_from_points(ahead)[0] + 0.5, atol=1e-3)
+
+
 def test_of_two_sizes_of_windows_only_the_newest_frame_is_shown(hand_made, tmp_path):
     log = FlightLog()
     with MessageLog(tmp_path, NavigatorRecipe(class_name="a:B", sheets=hand_made.sheets)) as messages:
