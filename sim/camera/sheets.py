@@ -280,6 +280,13 @@ class CameraSheets:
     sky: SkyParameters
     background: BackgroundParameters
 
+    def __post_init__(self) -> None:
+        """Refuse a filter that opens where the sensor's efficiency is not known; past its last node it is 0."""
+        opens_m, first_m = self.filter.cut_on_m - 0.5 * self.filter.cut_on_ramp_m, float(self.sensor.wavelength_m[0])
+        if first_m > opens_m:
+            expected = f"the first at {opens_m:g} m or less, where the filter opens"
+            raise DockairError("sensor.wavelength_m", expected=expected, got=first_m)
+
     @classmethod
     def load(
         cls, filter_name: str = "long_pass", overrides: Mapping[str, Mapping[str, Any]] | None = None

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from dockair.errors import DockairError
-from dockair.sim.camera.radiometry import filter_transmittance
+from dockair.sim.camera.radiometry import detection, filter_transmittance
 from dockair.sim.camera.sheets import CameraSheets
 
 NODES = [750e-9, 800e-9, 850e-9, 900e-9, 950e-9, 1000e-9, 1050e-9, 1100e-9]
@@ -19,6 +19,7 @@ NODES = [750e-9, 800e-9, 850e-9, 900e-9, 950e-9, 1000e-9, 1050e-9, 1100e-9]
         ("sensor", {"wavelength_m": NODES[::-1]}, "sensor.wavelength_m: expected rising wavelengths"),
         ("sensor", {"wavelength_m": [*NODES[:6], NODES[7], NODES[6]]}, "sensor.wavelength_m: expected rising"),
         ("sensor", {"wavelength_m": [NODES[0], *NODES[:7]]}, "sensor.wavelength_m: expected rising"),
+        ("filter_long_pass", {"cut_on_m": 764e-9}, "sensor.wavelength_m: expected the first at 7.49e-07 m or less"),
         ("sensor", {"converter_bits": 12, "outputs": 4}, "sensor.clock_hz: expected up to 4e"),
         ("filter_long_pass", {"cut_on_m": 900e-9, "cut_off_m": 700e-9}, "filter.cut_on_m: expected less than"),
         ("filter_long_pass", {"cut_on_m": 900e-9, "cut_off_m": 900e-9}, "filter.cut_on_m: expected less than"),
@@ -44,6 +45,11 @@ def test_a_quantum_efficiency_without_its_wavelength_is_refused() -> None:
     sensor = CameraSheets.load().sensor
     with pytest.raises(DockairError, match="sensor.wavelength_m: expected rising wavelengths, one for each"):
         replace(sensor, quantum_efficiency=sensor.quantum_efficiency[:-1])
+
+
+def test_a_filter_may_open_at_the_sensors_first_wavelength() -> None:
+    sheets = CameraSheets.load(overrides={"filter_long_pass": {"cut_on_m": 765e-9}})
+    assert not detection(sheets.lens, sheets.filter, sheets.sensor, np.linspace(600e-9, 749e-9, 150)).any()
 
 
 def test_smudges_may_all_be_of_one_size() -> None:
