@@ -6,20 +6,18 @@ from types import TracebackType
 from typing import Any, Self
 
 from rich.console import Console
-from rich.measure import Measurement
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 from rich.table import Column, Table
 from rich.text import Text
 
 from dockair.scenarios.campaign.jobs import Job
 from dockair.scenarios.campaign.row import flight_of, unflown
-from dockair.scenarios.commands.output import plain_console
+from dockair.scenarios.commands.output import plain_console, print_whole
 from dockair.scenarios.report.groups import groups_of
 from dockair.scenarios.statistics import wilson_interval
 
 _LINE_INTERVAL_S = 30.0  # between two lines where stderr is no terminal
 _BAR = 20  # characters: the figures beside it fit on a terminal of 80
-_WIDEST = 1000  # characters that a table may ask for
 _CELL = 48  # characters of settings that a table's cell can hold
 
 Row = Mapping[str, Any]
@@ -168,10 +166,7 @@ def _settings_cells(groups: Sequence[Mapping[str, Any]]) -> tuple[list[str], lis
 
 
 def _print(console: Console, shown: Table, below: Sequence[str]) -> None:
-    """Print a table as wide as it is: a narrow terminal wraps its lines, where rich would cut the figures off."""
-    whole_width = Measurement.get(console, console.options.update_width(_WIDEST), shown).maximum
-    console.width = max(console.width, whole_width)
-    console.print(shown)
+    print_whole(console, shown)
     for text in below:
         console.print(text, markup=False, highlight=False, soft_wrap=True)
 

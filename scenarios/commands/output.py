@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from rich.console import Console
+from rich.measure import Measurement
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 from rich.text import Text
@@ -27,6 +28,7 @@ if TYPE_CHECKING:  # the progress of a flight is told in these; importing them h
 _PLAIN_INTERVAL_S = 5.0  # of simulated time between two lines where stderr is no terminal
 _BAR_INTERVAL_S = 0.1
 _FILE_WIDTH = 140  # of tables where stdout is no terminal
+_WIDEST = 1000  # characters that a table may ask for
 
 #: Key of `result.json` (dotted) -> what people call it, unit, decimals.
 _FIGURES = {
@@ -221,38 +223,33 @@ def show_stages_bench(figures: Mapping[str, Any]) -> None:
     """Print the times of the stages, their ratios, and what each of them found."""
     console = plain_console()
     if "flights" in figures:
-        flights = figures["flights"].items()
-        console.print(_bench_table({what: {key: f"{x:.2f}" for key, x in row.items()} for what, row in flights}))
-        console.print(_bench_table({what: {"steps/s": f"{n:.1f}"} for what, n in figures["steps_per_second"].items()}))
+        _print_rows(console, figures["flights"], ".2f")
+        _print_rows(console, {what: {"steps/s": n} for what, n in figures["steps_per_second"].items()}, ".1f")
     for unit, short in (("milliseconds", "ms"), ("microseconds", "µs")):
         if unit in figures:
-            console.print(_bench_table({what: {short: f"{t:.3f}"} for what, t in figures[unit].items()}))
+            _print_rows(console, {what: {short: time} for what, time in figures[unit].items()}, ".3f")
     for what, ratio in figures["ratios"].items():
         console.print(f"{what}: {ratio:.2f}")
     if "recall" in figures:
-        found = figures["recall"]
-        console.print(_bench_table({what: {key: str(n) for key, n in row.items()} for what, row in found.items()}))
+        _print_rows(console, figures["recall"])
     if "found_by_frame" in figures:
-        by_frame = figures["found_by_frame"]
         names = {name: f"({k})" for k, name in enumerate(figures["recall"], 1)}
         console.print("LEDs found by " + ", ".join(f"{number} {name}" for name, number in names.items()))
-        console.print(
-            _bench_table(
-                {frame: {names.get(key, key): str(n) for key, n in row.items()} for frame, row in by_frame.items()}
-            )
-        )
+        by_frame = figures["found_by_frame"].items()
+        _print_rows(console, {frame: {names.get(key, key): n for key, n in row.items()} for frame, row in by_frame})
     for what, choice in figures.get("chosen", {}).items():
         console.print(f"{what}: best of its parameters: {choice}")
 
 
-def _bench_table(rows: Mapping[str, Mapping[str, str]]) -> Table:
+def _print_rows(console: Console, rows: Mapping[str, Mapping[str, Any]], decimals: str = "") -> None:
+    """Print row -> column -> value as a table."""
     table = Table(box=None, padding=(0, 1))
     table.add_column("what")
     for heading in next(iter(rows.values())):
-        table.add_column(heading, justify="right", overflow="fold")
+        table.add_column(heading, justify="right")
     for what, row in rows.items():
-        table.add_row(what, *row.values())
-    return table
+        table.add_row(what, *(format(value, decimals) for value in row.values()))
+    print_whole(console, table)
 
 
 def plain_console() -> Console:
@@ -264,6 +261,13 @@ def plain_console() -> Console:
     if not console.is_terminal:
         console.width = _FILE_WIDTH
     return console
+
+
+def print_whole(console: Console, table: Table) -> None:
+    """Print a table as wide as it is: a narrow terminal wraps its lines, where rich would cut or fold the cells."""
+    whole_width = Measurement.get(console, console.options.update_width(_WIDEST), table).maximum
+    console.width = max(console.width, whole_width)
+    console.print(table)
 
 
 def _at(table: Mapping[str, Any], key: str) -> Any:
