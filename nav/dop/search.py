@@ -71,7 +71,7 @@ def exhaustive(start: Array, pieces: Array, count: int, wanted: int) -> tuple[fl
             sums[d + 1] = sums[d] + pieces[chosen[d]]
         tried += 1
         value = _value(sums[count], L, wanted)
-        if value < least * (1.0 - _TIE) or (least == np.inf and value < np.inf):
+        if value < least * (1.0 - _TIE):
             least, best = value, chosen.copy()
         changed = count - 1
         while changed >= 0 and chosen[changed] == n - count + changed:
@@ -146,7 +146,7 @@ def _lower_bound(start: Array, pieces: Array, state: Array, count: int, wanted: 
         steepest.sort()
         bound = max(bound, value + at_w - steepest[n - rest :].sum())
         for i in range(n):
-            w[i] *= np.sqrt(g[i])
+            w[i] *= np.sqrt(max(g[i], 0.0))  # of landmarks nearly on a line rounding may leave less than nothing
     _feasible(state, rest, w)
     return bound
 
@@ -187,17 +187,18 @@ def _exchange(start: Array, pieces: Array, chosen: Integers, wanted: int) -> flo
     while better:
         better, least, leave, enter = False, value, 0, 0
         for d in range(count):
+            N[:] = start  # summed anew: of what nearly cancels, a difference would promise what no choice keeps
+            for e in range(count):
+                if e != d:
+                    N += pieces[chosen[e]]
             for i in range(n):
                 if not inside[i]:
-                    new = _value(N - pieces[chosen[d]] + pieces[i], L, wanted)
-                    if new < least * (1.0 - _TIE) or (least == np.inf and new < np.inf):
+                    new = _value(N + pieces[i], L, wanted)
+                    if new < least * (1.0 - _TIE):
                         better, least, leave, enter = True, new, d, i
         if better:
             inside[chosen[leave]], inside[enter] = False, True
-            chosen[leave], N[:] = enter, start
-            for i in chosen:
-                N += pieces[i]
-            value = _value(N, L, wanted)
+            chosen[leave], value = enter, least
     return value
 
 
@@ -218,9 +219,9 @@ def branch_and_bound(
         if not bounds[depth] < least * (1.0 - _TIE):
             continue
         state, w = states[depth].copy(), weights[depth].copy()
-        branch, largest = -1, -1.0
+        branch, largest = -1, 0.0
         for i in range(n):
-            if state[i] == 0 and w[i] > largest:
+            if state[i] == 0 and (branch < 0 or w[i] > largest):  # one of them also where no w is a number
                 branch, largest = i, w[i]
         for into in (-1, 1):  # out below, in on top of the stack: searched first
             state[branch] = into
@@ -234,7 +235,7 @@ def branch_and_bound(
                 for member in members:
                     N += pieces[member]
                 value = _value(N, L, wanted)
-                if value < least * (1.0 - _TIE) or (least == np.inf and value < np.inf):
+                if value < least * (1.0 - _TIE):
                     least, best = value, members
                 continue
             states[depth], weights[depth] = state, w

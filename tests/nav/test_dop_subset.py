@@ -122,6 +122,20 @@ def test_the_landmarks_in_the_camera_and_in_the_plane_can_be_chosen_from_too():
     assert seen.value == pytest.approx(least, rel=1e-6)
 
 
+@pytest.mark.parametrize(
+    ("n", "k", "seed", "criterion"), [(11, 5, 1, "dop"), (11, 5, 6, "pdop"), (7, 6, 32, "adop"), (11, 5, 35, "pdop")]
+)
+def test_a_search_among_landmarks_a_micrometre_off_a_line_ends_with_the_choice_of_all_or_one_as_good(
+    n, k, seed, criterion
+):
+    """Their information nearly cancels, so that a gradient may come out negative, and a sum less a piece too small."""
+    off = 1e-6 * np.random.default_rng(seed).standard_normal((n, 3))
+    dop = dilution_of_precision(np.arange(n)[:, None] * [1.0, 0.5, 0.2] + [5.0, 0.0, 0.0] + off, ZERO, ZERO, F)
+    searched, tried = (best_subset(dop, k, criterion, settings=setting) for setting in (SEARCH, ALL))
+    assert searched.status is tried.status is SubsetStatus.OPTIMAL
+    assert searched.value == pytest.approx(tried.value, rel=0.02)
+
+
 def test_when_the_nodes_run_out_it_says_so_and_how_much_better_a_choice_might_be():
     _, dop = cloud(30, 8)
     best = best_subset(dop, 6, "adop")
