@@ -74,16 +74,17 @@ def code_of(ring: LedRing, settings: CodeSettings) -> Code:
 
 
 def displaced_leds(points: Array, fit: RingFit, code: Code, slot_of_led_0: int) -> dict[int, int]:
-    """Candidate of each displaced LED that is seen, by number, if LED 0 is in this slot."""
+    """Candidate of each displaced LED that is seen, by number, if LED 0 is in this slot: the nearest pairs first."""
+    places = fit.image_px(_PLACE * (slot_of_led_0 + code.displaced) + code.offset_rad[code.displaced])
+    distance = np.hypot(*(points - places[:, None]).transpose(2, 0, 1))
+    distance[:, fit.candidate[fit.candidate >= 0]] = np.inf
     found = {}
-    free = np.ones(len(points), bool)
-    free[fit.candidate[fit.candidate >= 0]] = False
-    for k in code.displaced:
-        place = fit.image_px(np.array([_PLACE * (slot_of_led_0 + k) + code.offset_rad[k]]))[0]
-        distance = np.where(free, np.hypot(*(points - place).T), np.inf)
-        nearest = int(np.argmin(distance))
-        if distance[nearest] <= code.settings.reach * fit.tolerance_px:
-            found[int(k)] = nearest
+    for _ in code.displaced:
+        led, nearest = np.unravel_index(np.argmin(distance), distance.shape)
+        if not distance[led, nearest] <= code.settings.reach * fit.tolerance_px:
+            break
+        found[int(code.displaced[led])] = int(nearest)
+        distance[led], distance[:, nearest] = np.inf, np.inf  # no candidate is two LEDs
     return found
 
 

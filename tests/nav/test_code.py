@@ -1,12 +1,14 @@
 """Rings whose numbering can be read from the image: an LED off its place, or one of another brightness."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from dockair.calibration import Camera, LedRing
 from dockair.errors import DockairError
 from dockair.nav.identify import numbering
-from dockair.nav.identify.code import CodeSettings, code_of, possible_slots
+from dockair.nav.identify.code import CodeSettings, code_of, displaced_leds, possible_slots
 from dockair.nav.identify.perspective import fit_ring
 from dockair.nav.identify.ring import IdentificationStatus, identify
 from dockair.rotations import matrix_from_yaw_pitch_roll
@@ -138,6 +140,26 @@ def test_a_code_is_the_same_turned_when_some_turn_of_the_ring_is(turn):
     assert not code_of(BRIGHT, CodeSettings()).is_the_same_turned
     both = LedRing(brightness=brightness, angles_deg=UNEVEN.angles_deg)
     assert not code_of(both, CodeSettings()).is_the_same_turned
+
+
+@pytest.mark.parametrize(
+    ("blobs", "expected"),
+    [
+        ([0.0, 1.0], {0: 6, 1: 7}),
+        ([0.4], {0: 6}),
+        ([0.6], {1: 6}),
+        ([0.4, 1.8], {0: 6, 1: 7}),
+        ([0.6, -0.8], {1: 6, 0: 7}),
+    ],
+)
+def test_no_blob_is_two_displaced_leds(blobs, expected):
+    """LEDs 0 and 1 stand 9 degrees apart; blobs on the way from one to the other are near enough to both."""
+    close = LedRing(angles_deg=(18.0, 27.0, 90.0, 135.0, 180.0, 225.0, 270.0, 315.0))
+    points, fit = seen(close, range_m=40.0)
+    two = points[0] + np.array(blobs)[:, None] * (points[1] - points[0])
+    in_place = np.where(fit.candidate >= 0, fit.candidate - 2, -1)
+    code = code_of(close, CodeSettings(reach=8.0))
+    assert displaced_leds(np.vstack([points[2:], two]), replace(fit, candidate=in_place), code, 0) == expected
 
 
 @pytest.mark.parametrize("factor", [1e-6, 1.0, 1e6])
