@@ -25,6 +25,7 @@ from dockair.rotations import Array
 
 _PLACE = 2.0 * np.pi / SLOTS
 _DISPLACED_RAD = np.deg2rad(1.0)  # less, and an LED counts as in its place
+_ROUNDING = 1e-9  # of angles and logarithms: two LEDs that are off alike differ by this at most
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,7 +60,9 @@ class Code:
     def is_the_same_turned(self) -> bool:
         """Whether some other numbering has the same code, so that it cannot settle the numbers."""
         marks = [self.offset_rad] if self.log_brightness is None else [self.offset_rad, self.log_brightness]
-        return any(all(np.array_equal(np.roll(m, turn), m) for m in marks) for turn in range(1, SLOTS))
+        return any(
+            all(np.allclose(np.roll(m, turn), m, rtol=0.0, atol=_ROUNDING) for m in marks) for turn in range(1, SLOTS)
+        )
 
 
 def code_of(ring: LedRing, settings: CodeSettings) -> Code:

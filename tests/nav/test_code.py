@@ -142,6 +142,16 @@ def test_a_code_is_the_same_turned_when_some_turn_of_the_ring_is(turn):
     assert not code_of(both, CodeSettings()).is_the_same_turned
 
 
+@pytest.mark.parametrize("off_deg", [-7.0, 10.0, 18.0])
+@pytest.mark.parametrize("turn", [2, 4])
+def test_leds_displaced_alike_in_opposite_places_are_the_same_turned(turn, off_deg):
+    """Half a turn, or a quarter, brings each to the next; 190 degrees less 180 are not to the last bit 10."""
+    angles_deg = tuple(45.0 * k + off_deg * (k % turn == 0) for k in range(8))
+    assert code_of(LedRing(angles_deg=angles_deg), CodeSettings()).is_the_same_turned
+    another = tuple(angle_deg - 1.5 * (k == 0) for k, angle_deg in enumerate(angles_deg))
+    assert not code_of(LedRing(angles_deg=another), CodeSettings()).is_the_same_turned
+
+
 @pytest.mark.parametrize(
     ("blobs", "expected"),
     [
