@@ -32,6 +32,8 @@ from numpy.typing import NDArray
 from dockair.kernels import njit
 from dockair.rotations import Array
 
+_WORD = 64  # bits: peaks that `triples_near` looks at together
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Peaks:
@@ -124,8 +126,12 @@ def triples_near(points: Array, peaks: Peaks, band: float) -> NDArray[np.int64]:
     """(m, 3) indices, ascending, of points (n, 2) that are three in one peak's band: within `band` r of its circle."""
     distance = np.hypot(*(points[:, None] - peaks.centre_px).transpose(2, 0, 1))
     member = np.abs(distance - peaks.radius_px) <= band * peaks.radius_px
-    bits = (member * (np.uint64(1) << np.arange(len(peaks.votes), dtype=np.uint64))).sum(axis=1, dtype=np.uint64)
-    return np.asarray(_triples_sharing_a_bit(bits))
+    found = []
+    for first in range(0, max(len(peaks.votes), 1), _WORD):
+        part = member[:, first : first + _WORD]
+        bits = (part * (np.uint64(1) << np.arange(part.shape[1], dtype=np.uint64))).sum(axis=1, dtype=np.uint64)
+        found.append(_triples_sharing_a_bit(bits))
+    return np.asarray(found[0] if len(found) == 1 else np.unique(np.concatenate(found), axis=0))
 
 
 @njit(cache=True)

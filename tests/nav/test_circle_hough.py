@@ -139,6 +139,15 @@ def test_triples_are_those_with_three_in_one_band(seed, peaks):
     assert [tuple(t) for t in triples_near(points, circles, 0.25).tolist()] == expected
 
 
+@pytest.mark.parametrize("place", [0, 63, 64, 128])
+def test_three_in_one_band_are_a_triple_however_many_peaks_there_are(place):
+    """Of 129 peaks one has candidates on its circle."""
+    peaks = Peaks(centre_px=np.full((129, 2), 1e4), radius_px=np.full(129, 10.0), votes=np.zeros(129, np.int64))
+    peaks.centre_px[place] = 0.0
+    points = np.array([[10.0, 0.0], [500.0, 500.0], [0.0, 10.0], [-10.0, 0.0]])
+    assert triples_near(points, peaks, 0.25).tolist() == [[0, 2, 3]]
+
+
 def test_a_wide_frame_costs_no_more_cells_than_its_groups():
     """Two rings in corners of a frame of 100 000 px: a grid over both would have 10^9 cells."""
     angle = np.arange(8) * np.pi / 4
