@@ -58,7 +58,7 @@ class BrightnessModel:
     settings: BrightnessSettings
 
     def likelihood_ratios(self, rings: NDArray[np.int64]) -> tuple[Array, Array]:
-        """L (m,) of Eq. (1) and L_i (m, slots) of Eq. (2), 1 for an empty slot.
+        """L (m,) of Eq. (1) and L_i (m, slots) of Eq. (2), 1 for an empty slot and the second slot of a candidate.
 
         Args:
             rings: (m, slots) candidate in each slot, -1 for none.
@@ -127,29 +127,33 @@ def _likelihood_ratios(  # type: ignore[no-untyped-def]
     """Densities `led` (n, mu) of each candidate as an LED, `kernel` (n, n) of its share in another's q."""
     slots = rings.shape[1]
     total, single = np.ones(len(rings)), np.ones(rings.shape)
-    r, without = np.empty(slots), np.empty(slots)
+    r, without, slot = np.empty(slots), np.empty(slots), np.empty(slots, np.int64)
     for row in range(len(rings)):
-        members = [k for k in rings[row] if k >= 0 and known[k]]
-        if len(members) == 0:
+        filled = 0
+        for s in range(slots):
+            k, first = rings[row, s], True
+            for a in range(filled):
+                first = first and rings[row, slot[a]] != k
+            if k >= 0 and known[k] and first:
+                slot[filled] = s
+                filled += 1
+        if filled == 0:
             continue
-        q = np.empty(len(members))
-        for a in range(len(members)):
+        members, q = rings[row][slot[:filled]], np.empty(filled)
+        for a in range(filled):
             others = kernel[members[a]].sum()
             for b in members:
                 others -= kernel[members[a], b]
-            q[a] = (prior_weight / prior_range + others) / (prior_weight + known.sum() - len(members))
+            q[a] = (prior_weight / prior_range + others) / (prior_weight + known.sum() - filled)
         total[row], without[:] = 0.0, 0.0
         for step in range(led.shape[1]):
             product = 1.0
-            for a in range(len(members)):
+            for a in range(filled):
                 r[a] = outliers + (1.0 - outliers) * led[members[a], step] / q[a]
                 product *= r[a]
             total[row] += product * d_mu
-            for a in range(len(members)):
+            for a in range(filled):
                 without[a] += product / r[a] * d_mu
-        a = 0
-        for s in range(slots):
-            if rings[row, s] >= 0 and known[rings[row, s]]:
-                single[row, s] = total[row] / without[a]
-                a += 1
+        for a in range(filled):
+            single[row, slot[a]] = total[row] / without[a]
     return total, single

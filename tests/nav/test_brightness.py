@@ -70,6 +70,15 @@ def test_the_ratio_of_one_member_is_that_of_the_ring_with_and_without_it_at_the_
     assert L[0] / ratios(without, range(5))[0][0] == pytest.approx(L_i[0, 4])
 
 
+def test_a_candidate_in_two_slots_is_one_blob():
+    """Where a look-up is wider than half the way to the next LED; counted twice it would leave less than no clutter."""
+    flux = np.full(12, 3.0)
+    L, L_i = ratios(flux, range(6))
+    twice, twice_i = ratios(flux, [*range(6), 0, 1])
+    assert twice[0] == L[0]
+    np.testing.assert_array_equal(twice_i, L_i)
+
+
 def test_clutter_has_a_mean_ratio_of_one_at_most_and_so_exceeds_a_hundred_in_less_than_one_of_a_hundred():
     """2000 rings of five blobs among thirty, ln flux uniform: the mean's error is 0.1 to 0.2, its tail is heavy."""
     rng = np.random.default_rng(62)
