@@ -85,6 +85,18 @@ def test_two_candidates_make_no_circle():
     assert most_trusted_circle(np.zeros((2, 2))) is None
 
 
+def test_circles_beyond_the_range_of_radii_and_points_on_a_line_or_in_one_place_are_left_out():
+    """A ring of 100 px and one of 40; five points on a line have no circle, three in one place none either."""
+    large, small = ring((500.0, 400.0), 100.0), ring((900.0, 400.0), 40.0)
+    both = np.vstack([large, small])
+    for radius_range_px, radius_px in (((60.0, 150.0), 100.0), ((10.0, 60.0), 40.0)):
+        circle = most_trusted_circle(both, cap_px=5.0, radius_range_px=radius_range_px)
+        assert circle.radius_px == pytest.approx(radius_px)
+    assert most_trusted_circle(large, radius_range_px=(101.0, 150.0)) is None
+    assert most_trusted_circle(np.column_stack([np.arange(5.0), 2.0 * np.arange(5.0)])) is None
+    assert circles_through(np.ones((3, 2)), np.array([[0, 1, 2]]))[1][0] == np.inf
+
+
 def test_members_are_the_candidates_within_a_tenth_of_the_radius():
     points = np.vstack([ring((500.0, 400.0), 100.0), [609.5, 400.0], [500.0, 289.5], [390.5, 400.0], [589.5, 400.0]])
     best = most_trusted_circle(points, cap_px=5.0)
