@@ -227,9 +227,9 @@ def _levels(image: Image, settings: DetectSettings) -> tuple[int, float, float]:
 def _opened(found: _Components, settings: DetectSettings) -> tuple[_Components, NDArray[np.int64]]:
     """What opening leaves of the components, of the right area before and after, and their areas (n,)."""
     element, spare_below_px = _element(settings)
-    # spots are made with 8 neighbours, whatever the setting
+    connectivity = 8 if found.threshold_dn is None else settings.connectivity  # spots have 8, whatever the setting
     runs, origin, area_px = open_and_trace(
-        found.runs, element, spare_below_px, settings.connectivity, (settings.min_area_px, settings.max_area_px)
+        found.runs, element, spare_below_px, connectivity, (settings.min_area_px, settings.max_area_px)
     )
     opened = _Components(
         runs=runs,

@@ -89,6 +89,15 @@ def test_ten_bit_frames_in_sixteen_bit_words_give_the_same_centres(render):
     np.testing.assert_array_equal(b.clipped, a.clipped)
 
 
+@pytest.mark.parametrize(("method", "areas"), [("local", [50]), ("frame", [25, 25])])
+def test_connectivity_is_a_frame_s_and_spots_always_have_eight_neighbours(method, areas):
+    """Two squares of 5 x 5 pixels that touch at a corner; four neighbours make two of them."""
+    image = np.full((80, 90), 5, np.uint8)
+    image[30:35, 30:35] = image[35:40, 35:40] = 255
+    assert detect(image, DetectSettings(method=method, connectivity=4)).area_px.tolist() == areas
+    assert detect(image, DetectSettings(method=method)).area_px.tolist() == [50]
+
+
 def test_a_fixed_threshold_is_taken_as_it_is(render):
     image = render((100, 100), [(50.0, 50.0, 2e4)], np.random.default_rng(12))
     assert detect(image, DetectSettings(threshold_dn=60)).threshold_dn == 60
