@@ -33,6 +33,8 @@ _FEWEST_INTERVALS = 3  # of the longest averaging time, by default
 _PER_DECADE = 10
 _ROUNDS = 8  # of re-weighting by the model
 _CORRELATIONS_PER_DECADE = 12
+_LEAST_SHARE = 1e-30  # of the largest variance: of samples that cancel none is left, and its weight would be infinite
+_LEAST_VARIANCE = 1e-100
 _SMALL = 0.01  # r below which the next term of the series of G is a share of 1e-12
 
 
@@ -154,12 +156,13 @@ def _fit(curve: AllanCurve, T: float, terms: str) -> tuple[Array, Array, float]:
     t, variance = curve.taus_s, curve.deviation**2
     columns = {"Q": 3.0 / t**2, "N": 1.0 / t, "B": _gauss_markov(t / T) / _FLOOR**2, "K": t / 3.0}
     A = np.column_stack([columns[term] for term in terms])
-    model = np.maximum(variance, np.finfo(float).tiny)
+    least = max(_LEAST_SHARE * float(variance.max()), _LEAST_VARIANCE)
+    model = np.maximum(variance, least)
     squares = np.zeros(len(terms))
     for _ in range(_ROUNDS):
         weight = np.sqrt(curve.intervals) / model
         scale = np.linalg.norm(A * weight[:, None], axis=0)
         squares = nnls(A * weight[:, None] / scale, variance * weight)[0] / scale
-        model = np.maximum(A @ squares, np.finfo(float).tiny)
+        model = np.maximum(A @ squares, least)
     misfit = float(np.sum(curve.intervals * (np.log(model) + variance / model)))
     return squares, model, misfit

@@ -120,6 +120,16 @@ def test_a_bias_without_white_noise_is_found_at_averaging_times_far_below_its_ow
     assert noise.noise_density_rad_s_rthz < 1e-7
 
 
+@pytest.mark.parametrize("scale", [1.0, 1e-157])
+def test_a_record_whose_averages_cancel_to_the_bit_has_terms_too(scale):
+    """Levels by turns: an angle that swings by 1e-5 rad to either side, and of an even number of samples no trace."""
+    rates = scale * np.tile([1e-3, -1e-3], 500)
+    assert allan_deviation(rates, 50.0).deviation.min() == 0.0
+    noise = identify_gyro_noise(rates, 50.0)
+    assert noise.noise_density_rad_s_rthz == 0.0
+    assert noise.quantisation_rad == pytest.approx(1e-5 * scale, rel=0.3, abs=1e-100)
+
+
 @pytest.mark.parametrize(
     ("where", "make"),
     [
