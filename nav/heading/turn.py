@@ -69,7 +69,7 @@ class HeadingLine:
         return cls(slope_rad_px=1.0 / focal_length_px)
 
     def turn_rad(self, shift_px: float) -> float:
-        """D."""
+        """Turn that a mean column shift says."""
         return self.slope_rad_px * shift_px + self.offset_rad
 
 

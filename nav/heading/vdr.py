@@ -17,8 +17,8 @@ share is taken, so that one visual heading's error is not the whole turn's.
 Corrected of the source: (7) adds the initial heading at every step, here once; it integrates the low-passed rate, whose
 lag (the rate times tau) would count twice at each hand-over, here the raw one with heuristic drift reduction's I; (10)
 falls back to the integral of the drift-reduced rate, which has lost the turn, here to psi.
-Without a visual heading since the run began (or when it is older than `oldest_visual_s`) it is the integral of the
-drift-reduced rate. Not modelled: error of the visual heading; there is no covariance.
+Without a visual heading from before the run, or where the newest is older than `oldest_visual_s`, it is (7) alone. Not
+modelled: error of the visual heading; there is no covariance.
 Source: [Kyung et al. 2015, eqs 7 to 10]. Theta is not printed there; here five time constants of the low-pass, five
 times as long as the runs that noise makes.
 """

@@ -155,7 +155,7 @@ def foreground_runs(image: Image, threshold: int, connectivity: int = 8) -> Runs
 
     Args:
         image: (rows, columns) uint8 or uint16.
-        threshold: level [DN].
+        threshold: level [DN]; below 0 it counts as 0.
         connectivity: 8 or 4.
 
     Raises:
