@@ -1,5 +1,7 @@
 """Spots against their definition, written out pixel by pixel, and against what must not be one."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -7,7 +9,7 @@ from hypothesis import strategies as st
 from scipy import ndimage
 from scipy.special import erf
 
-from dockair.nav.image.spot_kernels import ARC, CUT_PX, REACHES_PX, SPARE, _middle, ring_steps
+from dockair.nav.image.spot_kernels import ARC, CUT_PX, REACHES_PX, SPARE, _append_runs, _middle, ring_steps
 from dockair.nav.image.spots import SpotLimits, Spots, find_spots
 
 LIMITS = SpotLimits(
@@ -232,6 +234,84 @@ def test_the_sun_s_veil_hides_no_led_that_stands_a_half_above_it():
     found = [set(pixels_of(spots, k)) for k in range(spots.runs.count)]
     assert len(found) == len(true)
     assert all(any((v, u) in pixels for pixels in found) for u, v in true)
+
+
+@pytest.mark.parametrize(("reach", "radius"), [("small", 1.5), ("middle", 1.5), ("wide", 5.0)])
+def test_a_reach_s_contrast_is_the_least_that_its_spots_have(reach, radius):
+    """A disc of level 5 on 0, with none of the other reaches' contrasts: 5 is enough, and 5.1 is not."""
+    rows, columns = np.indices((60, 90))
+    disc = np.where(np.hypot(rows - 30, columns - 45) <= radius, 5, 0).astype(np.uint8)
+    contrasts = {f"{name}_contrast_dn": 200.0 for name in ("small", "middle", "wide")}
+    for contrast, count in ((5.0, 1), (5.1, 0)):
+        limits = replace(LIMITS, **{**contrasts, f"{reach}_contrast_dn": contrast})
+        assert find_spots(disc, limits).runs.count == count
+
+
+@pytest.mark.parametrize("limit", ["detection", "beside", "share"])
+def test_what_noise_may_not_make_begins_at_its_limit(limit):
+    """Eq. (2) of a bright pixel with one that is nearly as bright beside it, on a ring that is uneven."""
+    image = np.full((60, 90), 10, np.uint8)
+    image[29:32, 44:47] = 12
+    image[30, 45], image[30, 46] = 40, 38
+    ring = ring_steps(4) + [30, 45]
+    image[tuple(ring[ring[:, 1] < 45].T)] = 14
+    b = image[tuple(ring.T)].mean()
+    total = 4.0 * (40 - b) + 2.0 * (38 - b) + (3 * 2.0 + 4 * 1.0) * (12 - b)
+    seven = total - 4.0 * (40 - b) - 2.0 * (38 - b)
+    most = {
+        "detection": total / 6.0 / noise_of(b),
+        "beside": seven / 4.0 / noise_of(b),
+        "share": seven / 4.0 / (40 - b),
+    }
+    for factor, count in ((0.99, 1), (1.01, 0)):
+        others = {"detection": 6.0, "beside": 0.1, "share": 0.01, limit: factor * most[limit]}
+        limits = replace(LIMITS, small_contrast_dn=200.0, wide_contrast_dn=200.0, **others)
+        spots = find_spots(image, limits)
+        assert sum((30, 45) in pixels_of(spots, k) for k in range(spots.runs.count)) == count
+
+
+@pytest.mark.parametrize(("sides", "found"), [(1, True), (2, False)])
+def test_a_brighter_surface_may_fill_one_side_of_the_smallest_ring_but_not_two(sides, found):
+    """Five pixels of 100 two pixels from a peak of 60, or nine that lie at a corner's two sides."""
+    image = np.full((60, 90), 5, np.uint8)
+    image[:29] = 100
+    if sides == 2:
+        image[:, :45] = 100
+    image[29:32, 45:48] = [[12, 25, 12], [25, 60, 25], [12, 25, 12]]
+    spots = find_spots(image, LIMITS)
+    assert any((30, 46) in pixels_of(spots, k) for k in range(spots.runs.count)) == found
+
+
+@pytest.mark.parametrize("row", range(40, 44))
+def test_a_dome_is_found_whole_from_whichever_of_its_rows_is_looked_at(row):
+    """Every fourth row is: from two rows off it is two steps up to the peak."""
+    rows, columns = np.indices((80, 90))
+    distance = np.hypot(rows - row, columns - 45)
+    dome = np.where(distance <= 10.0, np.rint(250.0 - distance**2), 5.0).astype(np.uint8)
+    spots = find_spots(dome, LIMITS)
+    assert spots.runs.area_px.tolist() == [(distance <= 10.0).sum()]
+
+
+@pytest.mark.parametrize(("name", "reach", "radius"), [("small", 2, 1.5), ("middle", 4, 1.5), ("wide", 8, 5.0)])
+def test_a_spot_s_ring_may_touch_the_frame_s_edge_and_not_leave_it(name, reach, radius):
+    contrasts = {f"{other}_contrast_dn": 200.0 for other in ("small", "middle", "wide")}
+    limits = replace(LIMITS, **{**contrasts, f"{name}_contrast_dn": 5.0})
+    rows, columns = np.indices((60, 90))
+    for edge in (0, 1):
+        for i, j in ((reach - edge, 45), (59 - reach + edge, 45), (30, reach - edge), (30, 89 - reach + edge)):
+            disc = np.where(np.hypot(rows - i, columns - j) <= radius, 80, 5).astype(np.uint8)
+            assert find_spots(disc, limits).runs.count == 1 - edge
+
+
+def test_the_table_of_runs_grows_with_what_is_put_into_it():
+    """A board of 5 x 5 has 13 runs of one pixel, three times into a table of one row."""
+    board = (np.indices((5, 5)).sum(axis=0) % 2 == 0).astype(np.uint8)
+    table, n = np.empty((1, 3), np.int32), 0
+    for top in (10, 20, 30):
+        table, n = _append_runs(board, top, 7, 5, table, n)
+    rows, columns = np.nonzero(board)
+    expected = [(top + i, 7 + j, 8 + j) for top in (10, 20, 30) for i, j in zip(rows, columns, strict=True)]
+    assert table[:n].tolist() == [list(run) for run in expected]
 
 
 def test_a_peak_alone_is_no_spot():
