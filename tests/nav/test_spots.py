@@ -9,7 +9,18 @@ from hypothesis import strategies as st
 from scipy import ndimage
 from scipy.special import erf
 
-from dockair.nav.image.spot_kernels import ARC, CUT_PX, REACHES_PX, SPARE, _append_runs, _middle, ring_steps
+from dockair.nav.image.spot_hits import find_hits
+from dockair.nav.image.spot_kernels import (
+    ARC,
+    CUT_PX,
+    REACHES_PX,
+    ROW_STEPS,
+    SPARE,
+    WIDE_PX,
+    _append_runs,
+    _middle,
+    ring_steps,
+)
 from dockair.nav.image.spots import SpotLimits, Spots, find_spots
 
 LIMITS = SpotLimits(
@@ -312,6 +323,32 @@ def test_the_table_of_runs_grows_with_what_is_put_into_it():
     rows, columns = np.nonzero(board)
     expected = [(top + i, 7 + j, 8 + j) for top in (10, 20, 30) for i, j in zip(rows, columns, strict=True)]
     assert table[:n].tolist() == [list(run) for run in expected]
+
+
+@pytest.mark.parametrize("width", [30, 100, 160])
+def test_hits_are_the_pixels_that_stand_out_from_their_second_brightest_neighbour_at_a_distance(width):
+    """13/16 x - n >= c, but for the rounding of 3/16 x to whole numbers, which is off by -1.5 to 0.5."""
+    rng = np.random.default_rng(31)
+    places = rng.uniform(0.0, 1.0, (60, 2)) * [width, 60]
+    spots = [(u, v, rng.choice([10.0, 40.0, 150.0]), rng.choice([0.7, 1.5, 4.0])) for u, v in places]
+    image = digital(blurred((60, width), spots, 3.0) + rng.normal(size=(60, width)))
+    contrasts, x = (4, 2, 8, 8), image.astype(float)
+    hits = find_hits(image, REACHES_PX, ROW_STEPS, contrasts, WIDE_PX)
+    for k, (reach, step, contrast) in enumerate(zip(REACHES_PX, ROW_STEPS, contrasts, strict=True)):
+        inside = np.zeros(image.shape, bool)
+        inside[reach : 60 - reach : step, reach : width - reach] = True
+        around = lambda d: np.sort([np.roll(x, s, axis) for s in (d, -d) for axis in (0, 1)], axis=0)  # noqa: E731
+        n, beside = around(reach)[-2], np.maximum(np.roll(x, 1, 1), np.roll(x, -1, 1))
+        if reach < WIDE_PX:
+            inside &= (around(1)[-1] if step == 1 else beside) <= x
+        i, j, second = hits[hits[:, 0] == k, 1:].T
+        np.testing.assert_array_equal(second, n[i, j])
+        found = np.zeros(image.shape, bool)
+        found[i, j] = True
+        assert len(i) == found.sum()
+        certain, possible = (inside & (13.0 / 16.0 * x - n >= contrast + more) for more in (0.5, -1.5))
+        assert (found | ~certain).all() and (possible | ~found).all()
+        assert certain.any() or width == 30
 
 
 def test_a_peak_alone_is_no_spot():
