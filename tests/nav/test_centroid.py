@@ -120,15 +120,19 @@ def _merged(image, u, v, R):
     return max(0.0, longer - shorter - 1.5 * noise - 0.07 * (longer + shorter))
 
 
-def test_what_the_background_varies_by_beyond_noise_and_the_lens_s_rings_counts_twice():
-    """Levels 18 and 22 by turns: s_t^2 = 2 (4 - (0.02 x 20 + 0.4^2) - (0.01 x 100)^2) in Eqs. (2) and (3)."""
+@pytest.mark.parametrize(("peak", "texture"), [(120, 2.0 * (4.0 - (0.02 * 20.0 + 0.4**2) - 1.0)), (255, 0.0)])
+def test_what_the_background_varies_by_beyond_noise_and_the_lens_s_rings_counts_twice(peak, texture):
+    """Levels 18 and 22 by turns: s_t^2 = 2 (4 - (0.02 x 20 + 0.4^2) - (0.01 x 100)^2) in Eqs. (2) and (3).
+
+    Of a clipped blob the lens's rings are not known: there s_t is 0.
+    """
     rows, columns = np.indices((21, 21))
     image = (20 + 2 * (-1) ** (rows + columns)).astype(np.uint8)
-    image[9:12, 9:12] = [[50, 80, 60], [70, 120, 90], [50, 60, 50]]
-    blob = measure_blobs(image, foreground_runs(image, 40), 40, NOISE, background_dn=0.0)
+    image[9:12, 9:12] = [[50, 80, 60], [70, peak, 90], [50, 60, 50]]
+    noise = replace(NOISE, clipped_floor_px=0.0)
+    blob = measure_blobs(image, foreground_runs(image, 40), 40, noise, background_dn=0.0)
     near = np.maximum(abs(rows - 10), abs(columns - 10)) <= 2
     w, own = near * (image - 20.0), 0.02 * 20.0 + 0.4**2
-    texture = 2.0 * (4.0 - own - 1.0)
     s2 = 0.02 * image + 0.4**2 + texture
     variances = []
     for x, centre in zip((columns, rows), blob.centroids_px[0], strict=True):
@@ -272,6 +276,29 @@ def test_a_row_of_n_pixels_is_n_times_as_long_as_wide():
     image[5, 5:15] = image[10:14, 5:9] = 100
     blobs = measure_blobs(image, foreground_runs(image, 50), 50, NOISE, background_dn=0.0)
     np.testing.assert_allclose(blobs.elongation, [10.0, 1.0], rtol=1e-12)
+
+
+def test_a_diagonal_of_five_pixels_is_seven_times_as_long_as_wide():
+    """Moments of n unit squares along a diagonal: (n^2 - 1)/6 + 1/12 along it and 1/12 across."""
+    image = np.zeros((20, 40), np.uint8)
+    image[5 + np.arange(5), 10 + np.arange(5)] = image[5 + np.arange(5), 30 - np.arange(5)] = 100
+    blobs = measure_blobs(image, foreground_runs(image, 50), 50, NOISE, background_dn=0.0)
+    np.testing.assert_allclose(blobs.elongation, 7.0, rtol=1e-9)
+
+
+def test_the_window_of_a_clipped_blob_is_wider():
+    """R = 2.8 equivalent radii in Eq. (4), over the blob and what touches it."""
+    rng = np.random.default_rng(25)
+    image = np.full((31, 31), 6, np.uint8)
+    image[13:18, 13:18] = rng.integers(60, 120, (5, 5))
+    image[14:17, 14:17] = 255
+    blob = measure_blobs(image, foreground_runs(image, 40), 40, NOISE, background_dn=6.0, windowed=True)
+    rows, columns = np.indices(image.shape)
+    du, dv = columns - blob.centroids_px[0, 0], rows - blob.centroids_px[0, 1]
+    G = (1.0 - (du**2 + dv**2) / (2.8**2 * 25 / np.pi)) ** 2
+    w = G * (image - 6.0) * (np.maximum(abs(rows - 15), abs(columns - 15)) <= 3)
+    np.testing.assert_allclose([(w * du).sum() / w.sum(), (w * dv).sum() / w.sum()], 0.0, atol=1e-6)
+    assert abs(du[15, 15]) > 1e-3
 
 
 def test_a_blob_at_the_frame_edge_is_measured_inside_the_frame():
