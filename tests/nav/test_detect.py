@@ -1,9 +1,14 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from dockair.errors import DockairError
 from dockair.messages import Window
+from dockair.nav.image.binarise import frame_statistics
+from dockair.nav.image.centroid import NoiseModel, measure_blobs
 from dockair.nav.image.detect import DetectSettings, detect
+from dockair.nav.image.labelling import foreground_runs
 
 
 def ring_spots(centre, radius, electrons):
@@ -102,6 +107,7 @@ def test_a_fixed_threshold_is_taken_as_it_is(render):
     image = render((100, 100), [(50.0, 50.0, 2e4)], np.random.default_rng(12))
     assert detect(image, DetectSettings(threshold_dn=60)).threshold_dn == 60
     assert len(detect(image, DetectSettings(threshold_dn=250))) == 0
+    assert detect(image[:0], DetectSettings(threshold_dn=60)).threshold_dn == 60
 
 
 def test_the_frame_s_gain_sets_the_shot_noise(render):
@@ -155,6 +161,81 @@ def test_wrong_images_and_settings_are_refused():
         DetectSettings(method="global")
     with pytest.raises(DockairError, match="centroid"):
         DetectSettings(centroid="best")
+
+
+@pytest.mark.parametrize("limit", ["spot_isolation", "texture", "spot_detection", "spot_beside", "spot_share"])
+def test_a_limit_of_spots_is_that_of_their_equations_with_the_frame_s_own_gain(limit):
+    """A pixel of 140 with one of 138 beside it on an even 100, all others at nought: a hundredth more is too much."""
+    image = np.full((60, 90), 100, np.uint8)
+    image[29:32, 44:47] = 102
+    image[30, 45], image[30, 46] = 140, 138
+    s = np.sqrt(0.05 * 100.0 + 0.25**2 + 1.0 / 12.0)
+    seven = (3 * 2.0 + 4 * 1.0) * 2.0
+    most = {
+        "spot_isolation": 40.0 / s,
+        "texture": 40.0 / 100.0,
+        "spot_detection": (4.0 * 40.0 + 2.0 * 38.0 + seven) / 6.0 / s,
+        "spot_beside": seven / 4.0 / s,
+        "spot_share": seven / 4.0 / 40.0,
+    }
+    for factor, count in ((0.99, 1), (1.01, 0)):
+        settings = DetectSettings(**{**dict.fromkeys(most, 1e-3), limit: factor * most[limit]})
+        assert len(detect(image, settings, gain_dn_per_electron=0.05)) == count
+
+
+def point(peak: int = 105) -> np.ndarray:
+    """A point whose light is four times that of its brightest pixel above the background of 5."""
+    image = np.full((60, 90), 5, np.uint8)
+    above = peak - 5
+    image[29:32, 44:47] = 5 + above * np.array([[1, 2, 1], [2, 4, 2], [1, 2, 1]]) // 4
+    return image
+
+
+@pytest.mark.parametrize(("widest", "count"), [(3.99, 0), (4.01, 1)])
+def test_a_spot_that_is_not_clipped_has_at_most_the_light_that_is_allowed_to_its_peak(widest, count):
+    settings = DetectSettings(max_equivalent_area_px=widest)
+    assert len(detect(point(), settings)) == count
+    assert len(detect(point(), replace(settings, method="frame"))) == 1  # all that is asked of a frame's is their area
+    assert len(detect(point(), replace(settings, saturation_dn=105))) == 1
+
+
+@pytest.mark.parametrize(("longest", "count"), [(2.99, 0), (3.01, 1)])
+def test_a_row_of_three_pixels_is_three_times_as_long_as_wide(longest, count):
+    image = np.full((60, 90), 5, np.uint8)
+    image[30, 44:47] = 105
+    assert len(detect(image, DetectSettings(threshold_dn=50, max_elongation=longest))) == count
+
+
+def test_one_area_may_be_both_the_least_and_the_largest():
+    image = np.zeros((60, 90), np.uint8)
+    for n in (1, 2, 3):
+        image[20 * n - 10 : 20 * n - 10 + n, 40:42] = 105
+    settings = DetectSettings(threshold_dn=50, min_area_px=4, max_area_px=4)
+    assert detect(image, settings).area_px.tolist() == [4]
+
+
+@pytest.mark.parametrize("peak", [105, 255])
+@pytest.mark.parametrize("windowed", [True, False])
+@pytest.mark.parametrize("local_background", [True, False])
+def test_blobs_are_measured_with_the_noise_that_the_settings_and_the_frame_say(peak, windowed, local_background):
+    image = point(peak) + np.random.default_rng(21).integers(0, 3, (60, 90)).astype(np.uint8)
+    image[30, 45] = peak
+    settings = DetectSettings(
+        threshold_dn=20, local_background=local_background, centroid="windowed" if windowed else "weighted",
+        noise_dn=0.7, response_spread=0.03, sigma_floor_px=0.002, clipped_sigma_floor_px=0.02,
+    )  # fmt: skip
+    noise = NoiseModel(
+        gain_dn_per_electron=0.05, noise_dn=np.sqrt(0.7**2 + 1.0 / 12.0), saturation_dn=255, floor_px=0.002,
+        clipped_floor_px=0.02, response_spread=0.03,
+    )  # fmt: skip
+    expected = measure_blobs(
+        image, foreground_runs(image, 20), 20, noise, background_dn=frame_statistics(image).background_dn,
+        local_background=local_background, windowed=windowed,
+    )  # fmt: skip
+    blobs = detect(image, settings, gain_dn_per_electron=0.05)
+    assert blobs.clipped.tolist() == [peak == 255]
+    for field in ("centroids_px", "sigma_px", "flux", "peak", "clipped"):
+        np.testing.assert_array_equal(getattr(blobs, field), getattr(expected, field))
 
 
 def test_leds_before_a_bright_uneven_background_are_found_by_their_surroundings_alone(render):
