@@ -120,6 +120,47 @@ def test_a_bias_without_white_noise_is_found_at_averaging_times_far_below_its_ow
     assert noise.noise_density_rad_s_rthz < 1e-7
 
 
+def test_by_default_there_are_ten_times_a_decade_from_one_sample_to_a_third_of_the_record():
+    curve = allan_deviation(np.random.default_rng(7).standard_normal(3000), 10.0)
+    assert (curve.taus_s[0], curve.taus_s[-1]) == (0.1, 100.0)
+    np.testing.assert_allclose(np.diff(np.log10(curve.taus_s[-15:])), 0.1, atol=0.01)
+
+
+def test_a_time_is_taken_to_the_nearest_sample_and_may_be_half_the_record():
+    """0.29 s at 100 Hz are 28.999999999999996 samples in double precision."""
+    curve = allan_deviation(np.random.default_rng(8).standard_normal(58), 100.0, [0.29])
+    assert curve.taus_s.tolist() == [0.29] and curve.intervals.tolist() == [1.0]
+
+
+def test_terms_of_a_curve_that_is_made_of_them_come_back_and_no_other_correlation_fits_as_well():
+    """Eq. (2) with the function of Eq. (3) written for it: exact, at thirty times over five decades."""
+    Q, N, B, K, T = 2e-6, 1e-4, 5e-5, 2e-6, 20.0
+    t = np.geomspace(0.02, 2000.0, 30)
+    r = t / T
+    G = 2.0 / r * (1.0 - (3.0 - 4.0 * np.exp(-r) + np.exp(-2.0 * r)) / (2.0 * r))
+    variance = 3.0 * Q**2 / t**2 + N**2 / t + (B / 0.6174) ** 2 * G + K**2 * t / 3.0
+    curve = allan.AllanCurve(t, np.sqrt(variance), 6000.0 / t - 1.0)
+    squares, fitted, misfit = allan._fit(curve, T, "QNBK")
+    np.testing.assert_allclose(np.sqrt(squares), [Q, N, B, K], rtol=1e-3)
+    np.testing.assert_allclose(fitted, variance, rtol=1e-6)
+    assert misfit < min(allan._fit(curve, factor * T, "QNBK")[2] for factor in (0.5, 0.8, 1.25, 2.0))
+
+
+def test_each_time_counts_by_its_number_of_independent_intervals():
+    """White noise alone: N^2 is the mean of t var(t), weighted by the intervals."""
+    t, ratio, n = np.array([1.0, 4.0, 9.0]), np.array([1.0, 2.0, 3.0]), np.array([100.0, 10.0, 1.0])
+    (square,), fitted, _ = allan._fit(allan.AllanCurve(t, np.sqrt(ratio / t), n), 1.0, "N")
+    assert square == pytest.approx((n * ratio).sum() / n.sum(), rel=1e-9)
+    np.testing.assert_allclose(fitted, square / t, rtol=1e-12)
+
+
+def test_what_the_terms_make_is_given_as_a_deviation_at_the_curve_s_times():
+    noise = identify_gyro_noise(_record(9, N=1e-4, hours=0.05), 50.0, terms="N")
+    np.testing.assert_allclose(
+        noise.fitted_rad_s, noise.noise_density_rad_s_rthz / np.sqrt(noise.curve.taus_s), rtol=1e-9
+    )
+
+
 @pytest.mark.parametrize("scale", [1.0, 1e-157])
 def test_a_record_whose_averages_cancel_to_the_bit_has_terms_too(scale):
     """Levels by turns: an angle that swings by 1e-5 rad to either side, and of an even number of samples no trace."""
@@ -141,7 +182,9 @@ def test_a_record_whose_averages_cancel_to_the_bit_has_terms_too(scale):
         ("rates", lambda: identify_gyro_noise(np.column_stack([np.arange(9.0), np.zeros(9)]), 50.0)),
         ("taus_s", lambda: allan_deviation(NBS14, 1.0, [5.0])),
         ("taus_s", lambda: allan_deviation(NBS14, 1.0, [0.1])),
+        ("rates", lambda: allan_deviation([1.0, -1e300, 2.0], 1.0)),
         ("terms", lambda: identify_gyro_noise(NBS14, 1.0, terms="NX")),
+        ("terms", lambda: identify_gyro_noise(NBS14, 1.0, terms="NN")),
         ("bias_correlation_s", lambda: identify_gyro_noise(NBS14, 1.0, bias_correlation_s=-1.0)),
         ("bias_correlation_s", lambda: identify_gyro_noise(NBS14, 1.0, bias_correlation_s=np.inf)),
         ("bias_correlation_s", lambda: identify_gyro_noise(NBS14, 1.0, bias_correlation_s=1e300)),

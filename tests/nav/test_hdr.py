@@ -37,11 +37,23 @@ def test_a_rate_of_zero_is_corrected_by_nothing():
     assert (hdr.run(np.zeros(500)) == 0.0).all() and hdr.correction_rad_s == 0.0
 
 
+@pytest.mark.parametrize("rate_rad_s", [-0.2, 0.2])
 @pytest.mark.parametrize("loop", ["printed", "closed"])
-def test_a_turn_above_the_switch_is_left_alone(loop):
+def test_a_turn_above_the_switch_is_left_alone(loop, rate_rad_s):
     hdr = HeuristicDriftReduction(RATE_HZ, HeuristicDriftSettings(loop=loop, time_constant_s=0.0, turn_rate_rad_s=0.1))
-    hdr.run(np.full(1000, 0.2))
+    hdr.run(np.full(1000, rate_rad_s))
     assert hdr.correction_rad_s == 0.0
+
+
+def test_it_is_the_low_pass_that_tells_a_turn():
+    """0.2 rad/s behind a low-pass of a second are 0.1 after 0.7 s: till then I goes on."""
+    hdr = HeuristicDriftReduction(RATE_HZ, HeuristicDriftSettings(turn_rate_rad_s=0.1, step_rad_s=1e-6))
+    corrections = []
+    for _ in range(100):
+        hdr.step(0.2)
+        corrections.append(hdr.correction_rad_s)
+    moved = np.flatnonzero(np.diff(corrections))
+    assert moved[-1] == len(moved) - 1 and 0.66 * RATE_HZ < len(moved) < 0.72 * RATE_HZ
 
 
 def test_the_closed_loop_gives_the_raw_rate_and_its_correction_whose_low_pass_drives_it():

@@ -133,7 +133,19 @@ def test_a_later_change_of_the_bias_counts_by_its_step_over_the_longest_time():
     np.testing.assert_allclose(levelled_at_rest(levelling, 1, [0.02, -0.04, 0.0], 60), [0.001, -0.002, 0.0], rtol=1e-9)
 
 
-@pytest.mark.parametrize(("turn", "correction", "learns"), [(0.2, 0.0, False), (0.2, -0.15, True), (0.0, 0.2, False)])
+def test_levelling_without_samples_since_the_last_time_waits_for_some():
+    """Two samples of one step, the second asked for after an average that had none."""
+    levelling = Levelling(20.0)
+    for stamp_s, rate in ((0.0, 0.0), (1.0, 0.02)):
+        levelling.heading_rate_rad_s(np.array([rate, 0.0, 0.0]), np.eye(3))
+        levelling.average(stamp_s, np.eye(3), 0.0, 0.1)
+        levelling.average(stamp_s + 0.5, np.eye(3), 0.0, 0.1)
+    np.testing.assert_allclose(levelling.bias_B, [0.02, 0.0, 0.0], rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("turn", "correction", "learns"), [(0.2, 0.0, False), (-0.2, 0.0, False), (0.2, -0.15, True), (0.0, 0.2, False)]
+)
 def test_in_a_turn_as_corrected_levelling_rests(turn, correction, learns):
     bias = levelled_at_rest(Levelling(20.0), 5, [0.02, 0.0, turn], 0, correction)
     np.testing.assert_allclose(bias, [0.02 * learns, 0.0, 0.0], atol=1e-12)
