@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from dockair.calibration import Camera
-from dockair.nav.heading.features import Features
+from dockair.nav.heading.features import Features, matched
+from dockair.nav.heading.levelling import without_yaw
 from dockair.nav.heading.turn import HeadingLine, TurnStatus, VisualSettings, _shared, turn_between
-from dockair.nav.heading.visual import VisualHeading
-from dockair.rotations import matrix_from_yaw_pitch_roll
+from dockair.nav.heading.visual import VisualHeading, _Seen
+from dockair.rotations import exp, matrix_from_yaw_pitch_roll
 
 DEGREE = np.pi / 180.0
 CAMERA = Camera()
@@ -114,7 +115,8 @@ def test_of_a_plain_mean_those_within_three_robust_sigmas_count_and_sigma_is_the
 
 @pytest.mark.parametrize(
     ("share_it", "others", "least_share", "status"),
-    [(10, 4, 0.35, TurnStatus.DISAGREE), (12, 4, 0.35, TurnStatus.MEASURED), (28, 12, 0.72, TurnStatus.DISAGREE),
+    [(11, 0, 0.35, TurnStatus.TOO_FEW), (12, 0, 0.35, TurnStatus.MEASURED),
+     (10, 4, 0.35, TurnStatus.DISAGREE), (12, 4, 0.35, TurnStatus.MEASURED), (28, 12, 0.72, TurnStatus.DISAGREE),
      (28, 12, 0.68, TurnStatus.MEASURED)],
 )  # fmt: skip
 def test_matches_disagree_where_too_few_or_too_small_a_share_have_one_shift(share_it, others, least_share, status):
@@ -153,7 +155,7 @@ def _seen_heading(monkeypatch, images):
 def test_an_image_that_shares_nothing_with_the_key_frame_is_measured_from_the_one_before(monkeypatch):
     numbers = [np.arange(first, first + 150) for first in (0, 75, 150)]
     images = [(PLACES[n] + k * SHIFT, n) for k, n in enumerate(numbers)]
-    assert _seen_heading(monkeypatch, images)[0] == pytest.approx(2.0 * DEGREE, abs=1e-6)
+    assert _seen_heading(monkeypatch, images)[:2] == (pytest.approx(2.0 * DEGREE, abs=1e-6), 2)
 
 
 def test_an_image_misled_against_the_key_frame_is_mended_by_the_one_before(monkeypatch):
@@ -186,3 +188,91 @@ def test_after_a_refused_image_the_next_is_measured_from_that_one(monkeypatch):
     images = [(PLACES[n] + k * SHIFT, n) for k, n in enumerate(numbers)]
     heading, key_frames, _ = _seen_heading(monkeypatch, images)
     assert heading == pytest.approx(0.05 + DEGREE, abs=1e-6) and key_frames == 2
+
+
+@pytest.mark.parametrize("turn_deg", [-2.6, 2.6])
+def test_the_way_back_is_the_turn_back(turn_deg):
+    """Azimuths and depressions are halfway between both images, so that neither of them is the first."""
+    one, two = _over_ground(forward_m=720.0, left_m=-40.0, turn=turn_deg * DEGREE)
+    there, back = turn_between(one, two, CAMERA, AIRCRAFT), turn_between(two, one, CAMERA, AIRCRAFT)
+    assert back.turn_rad == pytest.approx(-there.turn_rad, rel=1e-9)
+    assert back.sigma_rad == pytest.approx(there.sigma_rad, rel=1e-6)
+
+
+def test_a_spread_about_the_middle_takes_nothing_of_the_shift():
+    """Eq. (13) with its own terms, of matches that all lie to one side."""
+    rng, middle = np.random.default_rng(6), 0.5 * (CAMERA.width_px - 1)
+    place = rng.uniform(middle, CAMERA.width_px, 100)
+    shift = 17.0 + 0.02 * (place - middle) + 1e-5 * (place - middle) ** 2
+    rows, numbers = rng.uniform(0.0, 1000.0, 100), np.arange(100)
+    images = [_features(np.column_stack([place + s * shift, rows]), numbers) for s in (-0.5, 0.5)]
+    turn = turn_between(*images, LINE, VisualSettings())
+    assert turn.shift_px == pytest.approx(17.0, abs=1e-9) and turn.turn_rad == pytest.approx(0.017, abs=1e-12)
+    assert turn_between(*images, LINE, VisualSettings(spreads=False)).shift_px > 22.0
+
+
+def test_a_spread_of_azimuths_about_the_heading_takes_nothing_of_the_turn():
+    """Eqs. (12) and (13): what lies at the azimuth a halfway has turned by d + k a, all of it to the left."""
+    azimuth = np.random.default_rng(7).uniform(0.0, 20.0, 100) * DEGREE
+    d = TURN + 0.05 * azimuth
+    rays = [np.column_stack([np.cos(a), np.sin(a), np.full(100, 0.1)]) for a in (azimuth + 0.5 * d, azimuth - 0.5 * d)]
+    images = [_features(CAMERA.pixels_from_points(ray), np.arange(100)) for ray in rays]
+    assert turn_between(*images, CAMERA, VisualSettings()).turn_rad == pytest.approx(TURN, abs=1e-9)
+    assert turn_between(*images, CAMERA, VisualSettings(spreads=False)).turn_rad > TURN + 0.3 * DEGREE
+
+
+def test_sigma_of_a_line_s_turn_is_that_of_the_shift_times_its_slope():
+    numbers = np.arange(100)
+    noisy = PLACES[numbers] + SHIFT + np.random.default_rng(8).normal(0.0, 2.0, (100, 2))
+    images = [_features(PLACES[numbers], numbers), _features(noisy, numbers)]
+    for slope in (1e-3, -2e-3):
+        turn = turn_between(*images, HeadingLine(slope_rad_px=slope), VisualSettings(spreads=False))
+        assert turn.sigma_rad == pytest.approx(abs(slope) * 2.0 / 10.0, rel=0.25)  # a scatter's own is 7 %
+
+
+@pytest.mark.parametrize(("nearest", "second", "clear"), [(0.74, 1.0, True), (0.76, 1.0, False), (1.0, 0.74, True)])
+def test_a_match_is_nearer_than_three_quarters_of_the_second_nearest(nearest, second, clear):
+    """Distances of one descriptor from two; a third is far from all."""
+    one = Features(np.array([[1.0, 2.0], [3.0, 4.0]]), np.array([[0.0, 0.0], [9.0, 9.0]], np.float32), None, 0.0)
+    others = np.array([[nearest, 0.0], [0.0, second], [9.0, 9.0]], np.float32)
+    two = Features(np.array([[10.0, 0.0], [20.0, 0.0], [30.0, 0.0]]), others, None, 0.0)
+    a, b = matched(one, two, 0.75)
+    assert a.tolist() == [[1.0, 2.0]] * clear + [[3.0, 4.0]]
+    assert b.tolist() == [[10.0 if nearest < second else 20.0, 0.0]] * clear + [[30.0, 0.0]]
+
+
+def test_of_two_features_with_one_nearest_the_nearer_is_matched():
+    one = Features(np.array([[1.0, 0.0], [2.0, 0.0]]), np.array([[0.2, 0.0], [0.1, 0.0]], np.float32), None, 0.0)
+    two = Features(np.array([[5.0, 0.0], [6.0, 0.0]]), np.array([[0.0, 0.0], [9.0, 9.0]], np.float32), None, 0.0)
+    a, b = matched(one, two, 0.75)
+    assert a.tolist() == [[2.0, 0.0]] and b.tolist() == [[5.0, 0.0]]
+
+
+@pytest.mark.parametrize(("turn_deg", "key_frames"), [(-5.1, 2), (-4.9, 1), (4.9, 1), (5.1, 2)])
+def test_an_image_that_has_turned_by_five_degrees_to_either_side_is_the_next_key_frame(
+    monkeypatch, turn_deg, key_frames
+):
+    numbers = np.arange(100)
+    images = [(PLACES[numbers] + k * turn_deg * SHIFT, numbers) for k in (0, 1)]
+    assert _seen_heading(monkeypatch, images)[1] == key_frames
+
+
+def test_a_tilt_is_each_image_s_in_axes_along_its_own_heading():
+    """Key frame and last image at other headings and attitudes; without attitudes nothing is to be tilted."""
+    tilt, R_BC = np.array([0.02, -0.03, 0.0]), matrix_from_yaw_pitch_roll(0.1, 0.05, 0.35)
+    visual = VisualHeading(CAMERA)
+    visual.tilt(tilt, R_BC)
+    seen = [(0.4, matrix_from_yaw_pitch_roll(0.0, -0.1, 0.02)), (2.0, matrix_from_yaw_pitch_roll(0.0, 0.05, -0.3))]
+    for attitudes in ([R @ R_BC for _, R in seen], [None, None]):
+        visual._key, visual._last = (
+            _Seen(_features(PLACES[:3], range(3), R_HC), heading)
+            for R_HC, (heading, _) in zip(attitudes, seen, strict=True)
+        )
+        visual.tilt(tilt, R_BC)
+        for image, (heading, R_LB), R_HC in zip((visual._key, visual._last), seen, attitudes, strict=True):
+            if R_HC is None:
+                assert image.features.R_HC is None
+                continue
+            along = np.array([[np.cos(heading), np.sin(heading), 0.0], [-np.sin(heading), np.cos(heading), 0.0]])
+            expected = without_yaw(exp(np.append(along @ tilt, 0.0)) @ R_LB) @ R_BC
+            np.testing.assert_allclose(image.features.R_HC, expected, atol=1e-12)

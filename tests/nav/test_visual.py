@@ -155,7 +155,9 @@ def test_the_line_through_known_turns_is_the_least_squares_one():
     exact = fit_heading_line(x, np.radians(0.0272 * x + 0.0272), with_offset=True)
     assert np.degrees(exact.slope_rad_px) == pytest.approx(0.0272)
     assert np.degrees(exact.turn_rad(100.0)) == pytest.approx(2.75, abs=0.003)  # the source's printed example
-    assert fit_heading_line(x, 1e-3 * x + 0.01).offset_rad == 0.0
+    through_zero, d = fit_heading_line(x, 1e-3 * x + 0.01), 1e-3 * x + 0.01
+    assert through_zero.offset_rad == 0.0
+    assert through_zero.slope_rad_px == pytest.approx((x * d).sum() / (x * x).sum(), rel=1e-9)
 
 
 def test_a_dim_picture_s_structure_is_found_as_well(landscape, ahead):
