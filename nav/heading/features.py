@@ -109,7 +109,9 @@ def _stretched(grey: NDArray[Any], mask: NDArray[np.bool_] | None) -> NDArray[np
 
 @cache
 def _sift(most: int, contrast: float) -> Any:
-    return cv2.SIFT_create(nfeatures=most, contrastThreshold=contrast)  # type: ignore[attr-defined]
+    return cv2.SIFT_create(  # type: ignore[attr-defined]
+        nfeatures=most, contrastThreshold=contrast, enable_precise_upscale=True
+    )
 
 
 def matched(one: Features, two: Features, ratio: float) -> tuple[Array, Array]:
