@@ -160,6 +160,14 @@ def test_fewer_than_twelve_pixels_around_a_blob_say_less_of_the_background_than_
     assert blob.flux[0] == pytest.approx((image[:, 1:6] - background).sum())
 
 
+def test_twelve_pixels_around_a_blob_are_enough_for_its_background():
+    """A blob of 2 x 2 pixels and what touches it fill 16 of 28."""
+    image = np.full((4, 7), 10, np.uint8)
+    image[1:3, 2:4] = 100
+    blob = measure_blobs(image, foreground_runs(image, 50), 50, NOISE, background_dn=7.0)
+    assert blob.flux[0] == pytest.approx(4 * 90.0)
+
+
 def test_structure_around_a_merged_spot_does_not_take_its_doubt_away():
     """Beside canopy the background varies; that is no noise of the moments, and Eq. (6) has to see past it."""
     rows, columns = np.indices((21, 21))
