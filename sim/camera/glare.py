@@ -210,7 +210,7 @@ class Glare:
 
     def _check_budget(self) -> None:
         lost = self.shares["lost"]
-        if lost < 0.0 or self._wing >= 1.0:
+        if lost < 0.0:
             raise DockairError(
                 "glare", expected="transmittance x (1 + veil + halo + ghosts) <= 1", got=round(1.0 - lost, 4)
             )

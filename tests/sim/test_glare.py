@@ -338,3 +338,11 @@ def test_a_window_is_the_full_frames_crop_bit_for_bit(camera: Camera, place: tup
 def test_a_sheet_that_cannot_be_is_refused(changes: dict[str, object], message: str) -> None:
     with pytest.raises(DockairError, match=message):
         _glare(**changes)
+
+
+def test_no_lens_of_the_sheets_throws_all_of_the_disc_into_its_wing() -> None:
+    """The widest wing of all ranges, over the smallest image of the Sun: 1 mm, f/16, three blades, a micrometre."""
+    parameters, lens = replace(PARAMETERS, iris_blades=3), replace(LENS, f_number=16.0)
+    sun = replace(LIGHT, sun_angular_radius_rad=4.5e-3)
+    shares = Glare(parameters, lens, Camera(focal_length_m=1e-3), sun, RESPONSE, 1e-6).shares
+    assert 0.0 < shares["disc"] < 0.1 * LENS.transmittance
