@@ -2,8 +2,8 @@
 
     p = (y, z)/(|x| + |y| + |z|);     x < 0:  p <- (sgn p_y (1 - |p_z|), sgn p_z (1 - |p_y|))                    (1)
 
-Nodes of a table stand on an even grid of p, 2/n rad apart straight ahead and up to 2.3 times that elsewhere, with rows
-of them on p_y = 0 and p_z = 0, where the map has a kink: row 0 up, column 0 left, straight ahead in the middle.
+Nodes of a table stand on an even grid of p, 2/n rad apart straight ahead and up to sqrt 6 times that elsewhere, with
+rows of them on p_y = 0 and p_z = 0, where the map has a kink: row 0 up, column 0 left, straight ahead in the middle.
 Source: Praun & Hoppe 2003 (octahedral maps).
 """
 

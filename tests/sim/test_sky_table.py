@@ -126,3 +126,16 @@ def test_directions_of_nodes_are_unit_vectors_in_their_place() -> None:
     assert d[4, 0] == pytest.approx([0, 1, 0])  # left
     for corner in (d[0, 0], d[0, 8], d[8, 0], d[8, 8]):
         assert corner == pytest.approx([-1, 0, 0])
+
+
+def test_nodes_stand_two_nths_of_a_radian_apart_ahead_and_up_to_root_six_times_that_elsewhere() -> None:
+    """Nowhere are they nearer than ahead; widest apart they stand in the middle of a face."""
+    n = 302
+    i, j = np.meshgrid(np.arange(n - 1), np.arange(n - 1), indexing="ij")
+    d = directions_from_nodes(i.ravel(), j.ravel(), n).reshape(n - 1, n - 1, 3)
+    down, right = (np.linalg.norm(np.diff(d, axis=axis), axis=-1) * (n - 2) / 2.0 for axis in (0, 1))
+    middle = n // 2 - 1
+    assert (down[middle, middle], right[middle, middle]) == pytest.approx((1.0, 1.0), abs=0.01)
+    for apart in (down, right):
+        assert apart.min() > 0.99
+        assert apart.max() == pytest.approx(np.sqrt(6.0), abs=0.02)
