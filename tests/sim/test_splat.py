@@ -10,7 +10,7 @@ from dockair.parameters import load_parameters
 from dockair.sim.camera.optics import PointSpread
 from dockair.sim.camera.point_spread import airy_px
 from dockair.sim.camera.sheets import LensParameters, SensorParameters
-from dockair.sim.camera.splat import FAINTEST_E
+from dockair.sim.camera.splat import FAINTEST_E, reach_window
 
 LENS, SENSOR = load_parameters("lens", LensParameters), load_parameters("sensor", SensorParameters)
 CAMERA = Camera()
@@ -155,6 +155,25 @@ def test_a_blob_just_outside_still_throws_its_wings_into_the_image() -> None:
     _spread().splat(image, (0, 0), np.array([[-20.0, 20.0]]), np.array([1e6]), np.array([10.0]), 0.0, np.zeros((1, 2)))
     A = airy_px(replace(LENS, f_number=8.0, focus_distance_m=FOCUS_M), CAMERA, LED_M) / np.pi**3
     assert image[20, 0] == pytest.approx(A * 1e6 / 20.0**3, rel=0.2)
+
+
+def test_a_blob_reaches_every_pixel_that_it_adds_to_and_none_two_pixels_beyond_its_wings() -> None:
+    """A window of one pixel; the blob at twentieths of a pixel around where its wings end."""
+    spread, electrons = _spread(), 1e6
+    A = airy_px(replace(LENS, f_number=8.0, focus_distance_m=FOCUS_M), CAMERA, LED_M) / np.pi**3
+    r = (A * electrons / FAINTEST_E) ** (1.0 / 3.0) + np.arange(-3.0, 3.0, 0.05)
+    pixels, still, zeros = np.column_stack([r, np.zeros(len(r))]), np.zeros((len(r), 2)), np.zeros(len(r))
+    near = reach_window(
+        (1, 1), (0, 0), pixels, still, zeros + electrons, 0.0, zeros, spread.widest_px, spread.wing
+    )  # fmt: skip
+    adds = []
+    for k in range(len(r)):
+        image = np.zeros((1, 1), dtype=np.float32)
+        spread.splat(image, (0, 0), pixels, zeros + electrons, zeros + FOCUS_M, 0.0, still, np.array([k]))
+        adds.append(image[0, 0] > 0.0)
+    assert 40 < np.count_nonzero(adds) < len(r)
+    assert np.isin(np.flatnonzero(adds), near).all()
+    assert len(near) < np.count_nonzero(adds) + 2.0 / 0.05
 
 
 @pytest.mark.parametrize("size_m", [0.0, DIE_M, 0.012, 0.03])
