@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from dockair.rotations import exp
+from dockair.rotations import exp, quaternion_from_matrix
 from dockair.sim.camera.glints import find_glints, glint_rows
 from dockair.sim.camera.meshes import Meshes
 from dockair.sim.camera.mirrors import GLASS, METAL, PAINT, RUBBER, Mirrors, material_of, rim_of
@@ -204,6 +204,22 @@ def test_the_rim_is_read_back_from_its_capsules() -> None:
     assert rim.centre_x_m == pytest.approx(0.01)
     assert rim.skin_m == pytest.approx(0.25 * (1.0 - np.cos(np.pi / 24)) + 1e-3)
     assert rim_of(scene_of(metal_sphere([1.0, 0.0, 0.0], 0.1))[0]) is None
+
+
+def test_the_rims_torus_goes_through_its_capsules_however_its_body_is_turned() -> None:
+    """Ends of the pieces stand on its circle; its axis is the body's x."""
+    model, data = _rim_world()
+    rim, body = rim_of(model), model.body("drogue")
+    body.quat = quaternion_from_matrix(exp(np.array([0.4, -0.9, 0.7])))
+    mujoco.mj_forward(model, data)
+    assert rim is not None
+    centre, axis, radius, tube = (np.array(part) for part in rim.torus_W(data))
+    np.testing.assert_allclose(axis, data.body("drogue").xmat[::3], atol=1e-12)
+    for side in (1.0, -1.0):
+        ends = data.geom_xpos + side * model.geom_size[:, 1:2] * data.geom_xmat[:, 2::3]
+        np.testing.assert_allclose((ends - centre) @ axis, 0.0, atol=1e-12)
+        np.testing.assert_allclose(np.linalg.norm(ends - centre, axis=1), radius, atol=1e-12)
+    assert tube == pytest.approx(0.008)
 
 
 @pytest.mark.parametrize("sun", [unit(-0.8, 0.1, 0.6), unit(-0.5, -0.8, -0.3), unit(-0.6, 0.6, 0.1)])

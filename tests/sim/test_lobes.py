@@ -213,6 +213,16 @@ def test_a_glint_is_as_bright_as_its_materials_share(geom: str, share: str) -> N
     assert dim == pytest.approx(0.25 * bright, rel=1e-12)
 
 
+@pytest.mark.parametrize("geom", ["tanker_x", "basket_rib_3", "hose_4", "skin_canopy"])
+def test_a_balls_glint_is_as_wide_as_its_own_materials_slopes_make_it(geom: str) -> None:
+    """A square of twelve times the variance, (r s)^2 a direction; each of the four materials as rough as no other."""
+    rough = {"tanker_x": 0.01, "basket_rib_3": 0.015, "hose_4": 0.02, "skin_canopy": 0.025}
+    names = ("paint_roughness_rad", "metal_roughness_rad", "rubber_roughness_rad", "glass_roughness_rad")
+    surfaces = replace(IDEAL, **dict(zip(names, rough.values(), strict=True)))
+    glints = glints_in(scene_of(metal_sphere([30.0, 0.0, 0.0], 0.5, name=geom)), unit(-1, 0, 1), surfaces)
+    assert glints.size_m[0] == pytest.approx(np.sqrt(12.0) * 0.5 * rough[geom], rel=0.05)
+
+
 def test_the_suns_image_in_a_ball_is_its_angle_times_half_the_radius() -> None:
     """A disc of half-width a r/2, variance (a r/2)^2/4 a direction; a square of that variance has twelve times it."""
     r, a = 0.4, LIGHT.sun_angular_radius_rad
