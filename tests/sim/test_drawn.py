@@ -10,8 +10,9 @@ from dockair.errors import MachineError
 from dockair.rotations import exp
 from dockair.sim import off_screen
 from dockair.sim.camera.drawn import DrawnSolids
-from dockair.sim.camera.pieces import _reach
-from dockair.sim.camera.solids import BALL, BOX, CAPSULE, CYLINDER, Haze, Lighting
+from dockair.sim.camera.meshes import Meshes
+from dockair.sim.camera.pieces import Table, _reach, set_pieces, set_planes
+from dockair.sim.camera.solids import BALL, BOX, CAPSULE, CYLINDER, Haze, Lighting, Solids
 from dockair.sim.camera.traced import TracedSolids
 from dockair.sim.camera.unit_meshes import BALLS, CUBE, ENDS, SLICES, TUBES, unit_meshes
 
@@ -179,6 +180,46 @@ def test_a_solid_reaches_as_far_along_a_direction_as_its_farthest_point(kind: in
         reach = _reach(kind, h, M, np.array([*direction, 0.0]))
         assert farthest <= reach * (1.0 + 1e-12)
         assert farthest == pytest.approx(reach, rel=0.01)
+
+
+def _pieces(**geom: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Numbers of the meshes (n,) of a geom ten metres ahead, their places (n, 3) and their axes (n, 3, 3)."""
+    model, data = _scene({"pos": [10.0, 0.0, 0.0], **geom})
+    table, planes = Table.of(Solids.of(model), Meshes.of(model)), np.empty((6, 4))
+    set_planes(planes, np.eye(3), (X[0], X[-1], Y[0], Y[-1]), (0.1, 2000.0))
+    pieces = tuple(np.empty((3, *shape), dtype=np.float32) for shape in ((3,), (3, 3), (4,)))
+    meshes, changed = np.full(3, -1), np.empty(3, dtype=np.int64)
+    poses = data.geom_xpos, data.geom_xmat
+    count, _ = set_pieces(table, poses, np.zeros(3), planes, BLOCKS_PER_TANGENT, pieces, meshes, changed)
+    return meshes[:count], pieces[0][:count], pieces[1][:count]
+
+
+@pytest.mark.parametrize("kind", [GEOM.mjGEOM_SPHERE, GEOM.mjGEOM_CYLINDER])
+@pytest.mark.parametrize("radius_m", [0.001, 0.03, 0.2, 0.6, 2.3])
+def test_polygons_are_off_the_circle_by_a_quarter_of_a_block_where_a_solid_is_nearest(
+    kind: mujoco.mjtGeom, radius_m: float
+) -> None:
+    """2/(1 + cos(pi/n)) - 1 of the radius there, up to 150 blocks; and what is eight times as small is cut coarser."""
+    (mesh,), _, _ = _pieces(type=kind, size=[radius_m, 0.5, 0.0])
+    blocks = BLOCKS_PER_TANGENT * radius_m / (10.0 - radius_m)
+    level = mesh - (BALLS if kind == GEOM.mjGEOM_SPHERE else TUBES)
+    off = [blocks * (2.0 / (1.0 + np.cos(np.pi / n)) - 1.0) for n in SLICES]
+    assert off[level] < 0.252
+    assert level == 0 or off[level - 1] > 0.08
+
+
+def test_a_thin_capsule_is_a_tube_of_the_same_area_and_one_from_six_blocks_on_has_round_ends() -> None:
+    """Upright; the nearest part of it counts. The ends' tips are the capsule's, and no piece is inside out."""
+    for blocks, count in ((5.95, 1), (6.05, 3)):
+        radius, half = 10.0 * blocks / (BLOCKS_PER_TANGENT + blocks), 0.7
+        meshes, places, axes = _pieces(type=GEOM.mjGEOM_CAPSULE, size=[radius, half, 0.0])
+        assert len(meshes) == count and (np.linalg.det(axes) > 0.0).all()
+        tips = places[:, 2] + axes[:, 2, 2]
+        if count == 1:
+            assert 4.0 * radius * tips[0] == pytest.approx(4.0 * radius * half + np.pi * radius**2, rel=1e-6)
+        else:
+            assert tips == pytest.approx([half, half + radius, -half - radius], rel=1e-6)
+            assert list(meshes) == [TUBES + 1, ENDS + 1, ENDS + 1]
 
 
 @pytest.mark.gl
