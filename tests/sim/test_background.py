@@ -18,6 +18,7 @@ from dockair.sim.camera.sheets import BackgroundParameters
 
 CAMERA = Camera(width_px=400, height_px=300, principal_point_px=(207.3, 141.8), focal_length_m=16e-3 / 5)
 BENT = replace(CAMERA, distortion=(-0.25, 0.1, 0.004, -0.003, 0.02))  # moves the corners by 14 px
+TALL = replace(CAMERA, width_px=300, height_px=400, principal_point_px=(158.2, 207.3))
 FULL = CAMERA.full_window
 AT_ORIGIN = (np.eye(3), np.zeros(3))
 WINDOWS = [Window(101, 180, 155, 262), Window(0, 41, 0, 33), Window(251, 300, 333, 400), Window(60, 61, 70, 71)]
@@ -374,12 +375,18 @@ def test_the_as_built_principal_point_moves_the_picture(make: Callable[..., Back
     assert np.allclose(image[:, 40:] > 150.0, _draw(make(model, CAMERA, 1), data)[:, 20:-20] > 150.0)
 
 
-def test_distortion_of_less_than_half_a_block_is_left_out_and_more_is_not(make: Callable[..., Background]) -> None:
-    """k1 = 0.004 moves the farthest corner by 0.2 px, 0.04 by 2.1 px, a block being 2 px."""
+@pytest.mark.parametrize("camera", [CAMERA, TALL], ids=["wide", "tall"])
+def test_distortion_of_less_than_half_a_block_is_left_out_and_more_is_not(
+    make: Callable[..., Background], camera: Camera
+) -> None:
+    """k1 moves the farthest corner by k1 r^2 times its longer side: 0.9 px and 1.1 px, a block being 2 px."""
     model, data = _scene(*THREE_BALLS)
-    plain = _draw(make(model, CAMERA), data)
-    little = _draw(make(model, replace(CAMERA, distortion=(0.004, 0.0, 0.0, 0.0, 0.0))), data)
-    much = _draw(make(model, replace(CAMERA, distortion=(0.04, 0.0, 0.0, 0.0, 0.0))), data)
+    corner = (np.array(camera.principal_point_px) + 0.5) / camera.focal_length_px
+    longer_px = camera.focal_length_px * corner.max() * (corner @ corner)
+    plain, little, much = (
+        _draw(make(model, replace(camera, distortion=(moved_px / longer_px, *[0.0] * 4))), data, camera.full_window)
+        for moved_px in (0.0, 0.9, 1.1)
+    )
     assert np.array_equal(plain, little)
     assert not np.array_equal(plain, much)
 
