@@ -10,6 +10,7 @@ from dockair.parameters import load_parameters
 from dockair.rotations import exp, matrix_from_yaw_pitch_roll
 from dockair.sim.camera.earth import columns_below, dip_sine, meet_sphere
 from dockair.sim.camera.layer_table import NO_DECK, LayerTable, lay_under
+from dockair.sim.camera.layer_tiles import SIDE, LayerTiles
 from dockair.sim.camera.sheets import SkyParameters
 from dockair.sim.camera.sky import Sky
 from dockair.sim.camera.sky_radiance import SkyRadiance
@@ -229,6 +230,26 @@ def test_the_next_key_is_made_bit_by_bit_and_right(heading_m: tuple[float, float
             assert np.array_equal(*pictures)
     assert max(of_frame[1:]) < of_frame[0] / 20
     assert sum(of_frame[1:]) > 0.9 * of_frame[0]
+
+
+def test_of_what_is_planned_the_share_asked_for_is_made_and_another_key_begins_anew() -> None:
+    """Half of two tiles is one, whatever was planned and made under the key before."""
+    made: list[int] = []
+
+    def counted(d: np.ndarray, key_m: np.ndarray) -> np.ndarray:
+        made.append(len(d))
+        return _ground(d, key_m)
+
+    tiles = LayerTiles(counted, 32, 1)
+    for key in ((0.0, 0.0, 0.0), (2000.0, 0.0, 0.0), (2000.0, 2000.0, 0.0)):
+        tiles.restart(key)
+        assert tiles.lacks_work and not tiles.is_known.any()
+        tiles.plan([(31, 4), (31, 5)])
+        made.clear()
+        for _ in range(2):  # twice is once
+            tiles.prepare(0.5)
+            assert sum(made) == SIDE * SIDE
+        assert not tiles.lacks_work and tiles.is_known.sum() == 1
 
 
 def test_what_was_made_ahead_is_not_made_again_and_is_the_same() -> None:

@@ -37,5 +37,6 @@ def test_a_patch_in_a_window_is_the_full_frames_bit_for_bit() -> None:
 def test_patches_add_up_and_those_outside_or_nowhere_add_nothing() -> None:
     nowhere = np.array([[np.nan, 3.0], [5.0, np.inf], [900.0, 50.0], [50.0, -900.0]])
     assert not _patch(pixels=nowhere, electrons=np.full(4, 1e4), sigma_px=np.full(4, 10.0)).any()
+    assert not _patch(electrons=np.array([np.nan])).any()
     twice = _patch(pixels=np.array([[140.3, 95.7]] * 2), electrons=np.full(2, 5e4), sigma_px=np.full(2, 12.5))
     np.testing.assert_allclose(twice, 2.0 * _patch(), rtol=1e-6)

@@ -62,6 +62,18 @@ def test_every_block_whose_ray_meets_a_solid_is_in_one_of_its_runs(kind: mujoco.
     assert in_run[met].all()
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_runs_have_a_block_more_at_either_end_and_outlines_a_row_more(kind: mujoco.mjtGeom) -> None:
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        p_C = np.array([rng.uniform(5.0, 9.0), *rng.uniform(-1.0, 1.0, 2)])
+        in_run, met = _placed(kind, p_C, exp(rng.normal(0.0, 1.0, 3)), LEVEL)
+        assert met.any()
+        assert in_run[:, 1:][met[:, :-1]].all() and in_run[:, :-1][met[:, 1:]].all()
+        rows, rows_met = in_run.any(axis=1), met.any(axis=1)
+        assert rows[1:][rows_met[:-1]].all() and rows[:-1][rows_met[1:]].all()
+
+
 @pytest.mark.parametrize(("kind", "half"), [(GEOM.mjGEOM_BOX, (0.7, 0.2, 1.1)), (GEOM.mjGEOM_CAPSULE, (0.2, 0.2, 1.4))])
 def test_runs_are_the_solids_boxs_picture_and_two_blocks_more_a_side(
     kind: mujoco.mjtGeom, half: tuple[float, float, float]
