@@ -10,10 +10,11 @@ A table is of one place, its key, and serves all places around; from the key, D 
     (o_x + D_x, o_y + D_y, -h' - q),    q = a - sqrt(a^2 - o'^2) = o'^2/2a (1 + o'^2/4a^2 + ...)                   (2)
 
 with h' the key's height, o' the level way from there; the horizon is near enough for two terms. Keys stand on a grid, a
-third of the layer's depth apart, so that the picture is a function of the place alone. A feature stays where it is as
-the camera moves and turns; what it fades into changes with the key by less than the eye sees. On the way to a change of
-key the next one's tiles are made bit by bit, so that no frame has to wait for them; and, where there is time between
-frames, before anything looks at them. Rays that skim past the layer are taken to the farthest it reaches.
+third of the layer's depth apart at the start and closer where the layer is near, so that the picture is a function of
+the place alone. A feature stays where it is as the camera moves and turns; what it fades into changes with the key by
+less than the eye sees. On the way to a change of key the next one's tiles are made bit by bit, so that no frame has to
+wait for them; and, where there is time between frames, before anything looks at them. Rays that skim past the layer are
+taken to the farthest it reaches.
 
 The directions are unfolded onto a square as in `octahedron`.
 """
@@ -71,7 +72,7 @@ class LayerTable:
         self, function: Callable[[Array, Array], Array], tiles: int, channels: int, height_m: float, radius_m: float
     ) -> None:
         self._height_m, self._radius_m, self._tiles = height_m, radius_m, tiles
-        self._keys = Keys(max(height_m, _LEAST_DEPTH_M) / _KEYS_PER_DEPTH)
+        self._keys = Keys(max(height_m, _LEAST_DEPTH_M) / _KEYS_PER_DEPTH, height_m)
         self._own, self._next = (LayerTiles(function, tiles, channels) for _ in range(2))
         self._is_missing = np.zeros_like(self._own.is_known)  # false between looks
         self._count = 0

@@ -67,6 +67,22 @@ def test_a_point_of_the_plane_is_seen_where_its_ray_meets_the_sphere(
     assert np.abs(got - wanted).mean() < 2e-3
 
 
+@pytest.mark.parametrize("height_m", [700.0, 120.0])
+def test_a_camera_that_has_come_down_to_the_layer_sees_it_until_it_is_there(height_m: float) -> None:
+    """As above, from less than half of what is between two keys at the start; up to ten heights away."""
+    R, at = matrix_from_yaw_pitch_roll(0.5, 0.6, 0.0), np.array([900.0, -700.0, height_m - ALTITUDE_M])
+    below, out = np.tile([0, len(X)], (len(Y), 1)), np.empty((len(Y), len(X)), dtype=np.float32)
+    lay_under(out, R, X, Y, below, _table(1).nodes(at, R, X, Y, below), NO_DECK)
+    d = _rays(R)
+    _, distance, _ = meet_sphere(d[:, 2], RADIUS_M, height_m)
+    near = distance < 10.0 * height_m
+    assert near.all()
+    x, y = at[0] + d[:, 0] * distance, at[1] + d[:, 1] * distance
+    wanted = 2.0 + np.sin(x / WAVE_M) * np.cos(y / WAVE_M)
+    assert np.ptp(wanted) > 0.02
+    assert np.abs(out[::7, ::9].ravel() - wanted).max() < 1e-4
+
+
 def test_the_columns_below_are_those_whose_rays_point_below_the_dip() -> None:
     sine = 0.0434
     for seed in range(60):
