@@ -85,11 +85,6 @@ class Blocks:
         self._drawn_tangents = self._tangents(self.drawn)
         self._fall_off = (1.0 / (1.0 + a**2 + b**2) ** 2).astype(np.float32)
 
-    @property
-    def distorted(self) -> bool:
-        """Whether the sensor's blocks are not the pinhole's."""
-        return self._places is not None
-
     def around(self, window: Window) -> Extent:
         """Blocks that the pixels of a window are interpolated from."""
         k = self._k
