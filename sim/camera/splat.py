@@ -7,7 +7,7 @@ where E W falls to `FAINTEST_E`; what they hold beyond is laid under the blob, s
     W_R(r) = A P^-3 (t^(-3/2) - 1 - 3/2 s + c s^2),   P^2 = R^2 + w^2,   t = (r^2 + w^2)/P^2,   s = 1 - t          (1)
     c = 3 (2 + S + 3/4 S^2)/S^3,                      S = R^2/P^2                                                  (2)
 
-W_R and its slope vanish at R, so nothing ends at an edge; the layer is at most 12 FAINTEST_E, at the centre.
+W_R and its slope vanish at R, so nothing ends at an edge; the layer is at most 9 FAINTEST_E, at the centre.
 A smear is the mean over K blobs along a line, spaced |smear|/sqrt(K^2 - 1): its variance is |smear|^2/12 for every K.
 
 Every pixel is computed from its own row and column on the sensor, in one order of sources and sums: a window's pixels
