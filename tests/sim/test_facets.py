@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 from dockair.rotations import exp
 from dockair.sim.camera.facets import facets_that_may_shine
 from dockair.sim.camera.lobes import ROW, facet_rows
-from dockair.sim.camera.mirrors import Mirrors, _facet_table, finishes, vector
+from dockair.sim.camera.mirrors import METAL, Mirrors, _facet_table, finishes, vector
 from dockair.sim.camera.round_mirrors import _is_steep
 from dockair.sim.camera.sheets import CameraSheets
 
@@ -50,6 +51,51 @@ def test_facets_that_are_spared_send_nothing_to_the_lens(make_world: Callable[..
         assert np.array_equal(_rows(mirrors, which, data, sun, eye), every)
         found, spared = found + len(every), spared + len(toward) - len(which)
     assert found > 500 and spared > 10000
+
+
+def _may_shine(lean_rad: float, incidence_rad: float, roughness_rad: float, faintest: float, bend: float = 0.0) -> bool:
+    """Of a small, perfect mirror far away, which leans away from the half-way direction across the incidence."""
+    facets = _facet_table([(0, METAL, np.vstack([np.zeros(3), np.eye(3)]), (1e-3, 1e-3), (bend / 2e-3, 0.0, 0.0))])
+    assert facets.bend[0] == pytest.approx(bend)
+    h = np.array([math.cos(lean_rad), math.sin(lean_rad), 0.0])
+    up, across = math.cos(incidence_rad) * h, np.array([0.0, 0.0, math.sin(incidence_rad)])
+    perfect = replace(SURFACES, metal_reflectance=1.0, metal_share=1.0, metal_roughness_rad=roughness_rad)
+    poses, nowhere = (np.zeros((1, 3)), np.eye(3).reshape(1, 9)), (0.0, 0.0, 0.0)
+    light, eye = (vector(up + across), VARIANCE), vector(1e6 * (up - across))
+    return len(facets_that_may_shine(facets, poses, light, eye, nowhere, finishes(perfect), faintest)) == 1
+
+
+@pytest.mark.parametrize(("lean_rad", "s"), [(0.0, 0.003), (0.01, 0.003), (0.5, 0.15)])
+@pytest.mark.parametrize("incidence_rad", [0.0, 0.9])
+def test_a_small_far_facet_is_spared_from_four_times_its_radiance_on(
+    lean_rad: float, s: float, incidence_rad: float
+) -> None:
+    """Beckmann's facets, 1/(8 (h.n)^4 v.n s^2) exp(-tan^2/(2 V)); V is s^2 and the Sun's (a/2)^2/(2 cos i)^2."""
+    cos_i, cos_lean = math.cos(incidence_rad), math.cos(lean_rad)
+    variance = s**2 + VARIANCE / (2.0 * cos_i) ** 2
+    radiance = math.exp(-0.5 * math.tan(lean_rad) ** 2 / variance) / (8.0 * cos_lean**4 * cos_lean * cos_i * s**2)
+    assert _may_shine(lean_rad, incidence_rad, s, 3.96 * radiance)
+    assert not _may_shine(lean_rad, incidence_rad, s, 4.04 * radiance)
+
+
+@pytest.mark.parametrize("lean", [0.0, 0.11])
+def test_a_curved_facet_may_shine_as_if_it_leaned_by_its_bend_less_and_were_seen_as_flatly(lean: float) -> None:
+    bend, s, cos_i = 0.1, 0.003, 0.3
+    lacking, lean_rad, variance = max(lean - bend, 0.0), math.atan(lean), s**2 + VARIANCE / (2.0 * cos_i) ** 2
+    seen, hn = cos_i * math.cos(lean_rad) - bend, math.cos(lean_rad)
+    limit = 4.0 / (8.0 * hn**4 * seen * s**2) * math.exp(-0.5 * lacking**2 / variance)
+    assert _may_shine(lean_rad, math.acos(cos_i), s, 0.99 * limit, bend)
+    assert not _may_shine(lean_rad, math.acos(cos_i), s, 1.01 * limit, bend)
+
+
+@pytest.mark.parametrize("incidence_rad", [0.0, 0.9])
+def test_a_facet_that_leans_by_more_than_six_sigmas_is_spared_however_faint_a_glint_may_be(
+    incidence_rad: float,
+) -> None:
+    """Those of the surface and of the Sun's disc together."""
+    slope = 6.0 * (0.003 + math.sqrt(VARIANCE) / (2.0 * math.cos(incidence_rad)))
+    assert _may_shine(math.atan(0.99 * slope), incidence_rad, 0.003, 0.0)
+    assert not _may_shine(math.atan(1.01 * slope), incidence_rad, 0.003, 0.0)
 
 
 def test_a_facets_slopes_differ_from_its_middles_by_no_more_than_its_bend() -> None:
