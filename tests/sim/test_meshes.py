@@ -278,6 +278,37 @@ def test_backs_are_not_seen_and_hidden_groups_neither() -> None:
     hidden = _world([Skin("drum", drum, 1.0)], group=3)
     assert len(Meshes.of(hidden[0]).geoms) == 0
     assert np.all(_draw(TracedSolids(hidden[0], SUNLIT), hidden[1], (np.eye(3), np.array([-4.0, 0.0, 0.0]))) == SKY)
+    assert len(Meshes.of(_world([Skin("drum", drum, 1.0)], rgba=[1.0, 1.0, 1.0, 0.0])[0]).geoms) == 0
+
+
+@pytest.mark.parametrize(("lean_deg", "is_kept"), [(35.5, True), (36.5, False)])
+def test_a_normal_that_leans_more_than_36_degrees_gives_way_to_its_triangles_own(
+    lean_deg: float, is_kept: bool
+) -> None:
+    """There alone: the other triangles around the corner keep what does not lean so much from theirs."""
+    drum = body(np.array([[0.5, 1.0, 1.0, 0.0, 0.0, 2.0], [-0.5, 1.0, 1.0, 0.0, 0.0, 2.0]]), 16)
+    model, _ = _world([Skin("drum", drum, 1.0)])
+    a, b, c = model.mesh_vert[model.mesh_face[0]].astype(float)
+    flat, along = np.cross(b - a, c - a), (b - a) / np.linalg.norm(b - a)
+    flat /= np.linalg.norm(flat)
+    leaning = np.cos(np.deg2rad(lean_deg)) * flat + np.sin(np.deg2rad(lean_deg)) * along
+    model.mesh_normal[model.mesh_facenormal[0, 0]] = leaning
+    _, normals, triangles = mesh_of(model, 0)
+    np.testing.assert_allclose(normals[triangles[0, 0]], leaning if is_kept else flat, atol=1e-6)
+
+
+def test_triangles_without_area_are_left_out() -> None:
+    """Those on both sides of an edge whose ends are put together."""
+    drum = body(np.array([[0.5, 1.0, 1.0, 0.0, 0.0, 2.0], [-0.5, 1.0, 1.0, 0.0, 0.0, 2.0]]), 16)
+    model, _ = _world([Skin("drum", drum, 1.0)])
+    count = len(mesh_of(model, 0)[2])
+    a, b = model.mesh_face[5, :2]
+    model.mesh_vert[b] = model.mesh_vert[a]
+    on_edge = (model.mesh_face == a).any(axis=1) & (model.mesh_face == b).any(axis=1)
+    corners, _, triangles = mesh_of(model, 0)
+    assert on_edge.sum() > 0 and len(triangles) == count - on_edge.sum()
+    p, q, r = corners[triangles].transpose(1, 0, 2)
+    assert np.linalg.norm(np.cross(q - p, r - p), axis=1).min() > 1e-3
 
 
 def test_triangles_of_a_round_body_have_its_curvature_and_area() -> None:
