@@ -195,7 +195,7 @@ def _pieces(**geom: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 @pytest.mark.parametrize("kind", [GEOM.mjGEOM_SPHERE, GEOM.mjGEOM_CYLINDER])
-@pytest.mark.parametrize("radius_m", [0.001, 0.03, 0.2, 0.6, 2.3])
+@pytest.mark.parametrize("radius_m", [0.001, 0.03, 0.2, 0.47, 0.51, 2.3])
 def test_polygons_are_off_the_circle_by_a_quarter_of_a_block_where_a_solid_is_nearest(
     kind: mujoco.mjtGeom, radius_m: float
 ) -> None:

@@ -64,6 +64,16 @@ def test_what_was_not_made_is_made_at_once(start, shape, frame_number):
     assert np.array_equal(read(start, shape, frame_number, ahead), read(start, shape, frame_number, None))
 
 
+def test_a_window_whose_last_lanes_reach_beyond_what_was_made_is_made_at_once():
+    """Rows are worked on 64 pixels at once: 321 from 516 on take the columns up to 900, and 880 are there."""
+    ahead = NormalsAhead(KEY, SIZE)
+    read((300, 500), (200, 300), 5, ahead)
+    ahead.work_ahead()
+    for columns, is_held in ((316, True), (320, True), (321, False), (364, False)):
+        assert held(ahead, (300, 516), (200, columns), 6) == is_held
+        assert np.array_equal(read((300, 516), (200, columns), 6, ahead), read((300, 516), (200, columns), 6, None))
+
+
 def test_nothing_is_made_before_a_frame_nor_for_a_sensor_that_counts_electrons():
     ahead, counts = NormalsAhead(KEY, SIZE), replace(SENSOR, read_noise_e=2.0)
     assert not ahead.work_ahead()
