@@ -90,14 +90,8 @@ def test_opengl_and_rays_agree_but_for_edges(world: Any, near: float) -> None:
     assert apart < 1e-3
 
 
-@pytest.mark.parametrize("aside", [(0.35, 0.1), (-0.2, -0.3), (0.05, 0.5)])
-@pytest.mark.parametrize("turn", [(0.0, 0.0, 0.0), (0.4, 0.1, -0.3)])
-def test_a_mesh_that_reaches_past_the_lens_is_seen_as_far_as_the_near_plane(
-    aside: tuple[float, float], turn: tuple[float, float, float]
-) -> None:
-    """A rod of twelve triangles from 5 m behind to 5 m ahead shows in the blocks that a box of its size shows in."""
-    half = np.array([0.1, 0.07, 5.0])
-    quat = quaternion_from_matrix(exp(np.array([0.03, np.pi / 2 + 0.02, -0.02])))
+def _as_box_and_as_mesh(half: np.ndarray, pos: list[float], quat: np.ndarray, R: np.ndarray) -> list[np.ndarray]:
+    """Which blocks show a box, and which a mesh of its twelve triangles, from the origin."""
     corners = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)]) * half
     quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
     pictures = []
@@ -110,13 +104,32 @@ def test_a_mesh_that_reaches_past_the_lens_is_seen_as_far_as_the_near_plane(
             userface=[corner for a, b, c, d in quads for corner in (a, b, c, a, c, d)],
         )
         shape = {"size": half} if kind == mujoco.mjtGeom.mjGEOM_BOX else {"meshname": "rod"}
-        spec.worldbody.add_geom(type=kind, pos=[0.0, *aside], quat=quat, rgba=[1.0, 1.0, 1.0, 1.0], **shape)
+        spec.worldbody.add_geom(type=kind, pos=pos, quat=quat, rgba=[1.0, 1.0, 1.0, 1.0], **shape)
         model = spec.compile()
         data = mujoco.MjData(model)
         mujoco.mj_forward(model, data)
-        pictures.append(_draw(TracedSolids(model, SUNLIT), data, (exp(np.array(turn)), np.zeros(3))) != SKY)
-    assert pictures[0].sum() > 500
-    assert (pictures[0] != pictures[1]).sum() <= 3
+        pictures.append(_draw(TracedSolids(model, SUNLIT), data, (R, np.zeros(3))) != SKY)
+    return pictures
+
+
+@pytest.mark.parametrize("aside", [(0.35, 0.1), (-0.2, -0.3), (0.05, 0.5)])
+@pytest.mark.parametrize("turn", [(0.0, 0.0, 0.0), (0.4, 0.1, -0.3)])
+def test_a_mesh_that_reaches_past_the_lens_is_seen_as_far_as_the_near_plane(
+    aside: tuple[float, float], turn: tuple[float, float, float]
+) -> None:
+    """A rod of twelve triangles from 5 m behind to 5 m ahead shows in the blocks that a box of its size shows in."""
+    quat = quaternion_from_matrix(exp(np.array([0.03, np.pi / 2 + 0.02, -0.02])))
+    box, mesh = _as_box_and_as_mesh(np.array([0.1, 0.07, 5.0]), [0.0, *aside], quat, exp(np.array(turn)))
+    assert box.sum() > 500
+    assert (box != mesh).sum() <= 3
+
+
+def test_a_mesh_close_before_the_lens_and_half_a_millimetre_under_it_is_seen_as_a_box_is() -> None:
+    """From 5 cm beyond the near plane on; one row of blocks shows its top alone."""
+    pos, upright = [0.215, 0.0, -0.0205], np.array([1.0, 0.0, 0.0, 0.0])
+    box, mesh = _as_box_and_as_mesh(np.array([0.06, 0.05, 0.02]), pos, upright, np.eye(3))
+    assert box.sum() > 10000 and np.flatnonzero(box.any(axis=1))[0] == np.searchsorted(Y, 0.0005 / 0.275)
+    assert (box != mesh).sum() <= 3
 
 
 def test_a_picture_leaves_nothing_behind_in_the_next(world: Any) -> None:
