@@ -299,9 +299,10 @@ def test_set_point_of_a_hose_that_would_not_run_out_even_without_it_is_none_and_
     assert set_point_n(unreachable, full, wound) == 0.0
 
 
-def test_reel_that_would_wind_in_all_of_the_hose_is_refused(make_world):
+@pytest.mark.parametrize("range_m", [10.0, 11.0])
+def test_reel_that_would_wind_in_all_of_the_hose_is_refused(make_world, range_m):
     with pytest.raises(DockairError, match=r"parameters\.reel\.range_m: expected less than the hose's length"):
-        make_world(hose={"length_m": 10.0}, reel={"range_m": 11.0})
+        make_world(hose={"length_m": 10.0}, reel={"range_m": range_m})
 
 
 def test_set_point_equal_to_the_static_tension_would_keep_the_hose_in(make_world, wind_in):
@@ -404,6 +405,13 @@ def test_tube_bears_the_weight_of_what_lies_in_it_where_it_lies(share):
     np.testing.assert_allclose(wrench[3:], np.cross(middle_of_outside, outside), atol=1e-12)
 
 
+def test_weight_of_a_link_that_leans_aside_in_the_tube_has_its_lever_along_the_tubes_axis():
+    """About y, where a lean to the side brings no torsion spring in."""
+    t, share, weight = np.array([np.cos(0.6), np.sin(0.6), 0.0]), 0.4, HOSE.link_mass_kg * 9.80665
+    carried = np.cross(0.5 * (1.0 - share) * HOSE.link_length_m * t, [0.0, 0.0, share * weight])
+    assert _guide_on_one_link(t, share)[4] == pytest.approx(carried[1], rel=1e-12)
+
+
 def test_joint_in_the_pod_is_pressed_to_the_axis_and_its_motion_damped():
     """Two links, the first wholly inside: the joint between them, off the axis and moving outward, is pushed back."""
     length = HOSE.link_length_m
@@ -424,6 +432,15 @@ def test_turning_of_a_half_drawn_in_link_is_damped_by_the_sheets_ratio_of_a_rod_
     length, zero, w = HOSE.link_length_m, np.zeros((1, 3)), np.array([[0.3, 0.4, -0.5]])
     still, turning = (guide_loads(zero, np.eye(3)[None], zero, of, share * length, GUIDE)[0] for of in (zero, w))
     stiffness, inertia = STATIC * length * share / (1.0 - share), HOSE.link_mass_kg * length**2 / 3.0
+    damping = 2.0 * REEL.guide_damping_ratio * np.sqrt(stiffness * inertia)
+    np.testing.assert_allclose(turning - still, [0.0, 0.0, 0.0, 0.0, -0.4 * damping, 0.5 * damping], rtol=1e-9)
+
+
+def test_turning_of_a_link_wholly_in_the_pod_is_damped_by_the_sheets_ratio_of_a_rod_that_the_tube_holds():
+    """c = 2 zeta sqrt(k_t I), with k_t = k l^2 of the tube's stiffness k, where Eq. (4) is capped."""
+    length, zero, w = HOSE.link_length_m, np.zeros((1, 3)), np.array([[0.3, 0.4, -0.5]])
+    still, turning = (guide_loads(zero, np.eye(3)[None], zero, of, length, GUIDE)[0] for of in (zero, w))
+    stiffness, inertia = REEL.guide_stiffness_n_m2 * length**3, HOSE.link_mass_kg * length**2 / 3.0
     damping = 2.0 * REEL.guide_damping_ratio * np.sqrt(stiffness * inertia)
     np.testing.assert_allclose(turning - still, [0.0, 0.0, 0.0, 0.0, -0.4 * damping, 0.5 * damping], rtol=1e-9)
 
@@ -452,3 +469,12 @@ def test_link_that_turns_about_its_rear_joint_leaves_the_tube_there_alone():
         np.zeros((2, 3)), np.array([np.eye(3)] * 2), v, np.array([w, np.zeros(3)]), 1.5 * length, GUIDE
     )
     np.testing.assert_allclose(wrench[0, :3], [0.0, 0.0, HOSE.link_mass_kg * 9.80665], rtol=1e-12, atol=1e-12)
+
+
+def test_link_that_leans_with_its_rear_joint_on_the_axis_is_not_pressed_to_it():
+    """Two links, the first wholly inside: its middle is off the axis, which is the torsion spring's matter."""
+    length, R, zero = HOSE.link_length_m, np.array([np.eye(3)] * 2), np.zeros((2, 3))
+    R[0, :, 0] = [0.8, 0.36, -0.48]
+    position = np.array([0.5 * length * R[0, :, 0], np.zeros(3)])
+    wrench = guide_loads(position, R, zero, zero, 1.5 * length, GUIDE)
+    np.testing.assert_allclose(wrench[0, :3], [0.0, 0.0, HOSE.link_mass_kg * 9.80665], rtol=1e-12, atol=1e-9)

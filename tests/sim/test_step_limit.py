@@ -15,12 +15,30 @@ from dockair.sim.step_limit import (
     lowest_rate_of_reel_hz,
 )
 
+SOFT_TUBE = {"guide_stiffness_n_m2": 12000.0, "guide_damping_ratio": 0.1}
+SOFT_LOCK = {"lock_stiffness_n_m": 20000.0, "lock_damping_n_s_m": 0.0}
+
 
 def test_step_longer_than_half_a_contact_is_refused_with_its_key(make_world):
-    soft = {"guide_stiffness_n_m2": 12000.0, "guide_damping_ratio": 0.1}
     with pytest.raises(DockairError, match=r"rates\.physics_hz: expected at least 250 Hz.*contact_time_constant_s"):
-        make_world(rate_hz=200, reel=soft)
-    make_world(rate_hz=250, reel=soft)
+        make_world(rate_hz=200, reel=SOFT_TUBE)
+    make_world(rate_hz=250, reel=SOFT_TUBE)
+
+
+@pytest.mark.parametrize(
+    ("name", "key", "shortest_s", "lowest_hz"),
+    [("coupling", "latch_time_constant_s", 0.01, 200), ("reel", "stop_time_constant_s", 0.004, 500)],
+)
+def test_step_longer_than_half_the_latchs_or_the_stops_time_constant_is_refused_with_its_key(
+    make_world, name, key, shortest_s, lowest_hz
+):
+    """With the least of the sheet's range, all else being soft."""
+    soft = {"reel": SOFT_TUBE | SOFT_LOCK, "drogue": {"contact_time_constant_s": 0.02}}
+    soft[name] = soft.get(name, {}) | {key: shortest_s}
+    words = rf"expected at least {lowest_hz} Hz, because of parameters\.{name}\.{key}"
+    with pytest.raises(DockairError, match=words):
+        make_world(rate_hz=lowest_hz - 1, **soft)
+    make_world(rate_hz=lowest_hz, **soft)
 
 
 def _needed_hz(world):
@@ -60,10 +78,17 @@ QUICK_MOTOR = {"tension_gain": 2.0, "speed_band_m_s": 0.1, "drum_mass_kg": 10.0,
 
 
 def test_step_too_long_for_the_reels_motor_is_refused_with_its_keys(make_world):
+    """Which pulls a slack hose with (1 + k) f T, T being what the hose bears at rest."""
     keys = r"parameters\.reel\.tension_gain over speed_band_m_s"
     heavy_drag = {"drag_diameter_m": 0.81, "drag_coefficient": 1.0}
-    with pytest.raises(DockairError, match=rf"rates\.physics_hz: expected at least \d+ Hz, because of {keys}"):
-        make_world(rate_hz=1000, airspeed_m_s=250.0, altitude_m=0.0, reel=QUICK_MOTOR, drogue=heavy_drag)
+    flown = {"airspeed_m_s": 250.0, "altitude_m": 0.0, "reel": QUICK_MOTOR, "drogue": heavy_drag}
+    world = make_world(rate_hz=4000, **flown)
+    p, reel = world.parameters, world.parameters.reel
+    slack_n = (1.0 + 2.0) * reel.set_point_fraction * world.rest.root_tension_n
+    lowest_hz = slack_n / 0.1 / (2.0 * (10.0 + p.hose.length_m * p.hose.line_density_kg_m + p.drogue.mass_kg))
+    words = rf"rates\.physics_hz: expected at least {np.ceil(lowest_hz):.0f} Hz, because of {keys}"
+    with pytest.raises(DockairError, match=words):
+        make_world(rate_hz=1000, **flown)
 
 
 @pytest.mark.parametrize(("share", "settles"), [(1.02, True), (0.98, False)])
@@ -80,7 +105,6 @@ def test_below_the_motors_rate_a_slack_hose_comes_in_chattering_and_above_it_doe
     assert (np.ptp(rates_m_s[-200:]) < 1e-6) == settles
 
 
-SOFT_TUBE = {"guide_stiffness_n_m2": 12000.0, "guide_damping_ratio": 0.1}
 HARD_LOCK = {"lock_stiffness_n_m": 300000.0, "lock_damping_n_s_m": 10000.0}
 LONG_LINKS = {"reel": SOFT_TUBE | HARD_LOCK, "hose": {"links": 8}}
 

@@ -1,5 +1,7 @@
 """The tow: loads of air, pod and reel put together."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,7 +9,9 @@ from dockair.parameters import load_parameters
 from dockair.rotations import exp
 from dockair.sim.air.atmosphere import standard_atmosphere
 from dockair.sim.hose.chain import DrogueParameters, HoseParameters, velocities_at
+from dockair.sim.hose.loads import load_coefficients, tow_loads
 from dockair.sim.hose.reel import ReelParameters, guide_loads
+from dockair.sim.hose.rest import rest_shape
 from dockair.sim.hose.tow import PodMotion, Tow
 
 HOSE = load_parameters("hose", HoseParameters)
@@ -37,6 +41,28 @@ def test_at_rest_loads_and_weight_are_carried_by_the_root():
     carried = wrench[:, :3].sum(axis=0) - [0.0, 0.0, weight]
     np.testing.assert_allclose(carried, -tow.rest.root_tension_n * tow.rest.t_W[0], rtol=0.02, atol=10.0)
     assert np.linalg.norm(carried) == pytest.approx(tow.rest.root_tension_n, rel=1e-6)
+
+
+def test_set_point_leaves_the_force_to_run_out_to_a_hose_of_which_all_of_the_reels_range_is_wound_in():
+    """In slow flight, at rest: T cos(theta) less the motor's pull T_s + k (T_s - T), on a hose so much shorter."""
+    slow_W, reel, air = np.array([-100.0, 0.0, 0.0]), load_parameters("reel", ReelParameters), standard_atmosphere(6e3)
+    shorter = replace(HOSE, length_m=HOSE.length_m - reel.range_m)
+    rest = rest_shape(shorter, DROGUE, slow_W, air.density_kg_m3, air.kinematic_viscosity_m2_s)
+    tension_n, held_n = rest.root_tension_n, make(slow_W).reel.set_point_n
+    motor_n = held_n + reel.tension_gain * (held_n - tension_n)
+    assert tension_n * rest.t_W[0, 0] - motor_n == pytest.approx(reel.run_out_force_n, rel=1e-9)
+
+
+def test_tube_turns_a_half_drawn_in_link_under_the_tension_that_the_exit_bears_at_rest():
+    """Eq. (4) of the reel: T l t_z about y, besides the weight that the tube carries; a link turned to the side."""
+    tow, air, length = make(), standard_atmosphere(6000.0), HOSE.link_length_m
+    place, R, spatial, reference = at_rest(tow)
+    R[0, :, 0] = [0.0, 0.8, 0.6]
+    of_air = load_coefficients(HOSE, DROGUE, air.density_kg_m3, air.kinematic_viscosity_m2_s)
+    still = np.zeros((HOSE.links + 1, 3))
+    blown = tow_loads(R, still, still, still + WIND_W, 0.5 * length, of_air)
+    tube = tow.wrenches(place, R, spatial, reference, still, 0.5 * length)[0] - blown[0]
+    assert tube[4] == pytest.approx(tow.rest.root_tension_n * length * 0.6, rel=1e-9)
 
 
 def test_gust_counts_as_wind_on_every_body_and_only_there():
