@@ -2,10 +2,12 @@
 
 from typing import Any
 
+import mujoco
 import numpy as np
 import pytest
 
 from dockair.messages import ReceiverCommand
+from dockair.rotations import exp, quaternion_from_matrix
 from dockair.sim.reach import Reach
 
 FORWARD = ReceiverCommand(velocity_m_s=np.array([1.0, 0.0, 0.0]))
@@ -13,6 +15,33 @@ FORWARD = ReceiverCommand(velocity_m_s=np.array([1.0, 0.0, 0.0]))
 
 def _reach(world: Any) -> Reach:
     return Reach(world.model, world.data, world.model.body("receiver").id)
+
+
+@pytest.mark.parametrize(("spare_m", "clear"), [(0.501, True), (0.499, False)])
+@pytest.mark.parametrize("ball", ["first", "second"])
+def test_a_ball_is_out_of_reach_half_a_metre_and_its_radius_ahead_of_the_foremost_solid(
+    ball: str, spare_m: float, clear: bool
+) -> None:
+    """Two bodies ahead of one that is turned, the other of them far off; what is only drawn counts on neither side.
+
+    The foremost solid reaches 2.1 m along; a ball of 0.3 m that stands 0.4 m beside its body's place is one of 0.7 m.
+    """
+    spec, R = mujoco.MjSpec(), exp(np.array([0.4, -0.3, 0.8]))
+    places = {"receiver": np.zeros(3), "ghost": np.zeros(3), "first": R @ [50.0, 0.0, 0.0], "second": R @ [50.0, 0, 0]}
+    places[ball] = R @ [2.1 + 0.7 + spare_m, 5.0, -4.0]
+    for name, place in places.items():
+        body = spec.worldbody.add_body(name=name, pos=place + [1.0, 2.0, 3.0], quat=quaternion_from_matrix(R))
+        drawn = {"contype": 0, "conaffinity": 0, "size": [1.0, 0.0, 0.0]}
+        body.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, pos=[3.0, 0.0, 0.0], **drawn)
+        if name == "receiver":
+            for x in (2.0, -3.0):
+                body.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, pos=[x, 0.0, 0.0], size=[0.1, 0.0, 0.0], conaffinity=0)
+        elif name != "ghost":
+            body.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, pos=[0.0, 0.4, 0.0], size=[0.3, 0.0, 0.0], contype=0)
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    assert Reach(model, data, model.body("receiver").id).is_clear() is clear
 
 
 @pytest.mark.parametrize("ahead_m", [2.5, 4.0])

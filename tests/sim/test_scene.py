@@ -81,16 +81,29 @@ def test_probe_ends_exactly_at_the_mounting_point(world):
     assert name == "probe_tip" and distance == pytest.approx(1.0, abs=1e-6)
 
 
-def test_receiver_has_the_mass_and_inertia_it_was_given(world, receiver_on_rails):
-    """The compiled inertia, turned back from its principal axes, is the matrix that went in."""
-    body = world.model.body("receiver")
+@pytest.mark.parametrize("products", [(0.0, 1331.0, 0.0), (900.0, 1331.0, -2500.0)])
+def test_receiver_has_the_mass_and_inertia_it_was_given(make_world, receiver_on_rails, products):
+    """The compiled inertia, turned back from its principal axes, is the matrix that went in: I_xy, I_xz, I_yz, too."""
+    xy, xz, yz = products
+    given = receiver_on_rails(inertia_B=np.array([[12874.0, xy, xz], [xy, 75674.0, yz], [xz, yz, 85552.0]]))
+    body = make_world(receiver=given).model.body("receiver")
     R = np.zeros(9)
     mujoco.mju_quat2Mat(R, body.iquat)
     R = R.reshape(3, 3)
-    given = receiver_on_rails()
     assert body.mass[0] == given.mass_kg
     np.testing.assert_allclose(R @ np.diag(body.inertia) @ R.T, given.inertia_B, atol=1e-6 * given.inertia_B.max())
     np.testing.assert_array_equal(body.ipos, 0.0)
+
+
+def test_solid_stops_and_latch_stand_where_their_sheets_say_and_are_as_soft(make_world):
+    """Out of their own values, which MuJoCo's defaults are not."""
+    reel = {"buffer_travel_m": 0.13, "range_m": 6.2, "stop_time_constant_s": 0.03}
+    latch = {"latch_time_constant_s": 0.035, "latch_damping_ratio": 1.7}
+    model = make_world(reel=reel, coupling=latch).model
+    stops = model.joint("reel")
+    np.testing.assert_allclose(stops.range, [-0.13, 6.2], rtol=1e-12)
+    np.testing.assert_allclose(model.jnt_solref[stops.id], [0.03, 1.0], rtol=1e-12)
+    np.testing.assert_allclose(model.equality("latch").solref, [0.035, 1.7], rtol=1e-12)
 
 
 def test_tow_has_the_masses_of_its_sheets(world):

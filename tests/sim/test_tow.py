@@ -53,6 +53,13 @@ def test_set_point_leaves_the_force_to_run_out_to_a_hose_of_which_all_of_the_ree
     assert tension_n * rest.t_W[0, 0] - motor_n == pytest.approx(reel.run_out_force_n, rel=1e-9)
 
 
+def test_reel_at_full_trail_pulls_with_what_of_the_tension_at_rest_lies_along_the_pods_axis():
+    """The motor's pull and the buffer's push, nothing moving: so the hose rests on its stop."""
+    tow = make()
+    pull_n = tow.reel.step(tow.rest.root_tension_n, 0.0, 0.0)
+    assert pull_n == pytest.approx(tow.rest.root_tension_n * tow.rest.t_W[0, 0], rel=1e-12)
+
+
 def test_tube_turns_a_half_drawn_in_link_under_the_tension_that_the_exit_bears_at_rest():
     """Eq. (4) of the reel: T l t_z about y, besides the weight that the tube carries; a link turned to the side."""
     tow, air, length = make(), standard_atmosphere(6000.0), HOSE.link_length_m
@@ -111,3 +118,11 @@ def test_pod_turned_displaced_and_moving_with_the_whole_scene_guides_the_hose_as
     expected = guide_loads(place, R, *_rates(place, spatial, reference), 3.0, tow._guide)
     got = tow._guided(moved, Q @ R, *_rates(moved, turned, np.zeros(3)), 3.0, pod)
     np.testing.assert_allclose(got, np.hstack([expected[:, :3] @ Q.T, expected[:, 3:] @ Q.T]), rtol=1e-7, atol=1e-5)
+
+
+def test_pod_that_rests_in_the_origin_loads_the_tow_alike_whether_it_is_told_of_or_not():
+    """Air and tube together; part of the hose is inside."""
+    tow, gusts, still = make(), np.zeros((HOSE.links + 1, 3)), np.zeros(3)
+    bodies = _wound_in(4)
+    told = tow.wrenches(*bodies, gusts, 3.0, PodMotion(R_WT=np.eye(3), p_WO=still, v_WO=still, w_WT=still))
+    np.testing.assert_allclose(told, tow.wrenches(*bodies, gusts, 3.0), rtol=1e-12, atol=1e-9)
