@@ -192,6 +192,7 @@ def test_receiver_that_backs_off_is_let_go_at_the_outer_stop_once_and_not_taken_
     assert COUPLING.release_force_n * 0.9 < max(pulls) <= COUPLING.release_force_n
     assert abs(released_at.reel_position_m) < 0.1  # at the outer stop, not on the way
     assert truth.p_DP[0] < -0.3 and np.linalg.norm(truth.v_WD) < 1.0
+    assert truth.coupling_force_n == 0.0
 
 
 def test_coupling_force_is_what_the_probe_feels(make_world, receiver_on_rails):

@@ -11,7 +11,7 @@ from dockair.messages import Light, ReceiverCommand
 from dockair.parameters import load_parameters
 from dockair.sim.hose.chain import DrogueParameters, HoseParameters
 from dockair.sim.hose.reel import Reel, ReelParameters, guide_coefficients, guide_loads, reel_light, set_point_n
-from dockair.sim.hose.rest import rest_shape
+from dockair.sim.hose.rest import hinge_angles, rest_shape
 
 REEL = load_parameters("reel", ReelParameters)
 STATIC, STEP = 1900.0, 1e-3
@@ -188,6 +188,32 @@ def test_tension_at_the_exit_stays_near_the_set_point_while_the_probe_pushes_the
     relative = np.array(tension) / world._tow.reel.set_point_n - 1.0
     assert truth.reel_position_m == pytest.approx(3.0, abs=0.1)
     assert abs(relative.mean()) < 0.01 and np.sqrt(np.mean(relative**2)) < 0.03
+
+
+def test_tension_at_the_exit_is_that_of_the_link_in_it_and_not_the_less_that_the_tube_leaves_to_the_links_inside(
+    make_world,
+):
+    """Six links inside, the others at rest, the reel pulling with T cos(theta): inside no more is left than that."""
+    world = make_world(p_PD_B=(60.0, 0.0, 0.0))
+    p, air, inside = world.parameters, world.parameters.air, 6
+    outside = replace(p.hose, length_m=(p.hose.links - inside) * p.hose.link_length_m, links=p.hose.links - inside)
+    wind_W = np.array([-p.airspeed_m_s, 0.0, 0.0])
+    rest = rest_shape(outside, p.drogue, wind_W, air.density_kg_m3, air.kinematic_viscosity_m2_s)
+
+    class Holding:
+        def step(self, tension_n, position_m, rate_m_s, locked):
+            return rest.root_tension_n * rest.t_W[0, 0]
+
+    world._tow.reel = Holding()
+    directions = np.vstack([np.tile([1.0, 0.0, 0.0], (inside, 1)), rest.t_W, rest.t_D_W])
+    world.data.qpos[world._at.hinges] = hinge_angles(directions).ravel()
+    world.data.qpos[world._at.reel_qpos] = inside * p.hose.link_length_m + 1e-4
+    mujoco.mj_step1(world.model, world.data)
+    world._observe(0)
+    for _ in range(200):  # the joint at the exit gives way a little
+        truth = world.step(ReceiverCommand())
+    assert truth.root_tension_n == pytest.approx(rest.root_tension_n, rel=2e-3)
+    assert rest.t_W[0, 0] < 0.985
 
 
 def test_links_inside_the_pod_feel_no_air(make_world, wind_in):

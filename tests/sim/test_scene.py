@@ -6,7 +6,7 @@ import pytest
 
 from dockair.calibration import Camera, LedRing
 from dockair.messages import ReceiverCommand
-from dockair.rotations import matrix_from_yaw_pitch_roll
+from dockair.rotations import matrix_from_quaternion, matrix_from_yaw_pitch_roll
 
 
 @pytest.fixture
@@ -79,6 +79,22 @@ def test_probe_ends_exactly_at_the_mounting_point(world):
     ahead = world.truth.p_WP + np.array([1.0, 0.0, 0.0])
     name, distance = _first_hit(world, ahead, [-1.0, 0.0, 0.0])
     assert name == "probe_tip" and distance == pytest.approx(1.0, abs=1e-6)
+
+
+def test_probes_boom_runs_straight_from_its_tip_for_the_sheets_length_and_its_mast_begins_where_it_ends(world):
+    coupling, p_BP = world.parameters.coupling, world.parameters.mounting.p_BP
+
+    def ends(name):
+        """(2, 3) middles of a capsule's two caps, the foremost first."""
+        geom = world.model.geom(name)
+        half = geom.size[1] * matrix_from_quaternion(geom.quat)[:, 2]
+        both = np.array([geom.pos + half, geom.pos - half])
+        return both[np.argsort(-both[:, 0])]
+
+    bend = p_BP - [coupling.probe_boom_length_m, 0.0, 0.0]
+    np.testing.assert_allclose(ends("probe_boom"), [p_BP - [coupling.probe_tip_radius_m, 0.0, 0.0], bend], atol=1e-9)
+    np.testing.assert_allclose(ends("probe_mast")[0], bend, atol=1e-9)
+    assert world.model.geom("probe_boom").size[0] == coupling.probe_boom_radius_m
 
 
 @pytest.mark.parametrize("products", [(0.0, 1331.0, 0.0), (900.0, 1331.0, -2500.0)])
@@ -185,6 +201,17 @@ def test_a_blow_on_the_drogue_has_the_softness_and_friction_of_its_sheet(make_wo
             np.testing.assert_allclose(contact.solref, [drogue.contact_time_constant_s, 1.0])
             np.testing.assert_allclose(contact.friction[:2], drogue.friction)
     assert {"probe", "fuselage", "basket"} <= struck
+
+
+def test_all_that_can_strike_or_be_struck_slides_with_the_sheets_friction_but_the_tanker(world):
+    """Of two geoms MuJoCo takes the larger friction, and its default is 1."""
+    model, drogue = world.model, world.parameters.drogue
+    solid = (model.geom_contype | model.geom_conaffinity) != 0
+    solid &= model.geom_bodyid != model.body("tanker").id
+    assert {model.body(int(body)).name.split("_")[0] for body in model.geom_bodyid[solid]} == {
+        "hose", "drogue", "receiver"
+    }  # fmt: skip
+    np.testing.assert_array_equal(model.geom_friction[solid, 0], drogue.friction)
 
 
 def test_tanker_as_heavy_as_it_is_keeps_no_constraint_from_being_solved(make_world):

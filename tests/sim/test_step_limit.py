@@ -1,5 +1,7 @@
 """Which step is too long is said before the world flies, and by whose fault."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -156,6 +158,15 @@ def test_step_too_long_for_the_air_about_the_drogue_is_refused_with_its_keys(mak
     keys = r"parameters\.drogue\.rate_damping_coefficient and inertia_kg_m2"
     with pytest.raises(DockairError, match=rf"rates\.physics_hz: expected at least 1773 Hz, because of {keys}"):
         make_world(rate_hz=1000, drogue=WIDE_AND_LIGHT)
+
+
+def test_the_airs_rate_goes_by_density_times_airspeed(make_world):
+    """Eq. (5): the dampings are those of loads with 1/2 rho V."""
+    world = make_world()
+    p = world.parameters
+    flown = replace(p, airspeed_m_s=0.7 * p.airspeed_m_s, air=replace(p.air, density_kg_m3=1.5 * p.air.density_kg_m3))
+    expected = 0.7 * 1.5 * lowest_rate_in_air_hz(world.model, p)
+    assert lowest_rate_in_air_hz(world.model, flown) == pytest.approx(expected, rel=1e-9)
 
 
 @pytest.mark.parametrize(("share", "stays"), [(1.05, True), (0.95, False)])

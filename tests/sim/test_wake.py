@@ -231,7 +231,8 @@ def test_the_page_says_what_is_flown_in_the_wings_plane_and_at_the_drogue() -> N
 def test_on_the_vortices_themselves_the_air_moves_at_finite_speed() -> None:
     (x, _, z), (tail_x, _, tail_z) = SHEET.bound_m, SHEET.tail_bound_m
     tail = 0.5 * SHEET.tail_vortex_span_m
-    points = [(x, 0.0, z), (x, HALF, z), (x - 9.0, -HALF, z), (x + 9.0, HALF, z), (tail_x, tail, tail_z)]
+    corners = [(x, HALF, z), (x, -HALF, z), (tail_x, tail, tail_z), (tail_x, -tail, tail_z)]
+    points = [(x, 0.0, z), (x - 9.0, -HALF, z), (x + 9.0, HALF, z), *corners]
     velocity = at(SHEET, *points)
     assert np.all(np.abs(velocity) < gamma() / (2.0 * np.pi * 0.035 * SPAN))
 

@@ -206,6 +206,8 @@ def test_turning_receiver_moves_its_probe_and_feels_its_weight_in_its_own_axes(m
     np.testing.assert_allclose(0.5 * (b.v_WP + c.v_WP), (c.p_WP - a.p_WP) * 500.0, atol=5e-3)
     turn = b.R_WB.T @ (c.R_WB - a.R_WB) * 500.0
     np.testing.assert_allclose(0.5 * (b.w_WB_B + c.w_WB_B), [turn[2, 1], turn[0, 2], turn[1, 0]], atol=2e-3)
+    assert np.abs(b.alpha_WB_B).min() > 0.1
+    np.testing.assert_allclose(b.alpha_WB_B, (b.w_WB_B - a.w_WB_B) * 1000.0, atol=5e-3)
     np.testing.assert_allclose(receiver.specific_force_B, receiver.R_WB.T @ [0.0, 0.0, 9.80665], atol=0.01)
 
 
