@@ -31,7 +31,7 @@ class Addresses:
     geom_names: tuple[str, ...]
     observed: NDArray[
         np.int64
-    ]  #: (6,) for `truth.observed`: receiver, drogue, tanker, dof of the first, reel's qpos, dof
+    ]  #: (6,) for `truth.observe`: receiver, drogue, tanker, dof of the first, reel's qpos, dof
 
     @classmethod
     def of(cls, model: mujoco.MjModel) -> "Addresses":

@@ -2,9 +2,8 @@
 
 Frame W: origin at the hose's exit at the start, x forward, z up; it moves with the tanker's velocity at the start, so
 that a tanker flying straight stands still and the air blows. Bodies "tanker", "hose_0" ... "hose_{n-1}", "drogue",
-"receiver"; geoms
-"probe_...", "basket_...", "coupling_...", "hose_...", "fuselage_..." and so on; sites "led_0" ... "led_7", "coupling",
-"probe_tip".
+"receiver"; geoms "probe_...", "basket_...", "coupling_...", "hose_...", "fuselage_..." and so on; sites "led_0" ...
+"led_7", "coupling", "probe_tip".
 
 What is seen of tanker and receiver are lofted skins, "tanker_skin_..." and "skin_..."; they touch nothing. What they
 strike with are primitives in a group that is not drawn. Who touches whom: the probe touches basket, coupling and hose;

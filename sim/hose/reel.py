@@ -243,9 +243,8 @@ def add_guide_loads(position: Array, R: Array, v: Array, w: Array, drawn_in: flo
             j = i - 1
             arm = -0.5 * length * R[j, :, 0]
             velocity = v[j] + np.cross(w[j], arm)
-            held = min(s, 1.0)
             force = np.zeros(3)
             for axis in (1, 2):
-                force[axis] = -held * (stiffness * (position[j, axis] + arm[axis]) + damping * velocity[axis])
+                force[axis] = -s * (stiffness * (position[j, axis] + arm[axis]) + damping * velocity[axis])
             wrench[j, :3] += force
             wrench[j, 3:] += np.cross(arm, force)
