@@ -1,5 +1,7 @@
 """The compiled model: names, geometry, who touches whom, what the camera looks past."""
 
+from dataclasses import replace
+
 import mujoco
 import numpy as np
 import pytest
@@ -7,6 +9,9 @@ import pytest
 from dockair.calibration import Camera, LedRing
 from dockair.messages import ReceiverCommand
 from dockair.rotations import matrix_from_quaternion, matrix_from_yaw_pitch_roll
+from dockair.sim.parts import scene_of
+from dockair.sim.scene import build_scene
+from dockair.sim.skins import tanker_skins
 
 
 @pytest.fixture
@@ -181,6 +186,25 @@ def test_light_is_the_sun_alone(world):
     np.testing.assert_allclose(model.light_dir[0], [0.0, 0.0, -1.0], atol=1e-12)
     assert not model.vis.headlight.active
     assert model.vis.quality.offsamples == 0
+
+
+def test_light_comes_from_the_sun_wherever_it_stands_in_the_sky(world, receiver_on_rails):
+    """Given as a vector of any length from the scene to the Sun."""
+    sun_W = np.array([-0.6, 1.2, 0.4])
+    parameters = replace(world.parameters, sun_direction_W=3.0 * sun_W)
+    model = build_scene(scene_of(parameters, receiver_on_rails(), 1e-3))
+    np.testing.assert_allclose(model.light_dir[0], -sun_W / 1.4, atol=1e-12)
+
+
+def test_what_is_seen_is_as_bright_as_its_sheet_says(world):
+    p, skins = world.parameters, tanker_skins(world.parameters.tanker)
+    of = {"probe_tip": p.coupling.probe_reflectance, "hose_0": p.hose.reflectance, "basket_rim_0": p.drogue.reflectance}
+    of |= {"coupling_stave_3": p.drogue.reflectance, "canopy_0": p.drogue.canopy_reflectance}
+    of |= {"led_housing_0": p.drogue.led_housing_reflectance}
+    of |= {f"tanker_skin_{skin.name}": min(p.tanker.reflectance * skin.shade, 1.0) for skin in skins}
+    assert len(set(of.values())) >= 6 and len({skin.shade for skin in skins}) > 1
+    for name, reflectance in of.items():
+        np.testing.assert_allclose(world.model.geom(name).rgba, [*3 * [reflectance], 1.0], rtol=1e-6, err_msg=name)
 
 
 def test_every_colour_is_grey(world):
