@@ -259,6 +259,17 @@ def test_gusts_run_along_the_level_heading_of_a_pitched_and_banked_tanker_from_i
     np.testing.assert_allclose(state.receiver_rotation_B, [0.02 * ahead[-1], 0.0, 0.0], atol=1e-12)
 
 
+@pytest.mark.parametrize(("kind", "field_of"), [("gusts", dryden), ("discrete", single)])
+def test_a_step_moves_either_kind_of_gust_on_by_a_tick(kind, field_of):
+    air, field = motion(**{kind: field_of()}), field_of()
+    before = field.velocity(TOW[:, 0])
+    for _ in range(40):
+        air.step()
+        field.step()
+    np.testing.assert_array_equal(now(air).tow_W, field.velocity(TOW[:, 0]))
+    assert np.abs(now(air).tow_W - before).max() > 0.01
+
+
 def test_a_step_moves_the_gusts_on_and_a_copy_of_the_air_goes_the_same_way():
     air = motion(dryden(), single(), WAKE, BOW_WAVE)
     twin, before = copy.deepcopy(air), now(air)
