@@ -34,10 +34,12 @@ READY, LATCHED, BARRED = CouplingState.READY, CouplingState.LATCHED, CouplingSta
         (READY, replace(SEATED, closing_speed_m_s=COUPLING.closing_speed_min_m_s + 1e-6), LATCHED),
         (READY, replace(SEATED, closing_speed_m_s=COUPLING.closing_speed_min_m_s - 1e-6), READY),
         (READY, replace(SEATED, closing_speed_m_s=COUPLING.closing_speed_max_m_s + 1e-6), BARRED),
+        (READY, replace(SEATED, closing_speed_m_s=-2.0 * COUPLING.closing_speed_max_m_s), READY),
         (LATCHED, replace(SEATED, pull_n=COUPLING.release_force_n - 1.0), LATCHED),
         (LATCHED, replace(SEATED, pull_n=-10.0 * COUPLING.release_force_n), LATCHED),
         (LATCHED, replace(SEATED, pull_n=COUPLING.release_force_n + 1.0), BARRED),
         (BARRED, SEATED, BARRED),
+        (BARRED, replace(SEATED, distance_m=COUPLING.rearm_distance_m - 1e-6), BARRED),
         (BARRED, replace(SEATED, distance_m=COUPLING.rearm_distance_m + 1e-6), READY),
     ],
 )
