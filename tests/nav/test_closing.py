@@ -29,6 +29,14 @@ def test_nothing_is_known_before_a_whole_swing_nor_after_forgetting():
     assert miss.spread_m == np.inf
 
 
+def test_what_was_followed_before_forgetting_has_no_part_in_the_spread():
+    miss = _fed(np.full(300, 1.0))
+    miss.forget()
+    for _ in range(300):
+        miss.step(0.1)
+    assert miss.spread_m == pytest.approx(0.1, rel=1e-9)
+
+
 def test_nothing_is_known_after_a_whole_swing_in_which_the_drogue_was_not_seen():
     miss = _fed(np.full(300, 0.1))
     for _ in range(299):
@@ -82,3 +90,8 @@ def test_time_to_contact_is_that_of_the_ramp_flown_a_response_time_later(closure
         c = min(closure + ramp * max(t - SETTINGS.response_s, 0.0), full)
         x, t = x - c * dt, t + dt
     assert time_to_contact_s(SETTINGS, distance, closure, full, ramp) == pytest.approx(t, abs=1e-3)
+
+
+def test_who_stands_at_the_ring_or_past_it_is_there_now():
+    for distance_m in (0.0, -0.2):
+        assert time_to_contact_s(SETTINGS, distance_m, 0.0, 1.2, 0.6) == 0.0

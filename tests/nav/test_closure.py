@@ -84,6 +84,29 @@ def test_a_standing_receiver_waits_for_calm_and_a_running_one_for_hope():
     assert running[-1, 1] > 0.7
 
 
+@pytest.mark.parametrize(("unrest", "goes"), [(1.0, True), (1.01, False)])
+def test_of_a_standing_receiver_the_swing_is_asked_to_be_calm(unrest, goes):
+    closure = Closure(SETTINGS, FULL_M_S, RAMP_M_S2, STEP_S)
+    told(closure, 4.0, unrest=unrest)
+    assert (closure.speed_m_s > 0.0) is goes
+
+
+@pytest.mark.parametrize("which", ["miss", "unrest"])
+def test_a_running_receiver_goes_on_up_to_what_is_hopeful(which):
+    closure = running_up()
+    told(closure, 3.5, **{which: SETTINGS.hopeful})
+    assert closure.speed_m_s == SETTINGS.run_up_m_s
+    told(closure, 3.5, **{which: 1.01 * SETTINGS.hopeful})
+    assert closure.speed_m_s < SETTINGS.run_up_m_s
+
+
+def test_who_has_only_begun_to_run_up_goes_on_in_a_swing_that_nobody_would_begin_in():
+    closure = Closure(SETTINGS, FULL_M_S, RAMP_M_S2, STEP_S)
+    told(closure, 4.0)
+    told(closure, 4.0, unrest=1.2)
+    assert closure.speed_m_s == pytest.approx(2.0 * RAMP_M_S2 * STEP_S)
+
+
 def test_a_tip_that_is_blown_closer_is_called_back_earlier():
     near = [_flown(lambda t, d: (1.3, 0.5), 9.0, blown_m_s=v)[:, 0].min() for v in (0.0, 0.2, 0.4)]
     assert min(near) > SETTINGS.margin_m

@@ -103,3 +103,27 @@ def test_what_it_asks_for_first_is_equation_1(place_m, distance_m, error_m, inte
     wanted = s.proportional_1_s * np.array(error_m) + s.integral_1_s2 * 0.01 * np.array(integrated_m)
     wanted += closing + s.derivative * (rate_m_s + closing)
     np.testing.assert_allclose(asked, s.smoothing_1_s * (wanted - u), rtol=1e-12)
+
+
+def test_the_error_to_come_is_that_of_now():
+    pid = Pid(SETTINGS.pid, 0.01)
+    place_m = np.array([4.0, 0.1, -0.2])
+    pid.observe(Sight(place_m=place_m, rate_m_s=np.ones(3), push_m_s2=np.zeros((1, 3))), NOT_FELT)
+    np.testing.assert_allclose(pid.error_to_come(np.array([0.02, 0.03])), [0.12, -0.17], rtol=1e-12)
+
+
+def test_along_it_goes_no_faster_than_it_is_told_to_and_across_no_faster_than_it_rushes():
+    s, pid = SETTINGS.pid, Pid(SETTINGS.pid, 0.01)
+    pid.observe(Sight(place_m=np.array([30.0, -15.0, 9.0]), rate_m_s=np.zeros(3), push_m_s2=np.zeros((1, 3))), NOT_FELT)
+    asked = pid.rate(np.zeros(3), Wanted(distance_m=4.0, speed_m_s=0.7, aim_m=np.zeros(2)))
+    across_m_s = s.proportional_1_s * s.error_max_m
+    np.testing.assert_allclose(asked, s.smoothing_1_s * np.array([0.7, -across_m_s, across_m_s]), rtol=1e-12)
+
+
+def test_the_integrals_are_held_while_a_drogue_that_was_seen_is_not():
+    pid, wanted = Pid(SETTINGS.pid, 0.01), Wanted(distance_m=4.0, speed_m_s=1.5, aim_m=np.zeros(2))
+    sight = Sight(place_m=np.array([4.1, 0.2, -0.3]), rate_m_s=np.zeros(3), push_m_s2=np.zeros((1, 3)))
+    for seen in (sight, None, None):
+        pid.observe(seen, NOT_FELT)
+        pid.rate(np.zeros(3), wanted)
+    np.testing.assert_allclose(pid.drift_m_s, SETTINGS.pid.integral_1_s2 * 0.01 * np.array([0.1, 0.2, -0.3]))

@@ -97,6 +97,22 @@ def test_the_drogue_s_own_attitude_of_the_last_second_is_what_it_turns_from():
     assert told(lambda t: 0.0, before=lambda t: -8.0).any()
 
 
+def test_it_turns_from_the_mean_of_the_last_second_whatever_the_drogue_did_at_the_last():
+    """A drogue that nodded to and fro within it, and had its nose highest as it was met."""
+    assert not told(
+        lambda t: LIMIT_DEG - 0.5, before=lambda t: -6.0 * np.cos(2.0 * np.pi * t / LIMITS.slack_before_s)
+    ).any()
+
+
+def test_at_the_next_contact_it_turns_from_where_it_hung_before_that_one():
+    hose = SlackHose(LIMITS, STEP_S)
+    for degrees in (0.0, 12.0, -12.0):
+        for phase, coupling_m in ((Phase.APPROACH, 1.0), (Phase.CONTACT, 0.0)):
+            for _ in range(round(1.2 / STEP_S)):
+                hose.step(phase, np.array([coupling_m, 0.0, 0.0]), turned(degrees), seen=True)
+                assert not hose.is_slack
+
+
 FAR_DEG = np.degrees(LIMITS.slack_far_rad)
 
 

@@ -69,6 +69,13 @@ def test_of_a_swing_the_mean_counts_from_the_first_seconds_on():
         assert np.abs(held(trail, (0.0, 0.0), 1.0)[-1]).max() < GAIN_M_S * np.radians(1.0), seconds
 
 
+def test_where_it_trails_is_the_mean_over_the_time_that_is_set():
+    """Turned by 6 degrees to the left for just that time, all but 1/e of it has become the mean."""
+    trail = seen_before(60.0, lambda t: np.add(REST_DEG, (6.0 if t > -SETTINGS.trail_before_s else 0.0, 0.0)))
+    asked = held(trail, (6.0, 0.0), 1.0)[-1]
+    np.testing.assert_allclose(asked, GAIN_M_S * np.radians([6.0, 0.0]) / np.e, rtol=0.01, atol=1e-6)
+
+
 def test_where_it_trailed_long_ago_is_forgotten():
     trail = seen_before(60.0, lambda t: REST_DEG if t > -5.0 * SETTINGS.trail_before_s else (30.0, 30.0))
     assert np.abs(held(trail, (0.0, 0.0), 1.0)[-1]).max() < GAIN_M_S * np.radians(0.2)
