@@ -101,7 +101,7 @@ def two_poses(rays: Array, points_D: Array) -> tuple[Array, Array]:
         points_D: (n, 3) LEDs in drogue axes [m], flat or nearly so.
 
     Returns:
-        (2, 3, 3) R_CD and (2, 3) p_CD [m]; NaN when the LEDs lie on a line or are not in front.
+        (2, 3, 3) R_CD and (2, 3) p_CD [m], along the rays wherever they point; NaN when the LEDs lie on a line.
     """
     attitudes, positions, axes = np.full((2, 3, 3), np.nan), np.full((2, 3), np.nan), np.empty((3, 3))
     mean = _plane(points_D, axes)
