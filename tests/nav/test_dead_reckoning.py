@@ -135,6 +135,8 @@ def test_it_is_looked_for_beyond_one_edge_no_farther_than_it_swings_and_may_drif
     moved_m = np.linalg.norm(places - places[0], axis=1)
     assert moved_m.max() > SETTINGS.unseen_swing_m
     assert (moved_m <= beyond_m).all()
+    farthest = moved_m.argmax()
+    assert moved_m[farthest] == pytest.approx(beyond_m[farthest], abs=0.02)  # at 0.9 m/s
     np.testing.assert_allclose(places[-1], places[0], atol=1e-9)
     np.testing.assert_array_equal(drifts[-1], STILL)
 

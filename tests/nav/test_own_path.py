@@ -105,3 +105,29 @@ def test_who_was_blown_aside_and_is_at_rest_again_strays_no_more_though_the_limi
     assert np.max(strays) == pytest.approx(min(most_m_s, 0.5), abs=1e-5)
     assert np.min(strays) > -1e-5
     np.testing.assert_allclose(strays[-1], 0.0, atol=1e-5)
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_a_change_that_is_not_known_whole_was_not_felt(axis):
+    path, change = OwnPath(RESPONSE_S, 0.01, STRAYING_S, 4.0, LIMIT_M_S), np.full(3, 0.1)
+    change[axis] = np.nan
+    path.feel(change)
+    np.testing.assert_array_equal([path.velocity_m_s, path.blown_m_s], np.zeros((2, 3)))
+
+
+def test_what_was_felt_before_a_gap_is_no_part_of_what_gusts_give_after_it():
+    """0.4 m/s, a gap, and 0.3 m/s more: of the sum the limit would have left 0.1."""
+    path, given = OwnPath(RESPONSE_S, 0.01, STRAYING_S, 1e6, LIMIT_M_S), []
+    for change_m_s in (0.4, np.nan, 0.3):
+        path.feel(np.full(3, change_m_s))
+        given.append(path.blown_m_s)
+        path.step(np.zeros(3))
+    np.testing.assert_allclose(given, np.outer([0.4, 0.0, 0.3], np.ones(3)), rtol=1e-7)
+
+
+def test_who_answers_within_less_than_a_tick_has_flown_a_command_after_the_period_that_it_is_given_for():
+    path, u = OwnPath(np.full(3, 0.002), 0.01, STRAYING_S, 4.0, LIMIT_M_S), np.array([0.5, -0.2, 0.1])
+    path.step(u)
+    np.testing.assert_array_equal([path.place_m, path.velocity_m_s], np.zeros((2, 3)))
+    path.step(np.zeros(3))
+    np.testing.assert_allclose([path.place_m, path.velocity_m_s], [0.01 * u, u], rtol=1e-12)

@@ -5,6 +5,7 @@ import pytest
 
 from dockair.nav.guidance.controller import Sight, Wanted
 from dockair.nav.guidance.guidance_settings import GuidanceSettings
+from dockair.nav.guidance.path_plan import PathPlan
 from dockair.nav.guidance.predictive import Predictive
 
 SETTINGS, STEP_S, NOT_FELT = GuidanceSettings(), 0.01, np.full(3, np.nan)
@@ -196,3 +197,107 @@ def test_along_what_the_tip_strays_at_is_flown_against(distance_m):
         goes_on_m = e * (STEP_S + dies_s * (1.0 - left))
         expected -= s.along_gain_1_s * (e * left + s.smoothing_1_s * goes_on_m)
     assert rates[1] - rates[0] == pytest.approx(expected, rel=1e-6)
+
+
+def test_it_looks_ahead_to_now_the_response_time_and_the_nodes_of_the_plan():
+    plan, tau_s = SETTINGS.predictive.plan, SETTINGS.response_s[1]
+    times_s = shown(lambda _: 4.0 * ALONG, lambda _: np.zeros(3), 0.0).looks_ahead_s
+    np.testing.assert_allclose(times_s, [0.0, *(tau_s + plan.node_s * np.arange(plan.nodes + 1))], atol=1e-12)
+
+
+def test_across_the_tip_begins_from_where_straying_will_have_brought_it_and_on_to_where_it_goes():
+    """Blown to the left by 0.1 m/s in the last tick, the drogue at rest: y_r at the nodes by Eq. (3) of `own_path`."""
+    s, tau_s = SETTINGS.predictive, SETTINGS.response_s[1]
+    limits = np.array(SETTINGS.acceleration_limit_m_s2), np.array(SETTINGS.jerk_limit_m_s3)
+    e, left = 0.1 / (1.0 + STEP_S / s.forgotten_s) ** 2, np.array([0.0, 1.0, 0.0])
+    controller = Predictive(s, np.array(SETTINGS.response_s), *limits, STEP_S, SETTINGS.patient_share)
+    push = np.zeros((len(controller.looks_ahead_s), 3))
+    for blown_m_s in (*np.zeros(299), 0.1):
+        place_m = 4.0 * ALONG - (e * STEP_S * left if blown_m_s else 0.0)
+        controller.observe(Sight(place_m=place_m, rate_m_s=np.zeros(3), push_m_s2=push), blown_m_s * left)
+        controller.given(np.zeros(3), np.zeros(3))
+    wanted = Wanted(distance_m=None, speed_m_s=1.0, aim_m=np.zeros(2), must_follow=True)
+    times_s, dies_s = tau_s + s.plan.node_s * np.arange(1, s.plan.nodes + 1), s.straying_s[1]
+    gone_m = e * (STEP_S + dies_s * (1.0 - np.exp(-times_s / dies_s)))
+    jerk_m_s3 = PathPlan(s.plan, limits[0][1], limits[1][1]).jerk_m_s3(np.zeros(3), -gone_m, None)
+    assert controller.rate(np.zeros(3), wanted)[1] == pytest.approx(jerk_m_s3 * STEP_S, rel=1e-6)
+
+
+@pytest.mark.parametrize(("patient", "share"), [(False, (1.0, 1.0)), (True, SETTINGS.patient_share)])
+def test_across_it_goes_to_a_drogue_that_is_far_aside_with_all_of_the_jerk_or_the_share_that_patience_leaves(
+    patient, share
+):
+    place_m = np.array([4.0, 20.0, -20.0])
+    controller = shown(lambda _: place_m, lambda _: np.zeros(3), 5.0)
+    wanted = Wanted(distance_m=4.0, speed_m_s=1.0, aim_m=np.zeros(2), patient=patient, must_follow=True)
+    most_m_s2 = share * np.array(SETTINGS.jerk_limit_m_s3[1:]) * STEP_S
+    np.testing.assert_allclose(controller.rate(np.zeros(3), wanted)[1:] / most_m_s2, [1.0, -1.0], rtol=0.02)
+
+
+@pytest.mark.parametrize("row", [0, 1])
+def test_the_swing_is_as_large_as_the_share_of_the_acceleration_that_it_asks_for(row):
+    """Of the first mode by 0.2 m, at its end: omega^2 s of what is calm, left and up."""
+    controller, axis = shown(lambda _: 4.0 * ALONG, lambda _: np.zeros(3), 0.0), 1 + row
+    controller._motion._filters._x[:, axis, 2] = 0.2
+    omega = 2.0 * np.pi * SETTINGS.predictive.swing.modes[0].frequency_hz[axis]
+    calm_m_s2 = SETTINGS.predictive.calm_share[row] * SETTINGS.acceleration_limit_m_s2[axis]
+    assert controller.unrest == pytest.approx(0.2 * omega**2 / calm_m_s2, rel=1e-9)
+
+
+@pytest.mark.parametrize(("share", "bears"), [(0.7, True), (1.3, False)])
+@pytest.mark.parametrize("row", [0, 1])
+def test_gusts_can_be_borne_whose_swing_asks_for_a_share_of_the_acceleration_at_most(row, share, bears):
+    """A steady swing at the first mode's frequency by its rms acceleration, which is told to a sixth."""
+    axis = 1 + row
+    omega = 2.0 * np.pi * SETTINGS.predictive.swing.modes[0].frequency_hz[axis]
+    bearable_m_s2 = SETTINGS.predictive.bearable_share[row] * SETTINGS.acceleration_limit_m_s2[axis]
+    swing_m = np.sqrt(2.0) * share * bearable_m_s2 / omega**2 * np.eye(3)[axis]
+    controller = shown(
+        lambda t: 8.0 * ALONG + np.sin(omega * t) * swing_m, lambda t: omega * np.cos(omega * t) * swing_m, 30.0
+    )
+    assert controller.bears_the_gusts is bears
+
+
+def fresh():
+    """A controller that was shown nothing yet."""
+    return shown(lambda _: 4.0 * ALONG, lambda _: np.zeros(3), 0.0)
+
+
+def test_a_drogue_that_comes_into_view_goes_on_at_its_rate_and_the_receivers_own():
+    controller, left = fresh(), np.array([0.0, 1.0, 0.0])
+    for _ in range(50):
+        controller.observe(None, NOT_FELT)
+        controller.given(0.3 * left, np.zeros(3))
+    push = np.zeros((len(controller.looks_ahead_s), 3))
+    controller.observe(Sight(place_m=4.0 * ALONG, rate_m_s=0.1 * left, push_m_s2=push), NOT_FELT)
+    tau_s = SETTINGS.response_s[1]
+    assert controller.error_to_come(np.zeros(2))[0] == pytest.approx(0.1 * tau_s, abs=0.1 * 0.4 * tau_s)
+
+
+def test_the_push_of_the_bow_wave_now_and_after_the_response_time_is_in_the_error_to_come():
+    """From rest by 1 m/s^2 for a tick, then growing to 3: tau^2 (1/3 + 3/6) more, but for the swing's stiffness."""
+    controller, tau_s = fresh(), SETTINGS.response_s[1]
+    push = np.full((len(controller.looks_ahead_s), 3), 3.0)
+    push[0] = 1.0
+    controller.observe(Sight(place_m=4.0 * ALONG, rate_m_s=np.zeros(3), push_m_s2=push), NOT_FELT)
+    expected = 0.5 * STEP_S**2 + STEP_S * tau_s + tau_s**2 * (1.0 / 3.0 + 3.0 / 6.0)
+    np.testing.assert_allclose(controller.error_to_come(np.zeros(2)), expected, rtol=0.02)
+
+
+def test_a_drogue_that_has_been_seen_to_hang_still_is_waited_for_at_the_distance_that_is_wanted():
+    wanted = Wanted(distance_m=4.0, speed_m_s=1.0, aim_m=np.zeros(2))
+    controller = shown(lambda _: 4.0 * ALONG, lambda _: np.zeros(3), 5.0)
+    np.testing.assert_allclose(controller.rate(np.zeros(3), wanted), 0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("times", "farther"), [(1.0, 0.0), (1.5, 0.5), (2.0, 1.0), (9.0, SETTINGS.predictive.excess_max)]
+)
+def test_a_swing_is_waited_for_farther_astern_the_more_it_asks_for(times, farther):
+    """By so many times what is bearable, rms: u* = k (y_D - y_r - wanted)."""
+    s, controller = SETTINGS.predictive, shown(lambda _: 4.0 * ALONG, lambda _: np.zeros(3), 5.0)
+    controller._asked = times**2 * controller._bearable * [1.0, 0.1]
+    asked = controller.rate(np.zeros(3), Wanted(distance_m=4.0, speed_m_s=9.0, aim_m=np.zeros(2)))[0]
+    assert asked == pytest.approx(-s.smoothing_1_s * s.along_gain_1_s * farther * s.keep_away_m, abs=1e-9)
+    must = Wanted(distance_m=4.0, speed_m_s=9.0, aim_m=np.zeros(2), must_follow=True)
+    assert controller.rate(np.zeros(3), must)[0] == pytest.approx(0.0, abs=1e-9)
