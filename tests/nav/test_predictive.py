@@ -48,6 +48,12 @@ def test_a_bias_of_the_velocity_is_held_after_some_seconds():
     np.testing.assert_allclose(controller.steady_drift_m_s, drift, atol=0.1)
 
 
+def test_a_bias_that_has_long_been_there_is_held_whole():
+    drift = np.array([0.2, -0.3, 0.3])
+    controller = shown(lambda t: np.array([4.0, 0.0, 0.0]) + drift * t, lambda _: drift, 40.0)
+    np.testing.assert_allclose(controller.steady_drift_m_s, drift, rtol=0.03)
+
+
 @pytest.mark.parametrize("seconds", [5.0, 7.0, 10.0])
 def test_a_bias_that_shows_a_second_late_is_held_though_it_is_still_being_learnt(seconds):
     """As 27093 of light_gusts on perfect navigation: contact after 10 s, 0.57 m/s of bias, of which 0.32 were held."""
@@ -277,8 +283,8 @@ def test_a_drogue_that_comes_into_view_goes_on_at_its_rate_and_the_receivers_own
 def test_the_push_of_the_bow_wave_now_and_after_the_response_time_is_in_the_error_to_come():
     """From rest by 1 m/s^2 for a tick, then growing to 3: tau^2 (1/3 + 3/6) more, but for the swing's stiffness."""
     controller, tau_s = fresh(), SETTINGS.response_s[1]
-    push = np.full((len(controller.looks_ahead_s), 3), 3.0)
-    push[0] = 1.0
+    push = np.full((len(controller.looks_ahead_s), 3), 9.0)
+    push[:2] = [[1.0], [3.0]]
     controller.observe(Sight(place_m=4.0 * ALONG, rate_m_s=np.zeros(3), push_m_s2=push), NOT_FELT)
     expected = 0.5 * STEP_S**2 + STEP_S * tau_s + tau_s**2 * (1.0 / 3.0 + 3.0 / 6.0)
     np.testing.assert_allclose(controller.error_to_come(np.zeros(2)), expected, rtol=0.02)
@@ -301,3 +307,57 @@ def test_a_swing_is_waited_for_farther_astern_the_more_it_asks_for(times, farthe
     assert asked == pytest.approx(-s.smoothing_1_s * s.along_gain_1_s * farther * s.keep_away_m, abs=1e-9)
     must = Wanted(distance_m=4.0, speed_m_s=9.0, aim_m=np.zeros(2), must_follow=True)
     assert controller.rate(np.zeros(3), must)[0] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_across_it_goes_on_from_the_acceleration_that_was_commanded_last():
+    controller, a_m_s2 = shown(lambda _: 4.0 * ALONG, lambda _: np.zeros(3), 0.1), np.array([0.0, 1.0, -2.0])
+    controller.given(np.zeros(3), a_m_s2)
+    asked = controller.rate(np.zeros(3), Wanted(distance_m=4.0, speed_m_s=1.0, aim_m=np.zeros(2), must_follow=True))
+    assert (np.abs(asked - a_m_s2)[1:] <= STEP_S * np.array(SETTINGS.jerk_limit_m_s3[1:]) * (1.0 + 1e-9)).all()
+
+
+def test_a_swing_is_followed_but_where_it_is_more_than_can_be_borne_and_need_not_be():
+    """At rest but for a swing by 0.5 m/s on each axis; closing at 1 m/s."""
+    s, controller = SETTINGS.predictive, shown(lambda _: 4.0 * ALONG, lambda _: np.zeros(3), 5.0)
+    controller._motion._filters._x[:, :, 3] = 0.5
+    controller.observe(None, NOT_FELT)
+    for times, must_follow, follows in ((2.0, False, False), (2.0, True, True), (0.5, False, True)):
+        controller._asked = times * controller._bearable
+        wanted = Wanted(distance_m=None, speed_m_s=1.0, aim_m=np.zeros(2), must_follow=must_follow)
+        more = controller.rate(np.zeros(3), wanted) - s.smoothing_1_s * ALONG
+        np.testing.assert_array_equal(np.abs(more) > (0.02 if follows else 1e-9), follows)
+
+
+def test_the_tip_goes_to_where_it_is_aimed_off_the_drogue():
+    """As to a drogue that hangs there."""
+    off_m, asked = np.array([0.1, -0.2]), []
+    for place_m, aim_m in ((np.array([4.0, *off_m]), np.zeros(2)), (4.0 * ALONG, off_m)):
+        controller = shown(lambda _, place_m=place_m: place_m, lambda _: np.zeros(3), 5.0)
+        np.testing.assert_allclose(controller.error_to_come(aim_m), off_m, atol=1e-9)
+        asked.append(controller.rate(np.zeros(3), Wanted(distance_m=4.0, speed_m_s=1.0, aim_m=aim_m, must_follow=True)))
+    np.testing.assert_allclose(asked[1], asked[0], atol=1e-9)
+    assert (np.abs(asked[0][1:]) > 0.01).all()
+
+
+@pytest.mark.parametrize(
+    ("distance_m", "speed_m_s", "way_m_s"),
+    [(3.8, 1.0, None), (4.2, 1.0, None), (0.5, 0.7, 0.7), (10.0, 0.7, -0.7)],
+    ids=["behind", "ahead", "far behind", "far ahead"],
+)
+def test_along_it_goes_to_the_distance_and_no_faster_than_it_is_told_to(distance_m, speed_m_s, way_m_s):
+    """Eq. (1) of a drogue at rest, and of a receiver that is commanded 0.3 m/s now."""
+    s, u = SETTINGS.predictive, np.array([0.3, 0.0, 0.0])
+    controller = shown(lambda _: 4.0 * ALONG, lambda _: np.zeros(3), 5.0)
+    asked = controller.rate(u, Wanted(distance_m=distance_m, speed_m_s=speed_m_s, aim_m=np.zeros(2), must_follow=True))
+    if way_m_s is None:
+        expected = -s.along_gain_1_s * u[0] + s.smoothing_1_s * (s.along_gain_1_s * (4.0 - distance_m) - u[0])
+    else:
+        expected = s.smoothing_1_s * (way_m_s - u[0])
+    assert asked[0] == pytest.approx(expected, rel=1e-6)
+
+
+def test_a_drogue_that_is_reeled_in_is_gone_after_no_faster_than_the_speed_that_is_told():
+    drift = 0.5 * ALONG
+    controller, u = shown(lambda t: 8.0 * ALONG + t * drift, lambda _: drift, 10.0), np.array([0.3, 0.0, 0.0])
+    asked = controller.rate(u, Wanted(distance_m=4.0, speed_m_s=0.7, aim_m=np.zeros(2), must_follow=True))
+    assert asked[0] == pytest.approx(SETTINGS.predictive.smoothing_1_s * (0.7 - u[0]), rel=1e-9)
