@@ -211,8 +211,12 @@ def test_it_looks_ahead_to_now_the_response_time_and_the_nodes_of_the_plan():
     np.testing.assert_allclose(times_s, [0.0, *(tau_s + plan.node_s * np.arange(plan.nodes + 1))], atol=1e-12)
 
 
-def test_across_the_tip_begins_from_where_straying_will_have_brought_it_and_on_to_where_it_goes():
-    """Blown to the left by 0.1 m/s in the last tick, the drogue at rest: y_r at the nodes by Eq. (3) of `own_path`."""
+@pytest.mark.parametrize("to_contact_s", [None, 0.5, 0.9])
+def test_across_the_tip_begins_from_where_straying_will_have_brought_it_and_on_to_where_it_goes(to_contact_s):
+    """Blown to the left by 0.1 m/s in the last tick, the drogue at rest: y_r at the nodes by Eq. (3) of `own_path`.
+
+    The plan begins a response time from now, and so it is nearer to contact by that.
+    """
     s, tau_s = SETTINGS.predictive, SETTINGS.response_s[1]
     limits = np.array(SETTINGS.acceleration_limit_m_s2), np.array(SETTINGS.jerk_limit_m_s3)
     e, left = 0.1 / (1.0 + STEP_S / s.forgotten_s) ** 2, np.array([0.0, 1.0, 0.0])
@@ -222,10 +226,11 @@ def test_across_the_tip_begins_from_where_straying_will_have_brought_it_and_on_t
         place_m = 4.0 * ALONG - (e * STEP_S * left if blown_m_s else 0.0)
         controller.observe(Sight(place_m=place_m, rate_m_s=np.zeros(3), push_m_s2=push), blown_m_s * left)
         controller.given(np.zeros(3), np.zeros(3))
-    wanted = Wanted(distance_m=None, speed_m_s=1.0, aim_m=np.zeros(2), must_follow=True)
+    wanted = Wanted(distance_m=None, speed_m_s=1.0, aim_m=np.zeros(2), must_follow=True, to_contact_s=to_contact_s)
+    planned_s = None if to_contact_s is None else to_contact_s - tau_s
     times_s, dies_s = tau_s + s.plan.node_s * np.arange(1, s.plan.nodes + 1), s.straying_s[1]
     gone_m = e * (STEP_S + dies_s * (1.0 - np.exp(-times_s / dies_s)))
-    jerk_m_s3 = PathPlan(s.plan, limits[0][1], limits[1][1]).jerk_m_s3(np.zeros(3), -gone_m, None)
+    jerk_m_s3 = PathPlan(s.plan, limits[0][1], limits[1][1]).jerk_m_s3(np.zeros(3), -gone_m, planned_s)
     assert controller.rate(np.zeros(3), wanted)[1] == pytest.approx(jerk_m_s3 * STEP_S, rel=1e-6)
 
 
@@ -361,3 +366,15 @@ def test_a_drogue_that_is_reeled_in_is_gone_after_no_faster_than_the_speed_that_
     controller, u = shown(lambda t: 8.0 * ALONG + t * drift, lambda _: drift, 10.0), np.array([0.3, 0.0, 0.0])
     asked = controller.rate(u, Wanted(distance_m=4.0, speed_m_s=0.7, aim_m=np.zeros(2), must_follow=True))
     assert asked[0] == pytest.approx(SETTINGS.predictive.smoothing_1_s * (0.7 - u[0]), rel=1e-9)
+
+
+def test_across_a_drogue_that_is_farther_off_than_the_most_is_gone_to_as_if_it_were_that_far_off():
+    """At the price of a swing that is waited for, which leaves some of the jerk."""
+    most_m, asked = SETTINGS.predictive.plan.error_max_m, []
+    for off_m in (most_m, 2.0 * most_m):
+        place_m = np.array([4.0, off_m, -off_m])
+        controller = shown(lambda _, place_m=place_m: place_m, lambda _: np.zeros(3), 5.0)
+        controller._asked = 4.0 * controller._bearable
+        asked.append(controller.rate(np.zeros(3), Wanted(distance_m=4.0, speed_m_s=1.0, aim_m=np.zeros(2)))[1:])
+    np.testing.assert_allclose(asked[1], asked[0], rtol=1e-9)
+    assert (np.abs(asked[0]) < 0.8 * STEP_S * np.array(SETTINGS.jerk_limit_m_s3[1:])).all()
