@@ -49,7 +49,7 @@ def rotor_moment(parameters: AirframeData, w_B: Array) -> Array:
 
 
 def thrust_range(parameters: AirframeData, airspeed_m_s: float, air: Air) -> ThrustRange:
-    """Thrust range at an airspeed [m/s]; the altitude is the one where the standard pressure is that of `air`."""
+    """Thrust range at an airspeed [m/s]; between the tables' altitudes it goes with the standard pressure, linearly."""
     mach = airspeed_m_s / air.speed_of_sound_m_s
     pressures = [standard_atmosphere(altitude).pressure_pa for altitude in parameters.thrust_altitude_m]
     altitude = float(np.interp(-air.pressure_pa, -np.array(pressures), parameters.thrust_altitude_m))

@@ -29,11 +29,13 @@ def test_thrust_range_is_the_tables_own_at_their_nodes(
     assert available.throttle(available.military_n) == 1.0 and available.throttle(available.idle_n) == 0.0
 
 
-def test_thrust_between_nodes_is_bilinear() -> None:
-    """Mach 0.5 at 15000 ft: the mean of four nodes, but for pressure altitude that is not quite linear in height."""
-    air = standard_atmosphere(15000 * 0.3048)
+def test_thrust_between_nodes_is_bilinear_in_mach_number_and_pressure() -> None:
+    """Mach 0.5 at 15000 ft, between 10000 and 20000 ft."""
+    low, air, high = (standard_atmosphere(altitude_ft * 0.3048) for altitude_ft in (10000, 15000, 20000))
+    share = (low.pressure_pa - air.pressure_pa) / (low.pressure_pa - high.pressure_pa)
     available = thrust_range(AIRFRAME, 0.5 * air.speed_of_sound_m_s, air)
-    assert available.military_n == pytest.approx(0.25 * (9312 + 9839 + 6610 + 7090) * POUND_N, rel=0.02)
+    expected = 0.5 * ((1.0 - share) * (9312 + 9839) + share * (6610 + 7090)) * POUND_N
+    assert available.military_n == pytest.approx(expected, rel=1e-4)
 
 
 @pytest.mark.parametrize(
