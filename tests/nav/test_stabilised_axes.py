@@ -48,7 +48,7 @@ def test_the_rate_is_the_derivative_of_the_place():
         StabilisedAxes(5.0, 1e-4),
         np.array([4.0, 1.0, -0.5]),
         np.array([-1.0, 0.2, 0.3]),
-        np.ones(3),
+        np.array([1.0, -0.7, 0.4]),
     )
     places = []
     for k in range(3):
