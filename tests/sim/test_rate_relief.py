@@ -46,6 +46,15 @@ def test_a_surface_near_its_stop_takes_the_reference_back_the_model_s_too(relief
     assert again < relief.step(CALM, CALM, CALM)[LEFT] < 1.0
 
 
+@pytest.mark.parametrize("surface", range(3))
+def test_near_the_stop_the_command_counts_and_not_the_surface(relief, surface):
+    """Behind or ahead of each other by less than what is late."""
+    beyond, inside = np.zeros((2, 3))
+    beyond[surface], inside[surface] = 0.91 * STOPS[surface], 0.89 * STOPS[surface]
+    assert (relief.step(inside, beyond, CALM) == 1.0).all()
+    assert relief.step(beyond, inside, CALM)[LEFT] < 1.0
+
+
 def test_the_share_falls_as_the_equations_say(relief):
     """b = 1 - exp(-t/T) while busy; the share is 1 - 0.8 b / 0.4, and no less than 0.2."""
     asked = np.array([0.2, 0.0, 0.0])
