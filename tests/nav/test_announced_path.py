@@ -141,6 +141,30 @@ def test_a_descent_that_is_announced_in_a_turn_leaves_what_was_learnt_of_the_tur
     assert learnt[1.01 * TURN][0] == 0.0
 
 
+def test_a_descent_that_comes_in_sooner_or_later_than_said_makes_no_velocity_to_the_side_less_known():
+    """The turn goes on as it was: only what changes of it may come in late."""
+    known = []
+    for descends in (False, True):
+        path = AnnouncedPath()
+        path.announce(_said())
+        if descends:
+            path.announce(_said(starts_s=30.0, entry_s=5.0, climb=-0.03))
+        _behind(path, 0.02, 0.2, -0.2, 34.0)
+        assert (path.climb_rad < 0.0) is descends
+        known.append(path._covariance)
+    np.testing.assert_allclose(known[1], known[0], rtol=1e-9)
+
+
+def test_the_share_by_which_a_turn_is_another_than_announced_wanders():
+    """As it was told, (sigma / r)^2, and the wander's density times the time in which nothing is seen."""
+    path, s, seconds = AnnouncedPath(), AnnouncedPathSettings(), 40.0
+    path.announce(_said(starts_s=0.0))
+    path.step(0.01)
+    _flown(path, seconds)
+    expected = (s.turn_rate_sigma_rad_s / TURN) ** 2 + s.wander_1_sqrt_s**2 * seconds
+    assert path._covariance[2] == pytest.approx(expected, rel=1e-9)
+
+
 def test_another_turn_leaves_what_was_learnt_of_the_velocity_as_well_known_as_it_was():
     """A drogue that swings by 1 m/s for a tick then moves what is learnt as little as before, not as at the first."""
     moved = {}

@@ -90,6 +90,18 @@ def test_what_was_known_of_the_drift_stays_known_where_the_swing_is_begun_anew()
     assert kept < 0.1 and unknown > 0.6
 
 
+def test_begun_anew_at_a_place_nothing_is_left_of_the_swing_and_the_drift_is_as_it_was():
+    motion, rng, place = (
+        OneHose(SwingSettings(), STEP_S, LEAD_S, 0.1),
+        np.random.default_rng(6),
+        np.array([4.0, 1.0, -2.0]),
+    )
+    motion._x[:] = rng.standard_normal(motion._x.shape)
+    drift = motion.drift_m_s
+    motion.resume(place)
+    np.testing.assert_allclose(motion.ahead(CALM, CALM), [place + LEAD_S * drift, drift, np.zeros(3)], atol=1e-12)
+
+
 def test_a_steady_drift_is_predicted_without_error_and_told_from_the_swing():
     drift = np.array([-0.1, 0.2, -0.1])
     t, motion = follow(lambda t: drift * t, lambda t: drift, 40.0)

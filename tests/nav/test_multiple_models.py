@@ -181,3 +181,20 @@ def test_a_slow_swing_is_as_unquiet_as_one_of_the_usual_hose():
     motion._filters._x[0, :, 2] = 0.2
     omega = 2.0 * np.pi * np.array(SwingSettings().modes[0].frequency_hz)
     np.testing.assert_allclose(motion.swing_m_s2, 0.2 * omega**2, rtol=1e-12)
+
+
+def test_what_is_foretold_is_the_mean_by_the_weights_however_small():
+    ratios, weights, rng = (0.7, 1.0, 1.4), np.array([0.02, 0.9, 0.08]), np.random.default_rng(9)
+    ours = MultipleModels(replace(SwingSettings(), frequency_ratios=ratios), STEP_S, LEAD_S, NODE_S)
+    ours._filters._x[:] = rng.standard_normal(ours._filters._x.shape)
+    ours._weights = weights
+    push, filters = rng.standard_normal((7, 3)), ours._filters
+    for mean, of_each in (
+        (ours.drift_m_s, filters.drift_m_s),
+        (ours.middle_m, filters.middle_m),
+        (ours.ahead(push[0], push[1]), filters.ahead(push[0], push[1])),
+        (ours.path(push), filters.path(push)),
+        (ours.mean_path(5), filters.mean_path(5)),
+        (ours.mean_ahead(), filters.mean_ahead()),
+    ):
+        np.testing.assert_allclose(mean, np.tensordot(weights, of_each, 1), atol=1e-12)

@@ -98,6 +98,14 @@ def test_three_leds_are_enough_with_a_prior(kind):
     np.testing.assert_array_less(np.abs(p - pose.p_CD), 4.0 * sigma[3:])
 
 
+def test_sigmas_about_the_drogue_s_axes_are_information_in_the_camera_s():
+    """1/sigma^2 about each, none where nothing is known."""
+    R, sigma = matrix_from_yaw_pitch_roll(0.3, -0.2, 0.5), np.array([np.inf, 0.02, 0.05])
+    information = AttitudePrior.from_sigmas(R, sigma).information
+    for k in range(3):
+        np.testing.assert_allclose(information @ R[:, k], R[:, k] / sigma[k] ** 2, atol=1e-9)
+
+
 def test_unknown_roll_leaves_the_roll_to_the_frame():
     """A prior that is 40 degrees of roll off and knows nothing of it; the hose's direction never speaks of it."""
     R, p = tilted(12.0, 8.0)
