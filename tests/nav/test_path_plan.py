@@ -111,12 +111,15 @@ def test_it_is_met_half_way_to_the_coupling_at_the_ring_s_cost():
     assert half_way[1] < 0.7 * half_way[0]
 
 
-def test_what_the_drogue_does_after_contact_does_not_matter():
+@pytest.mark.parametrize("to_contact_s", [0.35, 0.5])
+def test_what_the_drogue_does_after_contact_does_not_matter(to_contact_s):
+    """From two widths after the middle of contact on; at 0.35 s that is just before a node."""
     x, target, plans = np.array([0.0, 0.1, 0.5]), 0.2 * np.sin(2.5 * TIMES), []
     for later in (0.0, 0.3):
-        moved = np.where(TIMES > 0.5 + 3.0 * SETTINGS.contact_s, target + later, target)
+        over_s = to_contact_s + SETTINGS.half_way_s + 2.0 * SETTINGS.contact_s
+        moved = np.where(TIMES > over_s, target + later, target)
         plan = PathPlan(replace(SETTINGS, on_the_way=0.0), ACCELERATION, JERK)
-        plans.append(_settled(plan, x, moved, to_contact_s=0.5))
+        plans.append(_settled(plan, x, moved, to_contact_s=to_contact_s))
     assert plans[0] == plans[1]
 
 

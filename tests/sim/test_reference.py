@@ -39,6 +39,18 @@ def test_reference_with_feed_forward_is_the_command_through_the_low_pass_alone()
     np.testing.assert_allclose(chain[tail, 0], np.tile(expected[:, None], 3), atol=2e-3)  # a tick of delay
 
 
+def test_reference_without_feed_forward_follows_by_the_gain_within_the_low_pass() -> None:
+    """Eq. (1) inside its limits, s r = F k (F u - r): k F^2 / (s + k F) of a swing of the command."""
+    w, size = 1.0, 0.05
+    chain = fly_reference(lambda t: ReceiverCommand(velocity_m_s=np.full(3, size * np.sin(w * t))), 9.0)
+    t = np.arange(1, len(chain) + 1) * 1e-3
+    tail = t > 7.5
+    b, zeta = PARAMETERS.smoothing_bandwidth_rad_s, PARAMETERS.smoothing_damping
+    F, k = b**2 / (b**2 - w**2 + 2j * zeta * b * w), PARAMETERS.reference_limits.gain_1_s
+    expected = size * np.imag(k * F**2 / (1j * w + k * F) * np.exp(1j * w * t[tail, np.newaxis]))
+    np.testing.assert_allclose(chain[tail, 0], expected, atol=0.006 * size)  # some ticks of delay
+
+
 def test_reference_keeps_its_limits_and_its_derivatives_belong_together() -> None:
     rng, limits = np.random.default_rng(2), PARAMETERS.reference_limits
     commands = rng.normal(size=(40, 2, 3)) * 6.0
