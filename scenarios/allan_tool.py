@@ -20,6 +20,7 @@ from dockair.errors import DockairError
 from dockair.nav.heading.allan import GyroNoise, identify_gyro_noise
 from dockair.parameters import read_sheet
 from dockair.rotations import Array
+from dockair.scenarios.toml_files import toml_text
 from dockair.scenarios.whole_file import write_text
 
 UNITS = {"rad/s": 1.0, "deg/s": float(np.pi / 180.0)}  #: in rad/s
@@ -159,7 +160,7 @@ def sheet_text(found: AllanReport) -> str:
         )
         entries.append(
             f"[{key}]\nvalue = {value:.6g}\nlow = {p.low}\nhigh = {p.high}\n"
-            f'unit = "{p.unit}"\nsource = "{_escaped(source)}"\nstatus = "measured"\n'
+            f'unit = "{p.unit}"\nsource = {toml_text(_readable(source))}\nstatus = "measured"\n'
         )
     return "\n".join(entries)
 
@@ -249,5 +250,6 @@ def _unit(path: Path, names: Sequence[str], asked: str | None) -> str:
     return said.pop()
 
 
-def _escaped(text: str) -> str:
-    return text.replace("\\", "\\\\").replace('"', '\\"')
+def _readable(text: str) -> str:
+    """Return a text with a sign in place of what is no UTF-8, as a file's name may be."""
+    return text.encode(errors="surrogateescape").decode(errors="replace")

@@ -1,5 +1,6 @@
 """TOML files that are asked for by name or by path: the packaged ones of one kind, how to find, show and read them."""
 
+import json
 import os
 import tomllib
 from dataclasses import dataclass
@@ -93,3 +94,8 @@ def toml_value(text: str) -> object:
     except (ValueError, RecursionError):
         return text  # a shell has eaten the quotes, or a name that needs none
     return table["value"] if len(table) == 1 else text
+
+
+def toml_text(text: str) -> str:
+    """Return a text as TOML writes it in one line, in quotes."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")  # TOML's strings, but for this one

@@ -4,7 +4,6 @@ A job's key is made of what decides the flight (scenario with every setting, see
 that is done is known again when the plan has grown.
 """
 
-import json
 import os
 import re
 import shlex
@@ -21,6 +20,7 @@ from dockair.scenarios.campaign.plan_file import PlanFile
 from dockair.scenarios.campaign.points import points_of, refuse_too_many, seeds_of
 from dockair.scenarios.scenario_hash import SHEETS, file_hash, require_decisive, scenario_hash
 from dockair.scenarios.schema import Scenario, load_scenario
+from dockair.scenarios.toml_files import toml_text
 
 _STRENGTHS = ("turbulence.sigma_m_s", "turbulence.intensity")
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
@@ -222,7 +222,7 @@ def as_toml(value: Any, where: str) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")  # TOML's strings, but for this one
+        return toml_text(value)
     if isinstance(value, int | float):
         return repr(value)
     if isinstance(value, list | tuple):

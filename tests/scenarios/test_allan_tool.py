@@ -2,6 +2,7 @@
 
 import errno
 import json
+import os
 import tomllib
 from dataclasses import replace
 
@@ -103,6 +104,17 @@ def test_the_sheet_s_keys_are_the_imu_s_own_and_a_scenario_takes_them(command, t
     assert overrides == {key: pytest.approx(entry["value"]) for key, entry in written.items()}
     taken = load_parameters("imu_mti", ImuParameters, overrides)
     assert taken.gyro_noise_density_rad_s_rthz == pytest.approx(2e-4, rel=0.03)
+
+
+@pytest.mark.parametrize(
+    ("name", "said"), [(b'a "\\.npy', 'a "\\.npy'), (b"a\n\a\x7f.npy", "a\n\a\x7f.npy"), (b"a\xff.npy", "a\ufffd.npy")]
+)
+def test_a_sheet_is_toml_and_names_its_record_whatever_that_is_called(tmp_path, name, said):
+    record, sheet = tmp_path / os.fsdecode(name), tmp_path / "sheet.toml"
+    np.save(record, _white(n=2000))
+    allan_tool.write_sheet(allan_tool.report(record, 100.0, "rad/s", terms="N"), sheet)
+    (entry,) = (entry for entry in tomllib.loads(sheet.read_text()).values() if entry["value"])
+    assert entry["source"] == f"Allan deviation of {said}: 3 x 20 s at 100 Hz"
 
 
 def test_json_is_one_object(command, tmp_path):
