@@ -79,6 +79,14 @@ def test_a_normal_draw_has_its_quantiles():
     assert values[22] == pytest.approx(1.0, abs=0.1)
 
 
+def test_a_value_grows_with_its_coordinate_and_at_one_is_the_last():
+    """The normal law's by one standard deviation from Phi(0) = 0.5 to Phi(1); values are floor(u n) of n."""
+    normal, listed = draw(mean=5.0, sigma=2.0), draw(values=["x", "y", "z"])
+    phi_1 = 0.5 * (1.0 + math.erf(math.sqrt(0.5)))
+    assert [normal.at(u) for u in (1.0 - phi_1, 0.5, phi_1)] == pytest.approx([3.0, 5.0, 7.0])
+    assert [listed.at(u) for u in (0.0, 0.33, 0.34, 0.66, 0.67, 1.0)] == ["x", "x", "y", "y", "z", "z"]
+
+
 @pytest.mark.parametrize(
     ("keys", "said"),
     [
