@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from dockair.errors import DockairError
-from dockair.scenarios.campaign.jobs import as_toml, jobs_of
+from dockair.scenarios.campaign.jobs import as_toml, jobs_of, with_background
 from dockair.scenarios.campaign.plan_file import PlanFile, plan_names
-from dockair.scenarios.campaign.points import refuse_too_many
+from dockair.scenarios.campaign.points import refuse_too_many, runs_of
 from dockair.scenarios.scenario_file import scenario_names
 from dockair.scenarios.schema import load_scenario
 from dockair.scenarios.toml_files import toml_value
@@ -123,6 +123,19 @@ gusts = [{{ at_s = 1e-3, length_m = 1e3, velocity_m_s = [0.0, -1.0, 2.0] }}]
 def test_a_value_comes_back_from_its_toml(value):
     assert toml_value(as_toml(value, "key")) == value
     assert "\n" not in as_toml(value, "key")
+
+
+def test_a_background_that_is_asked_for_stays_whatever_the_machine_could_draw(plan):
+    asked = [f'{{ scenario = "default", set.camera.background = "{name}" }}' for name in ("analytic", "auto")]
+    analytic, auto = jobs_of(plan(f"scenarios = [{', '.join(asked)}]"))
+    assert with_background(analytic, "mujoco") is analytic and with_background(auto, "") is auto
+    assert with_background(auto, "mujoco").scenario.camera.background == "mujoco"
+    assert auto.scenario.camera.background == "auto"
+
+
+def test_only_numbers_that_follow_one_another_are_a_run():
+    assert runs_of([3, 4, 5, 2, 2, 1, 9]) == [(3, 5), (2, 2), (2, 2), (1, 1), (9, 9)]
+    assert runs_of([]) == []
 
 
 def test_a_text_of_the_plan_stays_a_text(plan):
@@ -358,6 +371,10 @@ def test_every_packaged_plan_can_be_flown_and_says_what_for(name):
         (
             'scenarios = ["default"]\n[set]\nparameters = {}\n"parameters.hose.length_m" = 14.0',
             "p.toml: set: expected every key once, got 'parameters and parameters.hose.length_m'",
+        ),
+        (
+            'scenarios = ["default"]\n[set.navigation]\nheading_every_s = 1.0\nheading = "yes"',
+            "p.toml: set.navigation.heading: expected",
         ),
         ('scenarios = ["default"]\nseeds = [9223372036854775808]', "p.toml: seeds"),
         ("scenarios = [", "p.toml: expected TOML"),

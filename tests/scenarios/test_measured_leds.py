@@ -465,6 +465,26 @@ def test_latency_follows_the_window_of_a_ring_that_is_tracked_and_the_full_frame
     assert first - later == pytest.approx((1088 - rows) * row_s, abs=2.0 * row_s)
 
 
+def test_latency_is_counted_from_the_middle_of_the_exposure_that_was_taken():
+    """A frame of 500 us has its last row 200 us later after its stamp than one of 100 us."""
+    no_jitter = replace(SHEETS, sensor=replace(SHEETS.sensor, transfer_jitter_s=0.0))
+    latencies_s = []
+    for exposure_s in (100e-6, 500e-6):
+        stand = Stand(faults=[ExposureStuck(exposure_s=exposure_s)])
+        stand.leds._sheets = no_jitter
+        latencies_s.append(stand.leds.latency_s(stand.look()))
+    assert latencies_s[1] - latencies_s[0] == pytest.approx(200e-6, rel=1e-9)
+
+
+def test_the_window_is_as_high_above_the_rings_middle_as_below_it():
+    """LEDs in rows 490 to 510 and a margin of 40 px, windows as high as the ring: rows 470 to 530, 61 of them."""
+    stand = Stand(replace(EXACT, window_heights=1.0, window_margin_px=40.0))
+    view = stand.leds.view(stand.data, 1.0, 20e-6)
+    rows_px = np.linspace(490.0, 510.0, 8)
+    window = stand.leds.window(replace(view, pixels_px=np.column_stack([view.pixels_px[:, 0], rows_px])))
+    assert (window.row_start, window.row_stop) == (470, 531)
+
+
 def test_where_no_led_is_on_the_sensor_the_window_is_all_of_it_and_else_it_ends_with_the_sensor():
     stand = Stand()
     view = stand.leds.view(stand.data, 1.0, 20e-6)

@@ -291,8 +291,15 @@ def test_flight_parquet_holds_truth_and_belief_side_by_side(hand_made, tmp_path)
 def test_each_column_of_the_log_is_what_its_name_says(hand_made):
     """One tick in which no two of these are alike."""
     truth, imu, frame, solution = hand_made.tick(750)
-    vectors = ("v_WB", "w_WB_B", "alpha_WB_B", "a_WB", "specific_force_B", "v_WD", "w_WD_D", "gust_B_m_s", "gust_D_m_s")
-    truth = replace(truth, **{name: np.array([1.0, -2.0, 3.0]) + 10.0 * k for k, name in enumerate(vectors)})
+    vectors = (
+        "v_WB", "w_WB_B", "alpha_WB_B", "a_WB", "specific_force_B", "v_WP", "v_WD", "w_WD_D", "gust_B_m_s",
+        "gust_D_m_s",
+    )  # fmt: skip
+    truth = replace(
+        truth,
+        R_WT=exp(np.array([0.1, 0.2, -0.3])),
+        **{name: np.array([1.0, -2.0, 3.0]) + 10.0 * k for k, name in enumerate(vectors)},
+    )
     samples = [replace(sample, specific_force_m_s2=sample.angular_rate_rad_s + 7.0) for sample in imu]
     command = ReceiverCommand(velocity_m_s=np.array([0.1, 0.2, 0.3]), acceleration_m_s2=np.array([0.4, 0.5, 0.6]))
     named = np.where(np.arange(8)[:, None] < 5, solution.led_pixels_px, np.nan)
@@ -306,12 +313,15 @@ def test_each_column_of_the_log_is_what_its_name_says(hand_made):
     def of(name, unit, letters="xyz"):
         return [row[f"{name}_{letter}{unit}"] for letter in letters]
 
-    units = ("m_s", "rad_s", "rad_s2", "m_s2", "m_s2", "m_s", "rad_s", "m_s", "m_s")
+    units = ("m_s", "rad_s", "rad_s2", "m_s2", "m_s2", "m_s", "m_s", "rad_s", "m_s", "m_s")
     for name, unit in zip(vectors, units, strict=True):
         assert of(f"truth_{name.removesuffix('_m_s')}", f"_{unit}") == getattr(truth, name).tolist()
     for name in ("p_WB", "p_WP", "p_WD", "p_WT"):
         assert of(f"truth_{name}", "_m") == getattr(truth, name).tolist()
-    for name, R in (("truth_q_WB", truth.R_WB), ("truth_q_WD", truth.R_WD), ("nav_q_BD", solution.R_BD)):
+    np.testing.assert_allclose(of("truth_p_PD_B", "_m"), truth.R_WB.T @ (truth.p_WD - truth.p_WP), atol=1e-12)
+    np.testing.assert_allclose(of("truth_v_PD_B", "_m_s"), truth.R_WB.T @ (truth.v_WD - truth.v_WP), atol=1e-12)
+    attitudes = (("truth_q_WB", truth.R_WB), ("truth_q_WD", truth.R_WD), ("truth_q_WT", truth.R_WT))
+    for name, R in (*attitudes, ("nav_q_BD", solution.R_BD)):
         w, x, y, z = of(name, "", "wxyz")
         np.testing.assert_allclose(Rotation.from_quat([x, y, z, w]).as_matrix(), R, atol=1e-12)
     np.testing.assert_allclose(row["truth_p_WH_m"].reshape(-1, 3), truth.p_WH)
