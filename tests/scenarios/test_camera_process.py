@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from dockair.errors import DockairError, MachineError
-from dockair.messages import Window
+from dockair.messages import CameraFrame, Window
 from dockair.scenarios import camera_process
 from dockair.scenarios.assembly.parts import build
 from dockair.scenarios.camera_process import OverlappedExposures, can_overlap
@@ -86,6 +86,103 @@ def test_of_two_frames_that_have_arrived_both_ways_drop_the_older():
     assert len(waited) < 13
     assert {round((at_s - frame.time_stamp_s) / PERIOD_S) for at_s, frame in waited[-5:]} <= {1, 2}
     assert [(at_s, frame.time_stamp_s) for at_s, frame in beside] == [(a, f.time_stamp_s) for a, f in waited]
+
+
+class Pretended:
+    """Stands where the camera stands: frame k is of k's in every pixel; whenever it is idle it says the newest k.
+
+    Args:
+        latencies_s: of each frame, nothing of it jitter.
+        dropped: numbers of frames that never come.
+    """
+
+    full_window = Window(0, 2, 0, 3)
+
+    def __init__(self, latencies_s, dropped=()):
+        self._latencies_s, self._dropped, self._least_s = latencies_s, dropped, iter(latencies_s)
+        self.said, self._say = os.pipe()
+
+    def transfer_jitter_s(self):
+        return 0.0
+
+    def least_latency_s(self, window):
+        return next(self._least_s)
+
+    def latency_s(self, frame, jitter_s):
+        return self._latencies_s[frame.pixels[0, 0]]
+
+    def expose(self, scene, time_s, number, window, exposure_s):
+        self._newest = number
+        pixels = np.full(self.full_window.shape, number, np.uint8)
+        frame = CameraFrame(
+            time_stamp_s=time_s, pixels=pixels, window=self.full_window, exposure_s=exposure_s, gain=1.0
+        )
+        return None if number in self._dropped else frame
+
+    def work_ahead(self):
+        os.write(self._say, bytes([self._newest]))
+        return False
+
+    def close(self):
+        os.close(self.said)
+        os.close(self._say)
+
+
+@pytest.fixture
+def begin_all():
+    """Begin a frame every 20 ms, all before any is delivered; return the camera and its exposures."""
+    opened = []
+
+    def begin(latencies_s, dropped=(), exposures_s=None):
+        camera, model = Pretended(latencies_s, dropped), mujoco.MjModel.from_xml_string("<mujoco/>")
+        exposures = OverlappedExposures(camera, model)
+        opened.append((camera, exposures))
+        for number in range(len(latencies_s)):
+            exposure_s = (2e-5,) if exposures_s is None else (exposures_s[number],)
+            exposures.begin(mujoco.MjData(model), PERIOD_S * number, number, None, *exposure_s)
+        return camera, exposures
+
+    yield begin
+    for camera, exposures in opened:
+        exposures.close()
+        camera.close()
+
+
+def test_a_frame_that_arrives_at_the_tick_itself_is_delivered_in_that_tick(begin_all):
+    _, exposures = begin_all([0.03125])
+    assert exposures.delivered(0.03) is None
+    assert exposures.delivered(0.03125).pixels.max() == 0
+
+
+def test_a_frame_that_drops_out_keeps_no_later_one_waiting_that_could_arrive_before_it(begin_all):
+    """The first would take 80 ms, the second has come after 15 ms."""
+    _, exposures = begin_all([0.08, 0.015], dropped=(0,))
+    assert exposures.delivered(PERIOD_S) is None
+    assert exposures.delivered(PERIOD_S + 0.016).pixels.max() == 1
+
+
+def test_memory_is_used_again_only_when_the_frame_in_it_has_been_taken_out(begin_all):
+    """All are made before the first is looked at."""
+    count = camera_process._SLOTS + 2
+    camera, exposures = begin_all([0.01] * count)
+    while os.read(camera.said, 1) != bytes([count - 1]):
+        pass
+    assert [exposures.delivered(PERIOD_S * k + 0.015).pixels.max() for k in range(count)] == list(range(count))
+
+
+def test_a_keyboards_interrupt_does_not_end_the_camera_for_the_flight_says_when(begin_all):
+    camera, exposures = begin_all([0.01])
+    os.read(camera.said, 1)
+    process = exposures._process
+    os.kill(process.pid, signal.SIGINT)
+    exposures.close()
+    assert process.exitcode == 0
+
+
+def test_each_frame_has_the_exposure_that_was_asked_for_it(begin_all):
+    asked_s = [1e-5, 2e-5, 5e-4]
+    _, exposures = begin_all([0.01] * 3, exposures_s=asked_s)
+    assert [exposures.delivered(PERIOD_S * k + 0.015).exposure_s for k in range(3)] == asked_s
 
 
 def test_what_the_world_does_after_an_exposure_changes_no_pixel(parts):

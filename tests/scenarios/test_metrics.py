@@ -303,7 +303,7 @@ def test_each_column_of_the_log_is_what_its_name_says(hand_made):
     samples = [replace(sample, specific_force_m_s2=sample.angular_rate_rad_s + 7.0) for sample in imu]
     command = ReceiverCommand(velocity_m_s=np.array([0.1, 0.2, 0.3]), acceleration_m_s2=np.array([0.4, 0.5, 0.6]))
     named = np.where(np.arange(8)[:, None] < 5, solution.led_pixels_px, np.nan)
-    seen = {"led_pixels_px": named, "heading_rad": 0.3, "heading_sigma_rad": 0.02, "contact_usable": False}
+    seen = {"led_pixels_px": named, "heading_rad": 0.3, "heading_sigma_rad": 0.02, "contact_usable": True}
     covariance = np.diag(np.arange(1.0, 10.0) ** 2)
     solution = replace(solution, command=command, covariance=covariance, valid=False, phase_reason="why", **seen)
     log = FlightLog()
@@ -335,7 +335,7 @@ def test_each_column_of_the_log_is_what_its_name_says(hand_made):
     assert of("accelerometer_f_I", "_m_s2") == samples[-1].specific_force_m_s2.tolist()
     assert (row["nav_leds_named"], row["nav_candidates"], row["camera_exposure_s"]) == (5, 9, 2e-5)
     assert (row["nav_heading_rad"], row["nav_sigma_heading_rad"]) == (0.3, 0.02)
-    assert (row["nav_valid"], row["nav_contact_usable"], row["nav_phase_reason"]) == (False, False, "why")
+    assert (row["nav_valid"], row["nav_contact_usable"], row["nav_phase_reason"]) == (False, True, "why")
 
 
 def test_a_variance_below_zero_has_no_root_and_none_is_drawn(hand_made):
