@@ -78,10 +78,10 @@ def encode(value: Any) -> Any:
     Raises:
         DockairError: a type that has no exact form here.
     """
+    if isinstance(value, Enum):  # first: one may be a number or a text, too
+        return {"enum": name_of(type(value)), "name": value.name}
     if value is None or isinstance(value, bool | int | str):
         return value
-    if isinstance(value, Enum):
-        return {"enum": name_of(type(value)), "name": value.name}
     if isinstance(value, float):
         return float(value) if math.isfinite(value) else {"float": repr(float(value))}
     if isinstance(value, np.ndarray):

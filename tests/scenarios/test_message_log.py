@@ -7,6 +7,7 @@ import threading
 import time
 from contextlib import suppress
 from dataclasses import dataclass, field, fields, replace
+from enum import IntEnum, StrEnum
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -178,6 +179,14 @@ def test_sheets_and_settings_come_back_bit_for_bit(hand_made):
     assert np.isnan(settings.table["a"])
 
 
+class Grade(IntEnum):
+    FINE = 2
+
+
+class Kind(StrEnum):
+    RING = "ring"
+
+
 @dataclass(frozen=True)
 class Derived:
     given: float
@@ -212,6 +221,7 @@ def test_an_array_comes_back_with_shape_and_kind_and_cannot_be_written(array):
         {"a": (1,), 3: [0.1 + 0.2]},
         -0.0,
         [Light.GREEN, Light.RED],
+        {Grade.FINE: Kind.RING},
         Derived(given=0.3),
         PodSignal(time_stamp_s=1.5, light=Light.RED),
     ],
