@@ -59,8 +59,13 @@ def test_the_coupling_lies_its_depth_along_the_drogues_axis(monkeypatch):
 
 def test_the_solution_is_marked_and_certain_and_has_seen_no_frame(monkeypatch):
     truth = turning_truth()
-    solution, _ = handed_over(truth, monkeypatch)
+    solution, state = handed_over(truth, monkeypatch)
+    assert state.usable and state.contact_usable and state.sigma_lateral_m == 0.0
     assert solution.valid and solution.status == "truth" and solution.time_stamp_s == truth.time_s
+    assert solution.contact_usable and solution.phase == parts().navigator._guidance.phase.value
+    assert not np.isfinite(solution.led_pixels_px).any() and len(solution.candidates_px) == 0
+    shared = (solution.covariance, solution.led_pixels_px, solution.candidates_px)  # with every other solution
+    assert not any(array.flags.writeable for array in shared)
     assert not solution.covariance.any() and solution.window is None and np.isnan(solution.frame_time_stamp_s)
     np.testing.assert_allclose(solution.v_PD_B, truth.R_WB.T @ (truth.v_WD - truth.v_WP), atol=1e-12)
     np.testing.assert_allclose(solution.R_BD, truth.R_WB.T @ truth.R_WD, atol=1e-12)
