@@ -114,6 +114,12 @@ def test_where_no_rate_is_asked_for_every_flight_must_show_what_one_must():
     ]
 
 
+def test_limits_of_a_contact_are_asked_of_the_flights_that_made_one():
+    contacts_only = Accept(radial_offset_max_m=0.15, closure_speed_max_m_s=1.5)
+    assert contacts_only.judge(rows(2, 1, MISSED | {"closure_speed_m_s": None})) == []
+    assert contacts_only.judge(rows(2, 1, {"closure_speed_m_s": 1.6})) == ["1 of 3 flights fall short: seeds 2"]
+
+
 def test_a_flight_that_crashed_falls_short_of_any_figure_that_every_flight_must_show():
     crashed = Accept(radial_offset_max_m=0.15).judge([row(0), row(1, **CRASHED)])
     assert crashed == ["1 of 2 flights fall short: seeds 1"]

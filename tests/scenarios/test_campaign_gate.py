@@ -40,6 +40,14 @@ def test_a_build_of_the_rate_asked_fails_as_seldom_as_the_gate_says(flights, rat
     assert failed + chance(worst_passed, flights, rate) >= false_alarm  # it could not have been stricter
 
 
+def test_what_is_just_as_unlikely_as_a_false_alarm_may_be_is_none():
+    """Eq. (1) has "<": none of two under a rate of 1/2 has a probability of 1/4, exactly in binary."""
+    (test,) = judge(Gate(success_rate=0.5, false_alarm=0.25), rows(0, 2)).tests
+    assert (test.probability, test.passed, test.fails_up_to) == (0.25, True, -1)
+    (test,) = judge(Gate(success_rate=0.5, false_alarm=math.nextafter(0.25, 1.0)), rows(0, 2)).tests
+    assert (test.passed, test.fails_up_to) == (False, 0)
+
+
 def test_two_scenarios_together_fail_no_more_often_than_the_gate_says():
     gate, flights, rate = Gate(success_rate=0.8, false_alarm=0.05), 20, 0.8  # one alone 0.032, twice is too often
     failed = sum(
@@ -126,6 +134,8 @@ def test_flights_of_one_seed_share_their_fate_and_a_gate_on_them_is_refused():
     assert shared == pytest.approx(0.143, abs=0.001)
     with pytest.raises(DockairError, match=r"gate.success_rate: expected every seed once .* 'seed 0 20 times \(light"):
         require_power(gate, rows(0, 3) * 20, "gate")
+    with pytest.raises(DockairError, match="'seed 0 2 times"):
+        require_power(gate, rows(0, 12) + rows(0, 1), "gate")
 
 
 def test_the_same_seeds_in_other_groups_or_where_no_rate_is_asked_are_no_matter():

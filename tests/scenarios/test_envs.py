@@ -22,13 +22,15 @@ from dockair.scenarios.envs.tables import (
     OBSERVATION,
     OUTCOME_REWARD,
     PIXEL_STATE,
+    Entry,
     action_cost,
+    box,
     clipped,
     observation_from,
     truth_info,
 )
 from dockair.scenarios.judgement.attempts import Attempt
-from dockair.scenarios.judgement.referee import Outcome, Referee
+from dockair.scenarios.judgement.referee import Contact, Outcome, Referee
 from dockair.scenarios.loop import Flight, Tick
 from dockair.scenarios.schema import load_scenario
 
@@ -247,6 +249,12 @@ def test_the_observation_is_made_of_the_solution_and_the_gyro(hand_made, env):
     named = dict(zip([entry.name for entry in OBSERVATION], observation, strict=True))
     assert [named[f"gyro_{axis}"] for axis in "xyz"] == list(imu[-1].angular_rate_rad_s)
     assert named["v_PD_B_x"] == solution.v_PD_B[0]
+    assert named["time"] == solution.time_stamp_s != solution.frame_time_stamp_s
+
+
+def test_what_is_beyond_a_space_is_observed_at_its_limit_and_what_is_no_number_as_nought():
+    space = box((Entry("a", "m", -2.0, 3.0),) * 5, np.float64)
+    assert clipped(np.array([np.nan, np.inf, -np.inf, 3.5, 1.5]), space).tolist() == [0.0, 3.0, -2.0, 3.0, 1.5]
 
 
 def test_an_observation_s_attitude_sigmas_age_and_leds_are_the_solution_s(hand_made):
@@ -266,6 +274,16 @@ def test_an_observation_s_attitude_sigmas_age_and_leds_are_the_solution_s(hand_m
     assert sigmas == pytest.approx(range(1, 10))  # `NavSolution.covariance`: attitude, place, velocity
     assert named["frame_age"] == pytest.approx(0.02)
     assert named["leds_seen"] == 5.0
+
+
+def test_info_s_truth_is_of_the_world_now_and_of_the_contact_once_there_was_one(make_truth):
+    truth = make_truth(1.5, p_WD=np.array([4.0, 0.2, -0.1]), reel_position_m=0.7, latched=True)
+    info = truth_info(truth, 3.9, Contact(time_s=1.4, radial_offset_m=0.03, closure_speed_m_s=1.2, angle_deg=4.0))
+    place = dict(zip(("p_PD_B_x_m", "p_PD_B_y_m", "p_PD_B_z_m"), truth.p_PD_B, strict=True))
+    now = {"time_s": 1.5, "distance_m": 3.9, "closing_speed_m_s": 0.0, "reel_position_m": 0.7, "latched": 1.0}
+    assert info == place | now | {"contact_radial_offset_m": 0.03, "contact_closure_speed_m_s": 1.2}
+    before = truth_info(make_truth(1.5, probe_touches_drogue=True), 3.9, None)
+    assert (before["latched"], before["contact_radial_offset_m"], before["contact_closure_speed_m_s"]) == (0, np.inf, 0)
 
 
 @pytest.mark.parametrize(("v_WD", "v_WP", "closing_m_s"), [(0.0, 1.2, 1.2), (0.5, 1.2, 0.7), (0.5, 0.0, -0.5)])

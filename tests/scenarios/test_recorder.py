@@ -6,6 +6,8 @@ from dataclasses import replace
 import pytest
 
 from dockair.errors import DockairError
+from dockair.scenarios.judgement.hold import Hold
+from dockair.scenarios.judgement.referee import Contact
 from dockair.scenarios.loop import fly
 from dockair.scenarios.message_log import ESTIMATES, MESSAGES
 from dockair.scenarios.navigator_recipe import NAVIGATOR
@@ -68,17 +70,34 @@ def test_an_unknown_way_to_record_is_refused_with_the_known_ones(tmp_path):
         fly(_short("truth_navigation", 0.1), 0, tmp_path, record="some")
 
 
-def test_the_summary_says_what_was_not_measured_instead_of_nan():
-    result = fly(_short("truth_navigation", 0.1), 0)
-    assert "nan" not in summary_of(replace(result, truth_navigation=False))
-    nav = replace(result.nav, frames_used=3, range_rmse_m=0.0124, lateral_rmse_m=0.0031, nees_mean=8.5)
-    lines = summary_of(replace(result, nav=nav, frames=5)).splitlines()
+@pytest.fixture(scope="module")
+def brief():
+    """A flight of a tenth of a second, without contact."""
+    return fly(_short("truth_navigation", 0.1), 7)
+
+
+def test_the_summary_says_what_was_not_measured_instead_of_nan(brief):
+    assert "nan" not in summary_of(replace(brief, truth_navigation=False))
+    nav = replace(brief.nav, frames_used=3, range_rmse_m=0.0124, lateral_rmse_m=0.0031, nees_mean=8.5)
+    lines = summary_of(replace(brief, nav=nav, frames=5)).splitlines()
     assert lines[0] == "# timeout"
     for line in (
         "| range error (RMS) | 12.4 mm |", "| lateral error (RMS) | 3.1 mm |", "| mean NEES (of 9) | 8.5 |",
         "| frames used | 3 of 5 |",
     ):  # fmt: skip
         assert line in lines
+
+
+def test_the_summary_has_each_figure_of_contact_and_hold_in_its_line(brief):
+    contact = Contact(time_s=12.344, radial_offset_m=0.0561, closure_speed_m_s=1.234, angle_deg=3.21)
+    hold = Hold(duration_s=9.87, take_in_max_m=1.125, coupling_force_max_n=800.0)
+    lines = summary_of(replace(brief, outcome="contact", attempts=2, frames=5, contact=contact, hold=hold)).splitlines()
+    assert lines[:6] == ["# contact", "", "truth_navigation", "", "| | |", "|---|---|"]
+    assert lines[6:] == [
+        "| seed | 7 |", "| attempts | 2 |", "| navigation | perfect: the truth in place of the camera |",
+        "| contact after | 12.34 s |", "| off the basket's centre | 0.056 m |", "| closing speed | 1.23 m/s |",
+        "| probe against drogue axis | 3.2 deg |", "| held for | 9.9 s |", "| taken in | 1.12 m |",
+    ]  # fmt: skip
 
 
 @pytest.mark.slow
