@@ -267,6 +267,39 @@ def test_a_disk_that_refuses_only_the_last_ticks_reaches_the_flight_too(hand_mad
         log.close()
 
 
+def test_a_disk_that_refuses_to_close_the_files_reaches_the_flight_unless_it_refused_before(
+    hand_made, tmp_path, monkeypatch
+):
+    def refuse_to(what):
+        def refuse(*_):
+            raise OSError(f"no space left to {what}")
+
+        return refuse
+
+    for earlier, said in ((False, "to close"), (True, "to write")):
+        log = MessageLog(tmp_path, NavigatorRecipe(class_name="a:B", sheets=hand_made.sheets))
+        log._files.callback(refuse_to("close"))
+        with monkeypatch.context() as patch:
+            if earlier:
+                patch.setattr(message_log, "_message_row", refuse_to("write"))
+            _, imu, frame, solution = hand_made.tick(1)
+            log.append(imu, frame, solution)
+            with pytest.raises(MachineError, match=f"no space left {said}"):
+                log.close()
+
+
+def test_a_mistake_of_ours_in_the_encoders_thread_keeps_its_kind(hand_made, tmp_path, monkeypatch):
+    def fail(*_):
+        raise ValueError("a mistake")
+
+    monkeypatch.setattr(message_log, "_message_row", fail)
+    log = MessageLog(tmp_path, NavigatorRecipe(class_name="a:B", sheets=hand_made.sheets))
+    _, imu, frame, solution = hand_made.tick(1)
+    log.append(imu, frame, solution)
+    with pytest.raises(ValueError, match="a mistake"):
+        log.close()
+
+
 def test_a_flight_that_waits_for_the_encoder_goes_on_when_the_disk_refuses(hand_made, tmp_path, monkeypatch):
     """The first tick is refused while the flight waits with its third: it is told, and not left waiting."""
     waits = threading.Event()
