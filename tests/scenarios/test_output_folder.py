@@ -167,6 +167,20 @@ def test_a_flight_that_is_over_does_not_forget_the_next_ones_files(tmp_path):
     second.forget()
 
 
+def test_a_lock_is_held_until_its_file_is_gone(tmp_path, monkeypatch):
+    """Were it let go before, another could take it, and would have its own file removed."""
+    lock, unlink, free = file_lock.LockFile(tmp_path / "lock"), Path.unlink, []
+
+    def watched(path, **how):
+        with path.open() as other:
+            free.append(file_lock.has_locked(other.fileno()))
+        unlink(path, **how)
+
+    monkeypatch.setattr(Path, "unlink", watched)
+    lock.release()
+    assert free == [False] and not lock.is_held and list(tmp_path.iterdir()) == []
+
+
 def test_who_opened_the_lock_before_it_was_removed_takes_the_new_one(tmp_path, monkeypatch):
     """The first flight ends, and removes its lock, between the second's opening of it and its locking."""
     first, has_locked = FlightFolder(tmp_path), file_lock.has_locked
