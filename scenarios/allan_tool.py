@@ -10,7 +10,7 @@ beside the bias's correlation time is said in `nav/heading/allan`.
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -113,8 +113,9 @@ def report(
         raise error.at(where) from None
     range_s, T = read_sheet(_SHEET)["gyro_bias_correlation_s"], noise.bias_correlation_s
     dropped_s = T if T < range_s.low or T > range_s.high else float("nan")  # no in-run bias that a sheet could hold
-    if np.isfinite(dropped_s) and terms != "B":
-        noise = identify_gyro_noise(rates, rate_hz, terms=terms.replace("B", ""))
+    if np.isfinite(dropped_s):
+        others = terms.replace("B", "")
+        noise = identify_gyro_noise(rates, rate_hz, terms=others) if others else _without_terms(noise)
     return AllanReport(
         record=path.name,
         samples=len(rates),
@@ -123,6 +124,12 @@ def report(
         noise=noise,
         dropped_correlation_s=dropped_s,
     )
+
+
+def _without_terms(noise: GyroNoise) -> GyroNoise:
+    """Return what is left of a bias that was looked for alone."""
+    nothing = np.zeros_like(noise.fitted_rad_s)
+    return replace(noise, bias_instability_rad_s=0.0, bias_correlation_s=float("nan"), fitted_rad_s=nothing)
 
 
 def read_record(path: Path, unit: str | None = None) -> Array:

@@ -80,11 +80,12 @@ def test_units_by_name_or_by_option_and_csv_or_numpy_are_all_the_same_record(tmp
     )
 
 
-def test_a_column_of_time_is_left_out(tmp_path):
+@pytest.mark.parametrize("name", ["time_s", "Stamp"])
+def test_a_column_of_time_is_left_out(tmp_path, name):
     rates = _white(n=300, columns=1)
     path = tmp_path / "gyro.csv"
     table = np.column_stack([np.arange(300) / 100.0, rates])
-    np.savetxt(path, table, delimiter=",", header="time_s,z_rad_s", comments="", fmt="%.17g")
+    np.savetxt(path, table, delimiter=",", header=f"{name},z_rad_s", comments="", fmt="%.17g")
     np.testing.assert_array_equal(allan_tool.read_record(path), rates)
 
 
@@ -132,6 +133,23 @@ def test_without_bias_instability_no_correlation_time_is_written(tmp_path):
     assert "correlation" not in allan_tool.in_words(found)
 
 
+def test_a_bias_that_no_sheet_holds_is_left_out_though_nothing_else_was_looked_for(tmp_path):
+    """What fits white noise best wanders within a sample."""
+    np.save(tmp_path / "gyro.npy", _white(n=5000))
+    found = allan_tool.report(tmp_path / "gyro.npy", 100.0, "rad/s", terms="B")
+    assert found.caution.startswith("no bias instability: what fits best wanders within 0.0")
+    assert found.noise.bias_instability_rad_s == 0.0 and "gyro_bias_correlation_s" not in found.parameters
+    assert tomllib.loads(allan_tool.sheet_text(found))["gyro_bias_instability_rad_s"]["value"] == 0.0
+
+
+def test_the_bias_is_told_in_degrees_an_hour_too(tmp_path):
+    """360 degrees an hour are 1e-1 degrees a second."""
+    np.save(tmp_path / "gyro.npy", _white(n=5000))
+    found = allan_tool.report(tmp_path / "gyro.npy", 100.0, "rad/s", terms="N")
+    noise = replace(found.noise, bias_instability_rad_s=np.deg2rad(0.1), bias_correlation_s=30.0)
+    assert "B  bias instability   0.001745 rad/s (360 deg/h)" in allan_tool.in_words(replace(found, noise=noise))
+
+
 def test_a_record_too_short_to_tell_the_slow_terms_apart_says_so(tmp_path):
     """A Gauss-Markov bias of 20 s, in 200 s and in 2000 s."""
     said = []
@@ -158,6 +176,8 @@ def test_a_record_too_short_to_tell_the_slow_terms_apart_says_so(tmp_path):
         ("gyro.csv", "x_deg_s2\n1\n2\n3\n4\n", (), "unit"),
         ("gyro.csv", "x_deg_s\n1\n2\n3\n", ("--unit", "rpm"), "rpm"),
         ("gyro.csv", "x_deg_s,y_deg_s\n1,2\n3\n", (), "rows of numbers"),
+        ("gyro.csv", "x_deg_s\n1,2\n3,4\n5,6\n", (), "2 names"),
+        ("gyro.csv", "x_deg_s,y_deg_s,z_deg_s\n1,2\n3,4\n5,6\n", (), "2 names"),
         ("gyro.csv", "x_deg_s\n1\nnan\n3\n", (), "finite"),
         ("gyro.csv", "x_deg_s\n1\n2\n", (), "n >= 3"),
         ("gyro.csv", "time_s\n1\n2\n3\n", (), "column of rates"),
