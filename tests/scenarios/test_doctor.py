@@ -124,6 +124,20 @@ def test_a_full_disk_and_missing_memory_are_found(monkeypatch, tmp_path):
     assert not doctor._memory().ok
 
 
+@pytest.mark.parametrize(
+    ("line", "ok", "found"),
+    [
+        ("MemAvailable:  2500000 kB", True, "2.6 GB"),  # of 1024 bytes
+        ("MemAvailable:   976000 kB", False, "1.0 GB"),
+        ("MemFree:            12 kB", True, "unknown"),
+    ],
+)
+def test_the_memory_that_is_free_is_what_the_system_says(monkeypatch, line, ok, found):
+    monkeypatch.setattr(doctor.Path, "read_text", lambda path, **_: f"MemTotal: 9 kB\n{line}\n")
+    check = doctor._memory()
+    assert (check.ok, check.found) == (ok, found)
+
+
 def test_a_package_that_is_not_installed_is_named(monkeypatch):
     monkeypatch.setattr(doctor, "_required", lambda: ["numpy", "no-such-package"])
     check = doctor._packages()

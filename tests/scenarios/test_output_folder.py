@@ -1,5 +1,6 @@
 """Where a flight may be written, and what is never lost."""
 
+import errno
 import os
 import signal
 from functools import partial
@@ -111,6 +112,18 @@ def test_a_flight_that_is_killed_while_it_is_kept_never_looks_whole(tmp_path, mo
         if over:
             break
     assert left[0] and left[-1] and not all(left) and len(left) > len(FLIGHT_FILES)
+
+
+def test_a_folder_in_which_none_can_be_made_is_left_to_others(tmp_path, monkeypatch):
+    def refuse(*_, **__):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "mkdir", lambda path, **how: None if how else refuse())
+        with pytest.raises(DockairError, match="a folder that can be written, got 'No space left on device'"):
+            FlightFolder(tmp_path)
+    FlightFolder(tmp_path).forget()
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_fork_of_a_killed_flight_does_not_keep_the_folder(tmp_path):

@@ -15,6 +15,7 @@ import pytest
 
 import dockair
 from dockair.errors import DockairError
+from dockair.messages import Light, PodSignal, TankerAnnouncement
 from dockair.scenarios.message_log import ESTIMATES, MESSAGES, MessageLog
 from dockair.scenarios.navigator_recipe import NAVIGATOR, NavigatorRecipe, code_fingerprint
 from dockair.scenarios.replay import FORBIDDEN, replay, replay_in_this_process, same_bits
@@ -30,6 +31,12 @@ class Sums:
     def __init__(self, sheets):
         self.sheets, self.total = sheets, np.zeros(3)
 
+    def announce(self, announcement):
+        self.total = self.total + announcement.turn_rate_rad_s
+
+    def signal(self, signal):
+        self.total = self.total * (1.0 + signal.light.value)
+
     def step(self, imu, frame):
         for sample in imu:
             self.total = self.total * 0.9 + sample.angular_rate_rad_s + sample.time_stamp_s
@@ -43,6 +50,9 @@ class Sums:
             candidates_px=np.empty((0, 2)), led_pixels_px=np.full((8, 2), np.nan),
         )
 '''
+
+SAID = TankerAnnouncement(time_stamp_s=0.12, starts_s=12.25, entry_s=10.0, turn_rate_rad_s=0.0254, climb_rad=0.0)
+SHOWN = PodSignal(time_stamp_s=0.18, light=Light.RED)
 
 
 @pytest.mark.parametrize(
@@ -75,8 +85,13 @@ def record(hand_made, tmp_path, monkeypatch):
         out = tmp_path / "flight"
         out.mkdir()
         with MessageLog(out, recipe) as log:
-            for _, imu, frame, _ in hand_made.ticks(ticks):
-                log.append(imu, frame, navigator.step(imu, frame))
+            for k, (_, imu, frame, _) in enumerate(hand_made.ticks(ticks)):
+                said, shown = (SAID if k == 11 else None), (SHOWN if k == 17 else None)
+                if said is not None:
+                    navigator.announce(said)
+                if shown is not None:
+                    navigator.signal(shown)
+                log.append(imu, frame, navigator.step(imu, frame), said, shown)
         return out
 
     return recorded
@@ -226,4 +241,5 @@ def test_bits_are_compared_and_not_values():
     assert not same_bits(np.array([0.0]), np.array([-0.0]))
     assert not same_bits(np.array([1.0]), np.array([1.0, 1.0]))
     assert not same_bits(np.array([1.0]), np.array([np.nan]))
+    assert not same_bits(np.array([np.nan]), np.array([1.0]))
     assert not same_bits("hold", np.array([1.0]))
