@@ -124,6 +124,20 @@ def test_a_full_disk_and_missing_memory_are_found(monkeypatch, tmp_path):
     assert not doctor._memory().ok
 
 
+@pytest.mark.parametrize(("cores", "ok"), [({3}, False), ({0, 3}, True)])
+def test_one_core_is_enough_to_fly_and_two_are_wanted(monkeypatch, cores, ok):
+    monkeypatch.setattr(doctor.os, "sched_getaffinity", lambda _: cores, raising=False)
+    check = doctor._cores()
+    assert (check.ok, check.found, check.needed) == (ok, str(len(cores)), False)
+
+
+def test_a_python_that_is_too_old_is_told_what_is_wanted(monkeypatch):
+    assert doctor._python().ok
+    monkeypatch.setattr(doctor, "PYTHON_AT_LEAST", (99, 1))
+    check = doctor._python()
+    assert not check.ok and check.needed and check.remedy == "install Python 99.1 or newer"
+
+
 @pytest.mark.parametrize(
     ("line", "ok", "found"),
     [

@@ -11,6 +11,7 @@ from dockair.errors import DockairError
 from dockair.messages import NavSolution, ReceiverCommand, Window
 from dockair.nav.guidance.phases import Phase
 from dockair.nav.navigator import Navigator
+from dockair.scenarios import plug_in
 from dockair.scenarios.loop import fly
 from dockair.scenarios.navigator_recipe import NavigatorRecipe
 from dockair.scenarios.plug_in import announce_to, navigator_class_of, signal_to, step_navigator
@@ -291,3 +292,11 @@ def test_what_does_not_exist_is_said_plainly(name, got):
     with pytest.raises(DockairError, match=got) as refused:
         navigator_class_of(name)
     assert "line" not in str(refused.value)
+
+
+def test_a_class_that_says_nothing_of_its_arguments_is_believed_to_take_the_sheets(monkeypatch):
+    def says_nothing(made):
+        raise ValueError("no signature found")
+
+    monkeypatch.setattr(plug_in.inspect, "signature", says_nothing)
+    assert navigator_class_of("dockair.nav.navigator:Navigator") is Navigator

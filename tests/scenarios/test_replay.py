@@ -18,7 +18,7 @@ from dockair.errors import DockairError
 from dockair.messages import Light, PodSignal, TankerAnnouncement
 from dockair.scenarios.message_log import ESTIMATES, MESSAGES, MessageLog
 from dockair.scenarios.navigator_recipe import NAVIGATOR, NavigatorRecipe, code_fingerprint
-from dockair.scenarios.replay import FORBIDDEN, replay, replay_in_this_process, same_bits
+from dockair.scenarios.replay import FORBIDDEN, _RefuseForbiddenModules, replay, replay_in_this_process, same_bits
 
 SUMS = '''
 import numpy as np
@@ -129,6 +129,14 @@ def test_an_estimate_changed_in_its_last_bit_is_found(record):
     assert (report.first_difference.tick, report.first_difference.field) == (7, "v_PD_B")
 
 
+def test_an_estimate_that_a_recording_of_before_does_not_have_is_a_difference(record):
+    out = record()
+    pq.write_table(pq.read_table(out / ESTIMATES).drop_columns(["heading_rad"]), out / ESTIMATES)
+    report = replay_in_this_process(out)
+    assert (report.identical, report.ticks) == (False, 0)
+    assert (report.first_difference.field, report.first_difference.recorded) == ("heading_rad", "nothing")
+
+
 def test_a_difference_says_whether_the_code_is_still_the_flights(record):
     out = record()
     _edit(out / ESTIMATES, "valid", 0, lambda v: [0.0])
@@ -200,6 +208,16 @@ def test_a_table_of_another_kind_in_the_place_of_the_messages_is_refused(record)
 def test_a_navigator_that_reads_the_simulator_cannot_be_replayed(record, imports, refused):
     with pytest.raises(DockairError, match=f"{refused} must not be imported in a replay"):
         replay(record(imports=imports))
+
+
+def test_what_holds_truth_or_sheets_is_refused_with_all_below_it_and_nothing_else_is():
+    guard = _RefuseForbiddenModules()
+    for name in (*FORBIDDEN, "dockair.sim.truth", "mujoco.viewer", "dockair.assets.parameters"):
+        with pytest.raises(ImportError, match=f"^{name} must not be imported in a replay"):
+            guard.find_spec(name, None)
+    assert {"dockair.sim", "mujoco", "dockair.assets", "dockair.parameters"} <= set(FORBIDDEN)
+    for name in ("dockair", "dockair.nav", "dockair.simple", "mujoco_other", "assets"):
+        assert guard.find_spec(name, None) is None
 
 
 def test_a_navigator_may_print(record):

@@ -161,6 +161,13 @@ def test_what_is_set_makes_a_group_of_its_own_and_so_does_a_draw():
     assert "with <code>camera.filter=&#34;none&#34;</code>" in text
 
 
+def test_a_key_that_only_other_flights_of_the_table_drew_is_one_that_is_set():
+    """Their column is empty here."""
+    sigma = {"turbulence.sigma_m_s": 0.5}
+    row = _row(0, command=_command("light_gusts", 0, **sigma)) | {"set.turbulence.sigma_m_s": None}
+    assert groups_of([row])[0].settings == "turbulence.sigma_m_s=0.5"
+
+
 def test_what_is_set_is_compared_with_perfect_navigation_that_flew_it_so():
     with_sigma = [
         _row(0, sensing=kind, command=_command("light_gusts", 0, **{"turbulence.sigma_m_s": 0.5}, **_SENSING[kind]))
@@ -178,6 +185,7 @@ def test_a_flight_that_crashed_is_no_success_and_still_counts():
     (group,) = groups_of(rows)
     assert (group.first_attempt.count, group.first_attempt.of) == (1, 2)
     assert (group.success.count, group.success.of) == (1, 2)
+    assert group.outcomes == [("contact", 1), ("error", 1)]
 
 
 def test_success_within_attempts_grows_and_ends_at_all():
