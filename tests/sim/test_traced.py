@@ -191,6 +191,17 @@ def test_a_part_of_the_picture_is_the_same_to_the_bit(rows: slice, columns: slic
     assert np.array_equal(part, whole[rows, columns])
 
 
+def test_a_larger_picture_than_the_one_before_has_room_for_its_rows() -> None:
+    """A run for each row of each solid; the compiled code would write beyond without a word."""
+    model, data = _scene(*(_geom(kind, [6.0, 0.0, 0.0]) for kind in KINDS))
+    traced = TracedSolids(model, WHITE)
+    for y in (Y[24:27], Y):
+        out = np.full((len(y), len(X)), SKY, dtype=np.float32)
+        traced.draw(out, data, AT_ORIGIN, X, y, Haze())
+        assert len(traced._placed.runs) >= len(KINDS) * len(y)
+        assert np.array_equal(out, _draw(model, data, y=y))
+
+
 def test_haze_of_no_thickness_changes_nothing_and_thick_haze_hides_all() -> None:
     model, data = _scene(_geom("sphere", [6.0, 0.0, 0.0]))
     plain = _draw(model, data, SUNLIT)
