@@ -53,6 +53,8 @@ def _faults(*faults: Fault) -> Faults:
         (GyroDropOut(**TIMES), lambda f, t: f.imu(t).dropped, True, False),
         (DeadReel(**TIMES), lambda f, t: f.reel_locked(t), True, False),
         (DeadReel(**TIMES), lambda f, t: f.reel_seen_dead(t), True, False),
+        (DeadReel(unnoticed=True, **TIMES), lambda f, t: f.reel_locked(t), True, False),
+        (DeadReel(unnoticed=True, **TIMES), lambda f, t: not f.reel_seen_dead(t), True, True),
     ],
     ids=lambda value: type(value).__name__ if isinstance(value, Fault) else "",
 )

@@ -11,7 +11,7 @@ from dockair.messages import ReceiverCommand
 from dockair.rotations import matrix_from_quaternion, matrix_from_yaw_pitch_roll
 from dockair.sim.parts import scene_of
 from dockair.sim.scene import build_scene
-from dockair.sim.skins import tanker_skins
+from dockair.sim.skins import receiver_skins, tanker_skins
 
 
 @pytest.fixture
@@ -100,6 +100,14 @@ def test_probes_boom_runs_straight_from_its_tip_for_the_sheets_length_and_its_ma
     np.testing.assert_allclose(ends("probe_boom"), [p_BP - [coupling.probe_tip_radius_m, 0.0, 0.0], bend], atol=1e-9)
     np.testing.assert_allclose(ends("probe_mast")[0], bend, atol=1e-9)
     assert world.model.geom("probe_boom").size[0] == coupling.probe_boom_radius_m
+
+
+@pytest.mark.parametrize("outline", ["fighter", "unmanned"])
+def test_receiver_has_the_skin_of_the_outline_that_the_world_names(world, receiver_on_rails, outline):
+    parameters = replace(world.parameters, receiver_outline=outline)
+    model = build_scene(scene_of(parameters, receiver_on_rails(), 1e-3))
+    seen = {name for i in range(model.ngeom) if (name := model.geom(i).name).startswith("skin_")}
+    assert seen == {f"skin_{skin.name}" for skin in receiver_skins(parameters.mounting, outline)}
 
 
 @pytest.mark.parametrize("products", [(0.0, 1331.0, 0.0), (900.0, 1331.0, -2500.0)])
