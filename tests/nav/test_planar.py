@@ -148,3 +148,39 @@ def test_position_is_in_front_of_the_camera_also_when_the_attitude_is_upside_dow
 def test_position_is_finite_when_all_rays_are_one():
     b = np.tile([1.0, 0.0, 0.0], (4, 1))
     assert np.isfinite(position_for_attitude(b, RING[:4], np.eye(3))).all()
+
+
+@pytest.mark.parametrize("leds", [[0, 1, 2, 3], [1, 4, 6], [0, 1, 2, 3, 4]])
+def test_in_which_axes_the_flat_leds_are_given_does_not_matter(leds):
+    """LEDs q = S q' + t: the same rays belong to R S, and to p + R t."""
+    S, t = exp(np.array([0.7, -0.9, 0.4])), np.array([0.3, -0.2, 0.5])
+    for R, p in random_poses(10, 2.0, 10.0):
+        b, points = rays(R, p, RING[leds]), (RING[leds] - t) @ S
+        attitudes, positions = two_poses(b, RING[leds])
+        turned, moved = two_poses(b, points)
+        for k in range(2):
+            j = min(range(2), key=lambda j, k=k: angle(turned[j], attitudes[k] @ S))
+            np.testing.assert_allclose(turned[j], attitudes[k] @ S, atol=1e-7)
+            np.testing.assert_allclose(moved[j], positions[k] + attitudes[k] @ t, atol=1e-7)
+        Q, s = mirrored(R, p, RING[leds])
+        Q_turned, s_moved = mirrored(R @ S, p + R @ t, points)
+        np.testing.assert_allclose(Q_turned, Q @ S, atol=1e-9)
+        np.testing.assert_allclose(s_moved, s + Q @ t, atol=1e-9)
+
+
+@pytest.mark.parametrize("leds", [[0, 1, 2, 3], [1, 4, 6], [0, 1, 2, 3, 4]])
+def test_both_are_the_least_squares_fit_of_eq_1_also_near_by(leds):
+    """By numpy: 1/d the larger singular value of A, and the LEDs' middle at d (1, m_0) along the mean line of sight."""
+    points = RING[leds]
+    for R, p in random_poses(10, 0.8, 2.0):
+        b = rays(R, p, points)
+        along = b.sum(axis=0) / np.linalg.norm(b.sum(axis=0))
+        across = np.linalg.svd(along[np.newaxis])[2][1:]
+        q = points[:, 1:] - points[:, 1:].mean(axis=0)
+        fit = np.linalg.lstsq(np.column_stack([q, np.ones(len(q))]), b @ across.T / (b @ along)[:, np.newaxis])[0]
+        d = 1.0 / np.linalg.svd(fit[:2])[1][0]
+        middle = d * (along + fit[2] @ across)
+        attitudes, positions = two_poses(b, points)
+        for Q, s in zip(attitudes, positions, strict=True):
+            np.testing.assert_allclose(s + Q @ points.mean(axis=0), middle, atol=1e-9)
+            np.testing.assert_allclose(across @ Q[:, 1:], d * fit[:2].T, atol=1e-9)
