@@ -9,6 +9,7 @@ import pytest
 from dockair.messages import Light, PodSignal, ReceiverCommand, TankerAnnouncement
 from dockair.nav.guidance.announced_path import AnnouncedPath, AnnouncedPathSettings
 from dockair.nav.guidance.approach import Guidance, GuidanceSettings, PhaseLimits, RelativeState
+from dockair.nav.guidance.formation import Formation
 from dockair.nav.guidance.phases import Phase
 from dockair.rotations import exp, log
 
@@ -442,3 +443,19 @@ def test_how_far_the_drogue_was_pushed_in_leads_nobody_aside_once_it_is_off():
         guidance.step(ahead)
     assert guidance.phase is Phase.BACK_OFF
     np.testing.assert_allclose(guidance._u[1:], guidance._controller.drift_m_s[1:], atol=0.01)
+
+
+def test_what_the_path_is_told_of_a_drogue_that_keeps_company_is_what_is_commanded_to_the_left(monkeypatch):
+    """Wherever it is: what the turn of the axes does to its place is in the command, Eq. (1) of `formation`."""
+    formation, told, u = Formation(GuidanceSettings(), 0.01), [], np.array([0.1, 0.2, -0.3])
+    formation.path.announce(_said(starts_s=0.0, entry_s=0.1))
+    _flown(formation.path, 1.0)
+    for _ in range(2):  # by then it does not roll any more
+        formation.turn(np.zeros(3))
+    monkeypatch.setattr(formation.path, "step", lambda step_s, left_m_s=None: told.append(left_m_s))
+    place = np.array([4.0, 1.0, 0.5])
+    assert abs(formation.axes.turned(place) @ formation.axes.left_N) > 0.05
+    for _ in range(2):
+        formation.follow(place, np.zeros(3), learns=True)
+        formation.command(u, np.zeros(3))
+    assert told[1] == pytest.approx(u @ formation.axes.left_N, abs=1e-12)

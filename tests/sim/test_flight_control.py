@@ -335,3 +335,19 @@ def test_gains_are_designed_for_gusts_that_pass_at_the_airspeed_over_the_sheets_
     expected, ours = gains_of(plant, C, *weights, 180.0 / p.gust_length_m, p.swing), control().schedule.gains
     for name in ("K", "K_busy", "K_followed", "K_command"):
         np.testing.assert_allclose(getattr(ours, name), getattr(expected, name), rtol=1e-9, atol=1e-12)
+
+
+def test_feedback_is_equation_2_with_the_models_rates_as_late_as_the_measured_ones() -> None:
+    design = control()
+    for _ in range(60):
+        before = design._memory["x_m"][13:].copy(), design._memory["z"].copy()
+        u = commands(design, AHEAD, velocity_m_s=np.array([0.0, 1.0, 1.0]), acceleration_m_s2=np.array([0.0, 2.0, 2.0]))
+    m, row, chain = design._memory, design.schedule.at(0.0), design.reference.memory["chain"]
+    x_m = np.append(m["x_m"][:13], before[0])
+    late = m["x"] - np.concatenate([m["x_m"][:6], m["w_m"], m["x_m"][9:13]])
+    expected = m["trim"][6:10] - row.K_followed @ x_m - row.K_command @ chain[:3].ravel()
+    h = design._relief.haste
+    expected -= ((1.0 - h) * row.K + h * row.K_busy) @ np.concatenate([late, before[1], m["gust"]])
+    u[3] /= AIRFRAME.mass_kg
+    assert np.abs(m["w_m"] - m["x_m"][6:9]).max() > 1e-4
+    np.testing.assert_allclose(u, expected, rtol=1e-9, atol=1e-12)
