@@ -22,7 +22,7 @@ from dockair.scenarios.report.figures import overview, panels
 from dockair.scenarios.report.folders import Campaign, read_campaigns
 from dockair.scenarios.report.groups import NOT_SAID, Share, groups_of
 from dockair.scenarios.report.page import page
-from dockair.scenarios.report.pairs import beside_perfect_navigation, side_by_side
+from dockair.scenarios.report.pairs import beside_perfect_navigation, paired, side_by_side
 from dockair.scenarios.report.timelines import timelines
 from dockair.scenarios.scenario_hash import scenario_hash
 from dockair.scenarios.schema import load_scenario
@@ -275,6 +275,7 @@ def test_a_scenario_of_ones_own_is_paired_however_its_path_was_written():
 def test_a_key_of_guidance_is_the_crews_and_one_of_the_world_is_not():
     narrow, gusts = {"guidance.capture_radius_m": 0.1}, {"turbulence.sigma_m_s": 0.5}
     rows = [_flown_by({}, 0, True), _flown_by(narrow, 0, False), _flown_by({}, 0, True, **gusts)]
+    rows += [_flown_by({}, 0, True, **{"camera.filter": "none"})]  # it changes what there is to see
     ((a, b, pair),) = side_by_side(groups_of(rows))
     assert (a.settings, b.settings, pair.only_ours) == ("", "guidance.capture_radius_m=0.1", 1)
 
@@ -293,7 +294,8 @@ def test_a_draw_of_the_crews_own_is_in_no_pair():
         row = _flown_by({"guidance.capture_radius_m": radius_m}, 0, True)
         return row | {"set.guidance.capture_radius_m": radius_m}
 
-    assert side_by_side(groups_of([drawn(0.1), drawn(0.12), _row(0)])) == []
+    groups = groups_of([drawn(0.1), drawn(0.12), _row(0)])
+    assert side_by_side(groups) == [] and paired(*reversed(groups), apart=("guidance.",)) is None
 
 
 def test_flights_that_began_no_attempt_are_counted_by_their_causes_and_errors_with_them():
@@ -584,6 +586,8 @@ def test_where_perfect_navigation_never_docked_there_is_no_ratio():
     text = page("made", [_campaign([_without_attempt(0, "never_steady"), truth])])
     assert "What vision costs" in text
     assert ">nan<" not in text
+    groups = groups_of([_row(0), truth])
+    assert np.isnan(beside_perfect_navigation(groups[0], groups).ratio)
 
 
 def _bin(count, size, **changes):
