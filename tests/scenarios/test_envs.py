@@ -250,6 +250,7 @@ def test_the_observation_is_made_of_the_solution_and_the_gyro(hand_made, env):
     assert [named[f"gyro_{axis}"] for axis in "xyz"] == list(imu[-1].angular_rate_rad_s)
     assert named["v_PD_B_x"] == solution.v_PD_B[0]
     assert named["time"] == solution.time_stamp_s != solution.frame_time_stamp_s
+    assert [named[f"navigator_command_{of}_x"] for of in ("velocity", "acceleration")] == [0.1, 0.0]
 
 
 def test_what_is_beyond_a_space_is_observed_at_its_limit_and_what_is_no_number_as_nought():

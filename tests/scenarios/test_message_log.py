@@ -298,6 +298,8 @@ def test_a_mistake_of_ours_in_the_encoders_thread_keeps_its_kind(hand_made, tmp_
     log.append(imu, frame, solution)
     with pytest.raises(ValueError, match="a mistake"):
         log.close()
+    with pytest.raises(ValueError, match="a mistake"):  # nor are more ticks taken as if nothing had been
+        log.append(imu, frame, solution)
 
 
 def test_a_flight_that_waits_for_the_encoder_goes_on_when_the_disk_refuses(hand_made, tmp_path, monkeypatch):
