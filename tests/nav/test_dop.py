@@ -202,6 +202,31 @@ def test_landmarks_on_a_line_or_in_one_place_are_singular():
     assert singular(dilution_of_precision(at([(45, 0), (0, 0), (45, 0)], 100.0), ZERO, ZERO, F))
 
 
+LINE, OFF_IT = np.arange(5)[:, None] * [1.0, 0.5, 0.2] + [5.0, 0.0, 0.0], np.eye(3)[[0, 1, 2, 1, 0]] - np.eye(3)[0]
+
+
+@pytest.mark.parametrize("off_m", [1e-6, 1e-8, 1e-10])
+def test_dilution_grows_as_landmarks_near_a_line_as_long_as_more_than_rounding_is_left(off_m):
+    """The camera in the landmarks' axes turns about the line by errors that grow as one over their distance off it."""
+    near, far = (dilution_of_precision(LINE + off * OFF_IT, ZERO, ZERO, F) for off in (off_m, 1e-5))
+    assert near.pdop * off_m == pytest.approx(far.pdop * 1e-5, rel=1e-3)
+    assert near.adop * off_m == pytest.approx(far.adop * 1e-5, rel=1e-3)
+
+
+def test_any_line_is_singular_though_rounding_moves_landmarks_off_it():
+    rng = np.random.default_rng(8)
+    for _ in range(40):
+        line = [6.0, 0.0, 0.0] + rng.uniform(-1.0, 1.0, 3) + rng.uniform(-1.0, 1.0, (6, 1)) * rng.uniform(-1.0, 1.0, 3)
+        assert singular(dilution_of_precision(line, ZERO, ZERO, F))
+
+
+def test_what_leaves_double_precision_is_singular():
+    """Variances beyond the largest number; a landmark so near the camera's plane that its image moves by no number."""
+    assert singular(dilution_of_precision(1e155 * (LINE + OFF_IT), ZERO, ZERO, F))
+    grazing = np.vstack([LINE + OFF_IT, [1e-200, 1.0, 0.0]])
+    assert singular(dilution_of_precision(grazing, ZERO, ZERO, F))
+
+
 def test_on_the_danger_cylinder_three_landmarks_are_singular_and_a_fourth_mends_it():
     """The cylinder on the circle of three landmarks, across their plane: the classical singularity of resection."""
     angle = np.deg2rad([0.0, 120.0, 240.0])
@@ -234,6 +259,11 @@ def test_two_landmarks_are_too_few_and_one_behind_the_camera_cannot_be_measured(
     assert np.isnan(behind.jacobian[2:4]).all() and np.isfinite(np.delete(behind.jacobian, [2, 3], axis=0)).all()
     in_plane = dilution_of_precision_in_plane(np.array([[1.0, 0.0], [-1.0, 0.0], [2.0, 1.0]]), [0.0, 0.0], 0.0, F)
     assert in_plane.status is DopStatus.BEHIND_CAMERA
+    landmarks[1] = [0.0, 1.0, 1.0]  # in the camera's own plane
+    aside = dilution_of_precision(landmarks, ZERO, ZERO, F)
+    assert aside.status is DopStatus.BEHIND_CAMERA and np.isnan(aside.jacobian[2:4]).all()
+    at_the_body = dilution_of_precision_in_plane(np.array([[1.0, 0.5], [3.0, 4.0], [9.0, 1.0]]), [3.0, 4.0], 0.0, F)
+    assert at_the_body.status is DopStatus.BEHIND_CAMERA
     assert dilution_of_precision_in_plane(np.ones((2, 2)), [0.0, 0.0], 0.0, F).status is DopStatus.TOO_FEW_LANDMARKS
 
 
@@ -281,8 +311,18 @@ def test_wrong_arguments_are_refused_by_name(change, where):
         dilution_of_precision(**(right | change))
 
 
+def test_a_rotation_of_nine_printed_digits_is_one_and_one_of_four_is_none():
+    landmarks = in_view(ZERO, MOUNTING, ZERO)
+    printed = dilution_of_precision(landmarks, ZERO, ZERO, F, np.round(MOUNTING, 9))
+    assert printed.pdop == pytest.approx(dilution_of_precision(landmarks, ZERO, ZERO, F, MOUNTING).pdop, rel=1e-6)
+    with pytest.raises(DockairError, match="^R_BC: expected a rotation"):
+        dilution_of_precision(landmarks, ZERO, ZERO, F, np.round(MOUNTING, 4))
+
+
 def test_wrong_arguments_in_the_plane_are_refused_by_name():
     with pytest.raises(DockairError, match=r"^landmarks_N: expected an array \(n, 2\)"):
         dilution_of_precision_in_plane(np.ones((3, 3)), [0.0, 0.0], 0.0, F)
     with pytest.raises(DockairError, match="^yaw_rad: expected a number"):
         dilution_of_precision_in_plane(np.ones((3, 2)), [0.0, 0.0], [0.0], F)
+    with pytest.raises(DockairError, match="^focal_length_m: expected a number > 0"):
+        dilution_of_precision_in_plane(np.ones((3, 2)), [0.0, 0.0], 0.0, -F)

@@ -14,7 +14,7 @@ from dockair.nav.dop import DopStatus, dilution_of_precision, pose_bound
 from dockair.nav.pose.estimate import solve_pose
 from dockair.rotations import Array, exp
 
-RING, CAMERA = LedRing().positions_D, Camera()
+RING, CAMERA, ZERO = LedRing().positions_D, Camera(), np.zeros(3)
 DISTORTED = replace(CAMERA, distortion=(-0.12, 0.06, 8e-4, -5e-4, -0.01))
 DEEP = np.vstack([RING, [[0.2, 0.1, 0.0], [0.15, -0.05, 0.1]]])
 R_CD, P_CD = exp(np.array([0.2, -0.3, 0.25])), np.array([4.0, 0.5, -0.2])
@@ -153,6 +153,7 @@ def test_a_prior_adds_its_information_and_lets_one_led_do():
         np.linalg.inv(held.covariance) - np.linalg.inv(free.covariance), prior, rtol=1e-3, atol=1.0
     )
     assert pose_bound(RING[:2], np.eye(3), P_CD, CAMERA).status is DopStatus.TOO_FEW_LANDMARKS
+    assert pose_bound(RING[:3], np.eye(3), P_CD, CAMERA).status is DopStatus.SOLVED
     one = pose_bound(RING[:1], np.eye(3), P_CD, CAMERA, prior_information=prior)
     assert one.status is DopStatus.SOLVED and 0.4 < one.range_sigma_m <= 0.5 and one.lateral_sigma_m < 0.05
 
@@ -162,6 +163,32 @@ def test_leds_on_a_line_are_singular():
     bound = pose_bound(line, R_CD, P_CD, CAMERA)
     assert bound.status is DopStatus.SINGULAR and np.isnan(bound.covariance).all()
     assert np.isnan([bound.range_sigma_m, bound.lateral_sigma_m, bound.attitude_sigma_rad]).all()
+
+
+def test_any_line_is_singular_though_rounding_moves_leds_off_it():
+    rng = np.random.default_rng(9)
+    for _ in range(40):
+        line = rng.uniform(-1.0, 1.0, 3) + rng.uniform(-0.3, 0.3, (6, 1)) * rng.uniform(-1.0, 1.0, 3)
+        assert pose_bound(line, R_CD, 1.5 * P_CD, CAMERA, sensor_edges=False).status is DopStatus.SINGULAR
+
+
+def test_the_bound_grows_as_leds_near_a_line_as_long_as_more_than_rounding_is_left():
+    line, aside = np.linspace(-0.25, 0.25, 5)[:, None] * [0.0, 1.0, 0.3], np.eye(3)[[0, 2, 0, 1, 2]]
+    near, far = (
+        pose_bound(line + off_m * aside, R_CD, P_CD, CAMERA).attitude_sigma_rad * off_m for off_m in (1e-6, 1e-4)
+    )
+    assert near == pytest.approx(far, rel=1e-2)
+
+
+def test_an_led_counts_on_an_endless_image_plane_until_its_line_of_sight_has_no_pixel():
+    """A cosine of 0.1 to the boresight counts, one of 1e-10 does not, nor what is at the camera or beyond numbers."""
+    aside = np.array([[0.1, 1.0, 0.0], [1e-10, 1.0, 0.0], [1e-60, 0.0, 0.0], [1e60, 0.0, 0.0]])
+    assert pose_bound(aside, np.eye(3), ZERO, CAMERA, sensor_edges=False).seen.tolist() == [True, False, False, False]
+
+
+def test_a_drogue_at_the_camera_has_no_line_of_sight_and_says_nothing_of_it():
+    bound = pose_bound(RING + [4.0, 0.0, 0.0], np.eye(3), ZERO, CAMERA)
+    assert bound.status is DopStatus.SOLVED and (bound.line_of_sight == 0.0).all()
 
 
 def test_depth_ends_the_frontal_weakness():
