@@ -47,6 +47,25 @@ def test_the_integral_holds_also_where_no_candidate_is_brighter_or_fainter_than_
     assert ratios(np.full(8, 50.0), range(8))[0][0] == pytest.approx(expected, rel=2e-3)
 
 
+def test_the_integral_goes_on_beyond_a_ring_of_few_leds_that_are_alike():
+    """Three: at a standard deviation from them the integrand is still a quarter of its height."""
+    s = SETTINGS
+
+    def integrand(mu):
+        return (s.outliers + (1.0 - s.outliers) * norm.pdf(mu, 0.0, s.sigma) * s.prior_range) ** 3 / s.mean_range
+
+    expected = quad(integrand, -6.0 * s.sigma, 6.0 * s.sigma, epsrel=1e-9)[0]
+    assert ratios(np.full(3, 50.0), range(3))[0][0] == pytest.approx(expected, rel=0.01)
+
+
+def test_the_sheet_s_spread_and_that_of_the_bins_add_as_independent_ones():
+    flux, rings = np.array([1.0, 1.6, 0.7, 1.2, 2.5, 0.05, 40.0]), np.array([[0, 1, 2, 3, 4, -1, -1, -1]])
+    wider = brightness_model(flux, BrightnessSettings(sigma=0.5), 0.0).likelihood_ratios(rings)
+    both = brightness_model(flux, BrightnessSettings(sigma=0.3), 0.4).likelihood_ratios(rings)
+    np.testing.assert_allclose(both[0], wider[0])
+    np.testing.assert_allclose(both[1], wider[1])
+
+
 @pytest.mark.parametrize("ends", [(-7.0, 7.0), (-30.0, 7.0), (-7.0, 30.0)])
 def test_a_blob_farther_off_than_the_range_of_means_counts_as_at_its_end(ends):
     """About the median; so the ring's own ratio does not depend on how far off it is."""

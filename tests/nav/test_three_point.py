@@ -92,7 +92,8 @@ def test_circles_beyond_the_range_of_radii_and_points_on_a_line_or_in_one_place_
     for radius_range_px, radius_px in (((60.0, 150.0), 100.0), ((10.0, 60.0), 40.0)):
         circle = most_trusted_circle(both, cap_px=5.0, radius_range_px=radius_range_px)
         assert circle.radius_px == pytest.approx(radius_px)
-    assert most_trusted_circle(large, radius_range_px=(101.0, 150.0)) is None
+    for radius_range_px in ((101.0, 150.0), (10.0, 99.0)):
+        assert most_trusted_circle(large, radius_range_px=radius_range_px) is None
     assert most_trusted_circle(np.column_stack([np.arange(5.0), 2.0 * np.arange(5.0)])) is None
     assert circles_through(np.ones((3, 2)), np.array([[0, 1, 2]]))[1][0] == np.inf
 
