@@ -222,7 +222,7 @@ def test_any_line_is_singular_though_rounding_moves_landmarks_off_it():
 
 def test_what_leaves_double_precision_is_singular():
     """Variances beyond the largest number; a landmark so near the camera's plane that its image moves by no number."""
-    assert singular(dilution_of_precision(1e155 * (LINE + OFF_IT), ZERO, ZERO, F))
+    assert singular(dilution_of_precision(1e153 * (LINE + OFF_IT), ZERO, ZERO, F))
     grazing = np.vstack([LINE + OFF_IT, [1e-200, 1.0, 0.0]])
     assert singular(dilution_of_precision(grazing, ZERO, ZERO, F))
 
@@ -262,7 +262,7 @@ def test_two_landmarks_are_too_few_and_one_behind_the_camera_cannot_be_measured(
     landmarks[1] = [0.0, 1.0, 1.0]  # in the camera's own plane
     aside = dilution_of_precision(landmarks, ZERO, ZERO, F)
     assert aside.status is DopStatus.BEHIND_CAMERA and np.isnan(aside.jacobian[2:4]).all()
-    at_the_body = dilution_of_precision_in_plane(np.array([[1.0, 0.5], [3.0, 4.0], [9.0, 1.0]]), [3.0, 4.0], 0.0, F)
+    at_the_body = dilution_of_precision_in_plane(np.array([[6.0, 4.5], [3.0, 4.0], [9.0, 1.0]]), [3.0, 4.0], 0.0, F)
     assert at_the_body.status is DopStatus.BEHIND_CAMERA
     assert dilution_of_precision_in_plane(np.ones((2, 2)), [0.0, 0.0], 0.0, F).status is DopStatus.TOO_FEW_LANDMARKS
 
