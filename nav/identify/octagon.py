@@ -52,7 +52,7 @@ class Octagons:
     triple: NDArray[np.int64]  #: (m, 3) candidates that define it
     count: NDArray[np.int64]  #: (m,) LEDs, the three included
     candidate: NDArray[np.int64]  #: (m, 8) candidate in each slot, -1 for none
-    radius_px: Array  #: (m,) of the ring if it were frontal
+    radius_px: Array  #: (m,) of the ring if it were frontal to a camera aimed at it: f k of `posit`
     tolerance_px: Array  #: (m,) of its look-ups
     tested_right_angles: int  #: hypotheses of plausible shape that were looked up, of RIGHT_ANGLES
     tested: int  #: and of all patterns
