@@ -169,7 +169,7 @@ def test_a_limit_of_spots_is_that_of_their_equations_with_the_frame_s_own_gain(l
     image = np.full((60, 90), 100, np.uint8)
     image[29:32, 44:47] = 102
     image[30, 45], image[30, 46] = 140, 138
-    s = np.sqrt(0.05 * 100.0 + 0.25**2 + 1.0 / 12.0)
+    s = np.sqrt(0.005 * 100.0 + 0.25**2 + 1.0 / 12.0)
     seven = (3 * 2.0 + 4 * 1.0) * 2.0
     most = {
         "spot_isolation": 40.0 / s,
@@ -180,7 +180,7 @@ def test_a_limit_of_spots_is_that_of_their_equations_with_the_frame_s_own_gain(l
     }
     for factor, count in ((0.99, 1), (1.01, 0)):
         settings = DetectSettings(**{**dict.fromkeys(most, 1e-3), limit: factor * most[limit]})
-        assert len(detect(image, settings, gain_dn_per_electron=0.05)) == count
+        assert len(detect(image, settings, gain_dn_per_electron=0.005)) == count
 
 
 def point(peak: int = 105) -> np.ndarray:

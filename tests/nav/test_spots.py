@@ -331,6 +331,7 @@ def test_hits_are_the_pixels_that_stand_out_from_their_second_brightest_neighbou
     rng = np.random.default_rng(31)
     places = rng.uniform(0.0, 1.0, (60, 2)) * [width, 60]
     spots = [(u, v, rng.choice([10.0, 40.0, 150.0]), rng.choice([0.7, 1.5, 4.0])) for u, v in places]
+    spots += [(0.3 * width, 57.0, 400.0, 0.5), (0.7 * width, 2.0, 400.0, 0.5)]  # in the last and the first row of all
     image = digital(blurred((60, width), spots, 3.0) + rng.normal(size=(60, width)))
     contrasts, x = (4, 2, 8, 8), image.astype(float)
     hits = find_hits(image, REACHES_PX, ROW_STEPS, contrasts, WIDE_PX)
@@ -349,6 +350,7 @@ def test_hits_are_the_pixels_that_stand_out_from_their_second_brightest_neighbou
         certain, possible = (inside & (13.0 / 16.0 * x - n >= contrast + more) for more in (0.5, -1.5))
         assert (found | ~certain).all() and (possible | ~found).all()
         assert certain.any() or width == 30
+        assert reach > 2 or (certain[57].any() and certain[2].any())
 
 
 def test_a_peak_alone_is_no_spot():
