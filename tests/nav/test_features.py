@@ -7,7 +7,7 @@ from dockair.nav.heading.features import _stretched, features_of
 from dockair.nav.heading.turn import VisualSettings
 
 SETTINGS = VisualSettings()  # images are halved
-PLACES = np.array([[60.3, 50.8], [331.4, 170.9], [402.7, 233.4], [521.9, 350.2]])  # (u, v)
+PLACES = np.array([[60.3, 50.8], [331.4, 170.9], [402.7, 233.4], [521.9, 350.2], [470.3, 150.6]])  # (u, v)
 
 
 def picture(places=PLACES):
@@ -24,17 +24,17 @@ def nearest_px(features, place):
 @pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
 def test_a_feature_lies_where_its_spot_is_in_pixels_of_the_whole_image(dtype):
     features = features_of(picture().astype(dtype), SETTINGS, None, None)
-    assert [nearest_px(features, place) < 0.15 for place in PLACES] == [True] * 4
+    assert [nearest_px(features, place) < 0.15 for place in PLACES] == [True] * 5
     assert features.middle_px == 299.5
 
 
 @pytest.mark.parametrize(("first", "last"), [((300, 140), (440, 260)), ((311, 153), (423, 251))])
 def test_with_a_mask_the_features_inside_it_stay_where_they_are_and_others_are_left_out(first, last):
-    """Only a part of the image around the mask is looked at; two of the spots are in the mask."""
+    """Only a part of the image around the mask is looked at; two spots are in the mask, and one is beside it."""
     mask = np.zeros((400, 600), bool)
     mask[first[1] : last[1], first[0] : last[0]] = True
     features = features_of(picture(), SETTINGS, mask, None)
-    assert [nearest_px(features, place) < 0.15 for place in PLACES] == [False, True, True, False]
+    assert [nearest_px(features, place) < 0.15 for place in PLACES] == [False, True, True, False, False]
     u, v = np.rint(features.pixels).astype(int).T
     assert mask[np.clip(v, 0, 399), np.clip(u, 0, 599)].all()
 

@@ -248,6 +248,12 @@ def test_of_two_features_with_one_nearest_the_nearer_is_matched():
     assert a.tolist() == [[2.0, 0.0]] and b.tolist() == [[5.0, 0.0]]
 
 
+def test_an_image_of_one_feature_has_no_second_nearest_and_no_match():
+    one, two = _features([[1.0, 2.0]], [1]), _features([[1.0, 2.0], [3.0, 4.0]], [1, 2])
+    for pair in ((one, two), (two, one), (one, one)):
+        assert [pixels.shape for pixels in matched(*pair, 0.75)] == [(0, 2), (0, 2)]
+
+
 @pytest.mark.parametrize(("turn_deg", "key_frames"), [(-5.1, 2), (-4.9, 1), (4.9, 1), (5.1, 2)])
 def test_an_image_that_has_turned_by_five_degrees_to_either_side_is_the_next_key_frame(
     monkeypatch, turn_deg, key_frames

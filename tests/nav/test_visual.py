@@ -183,6 +183,7 @@ def test_sixteen_bit_pictures_are_seen_like_eight_bit_ones(landscape, ahead):
         ("image", lambda: VisualHeading(LINE).step(np.zeros((40, 40, 3), np.uint8))),
         ("second", lambda: measure_turn(np.zeros((40, 40), np.uint8), np.zeros((40, 41), np.uint8), LINE)),
         ("mask", lambda: VisualHeading(LINE).step(np.zeros((40, 40), np.uint8), mask=np.ones((4, 4), bool))),
+        ("mask", lambda: VisualHeading(LINE).step(np.zeros((40, 40), np.uint8), mask=np.ones((40, 40), int))),
         ("focal_length_px", lambda: HeadingLine.of_focal_length(0.0)),
         ("scale", lambda: VisualSettings(scale=0.0)),
         ("fewest_matches", lambda: VisualSettings(fewest_matches=0)),
