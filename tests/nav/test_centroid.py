@@ -160,6 +160,28 @@ def test_fewer_than_twelve_pixels_around_a_blob_say_less_of_the_background_than_
     assert blob.flux[0] == pytest.approx((image[:, 1:6] - background).sum())
 
 
+def test_columns_and_rows_are_measured_alike():
+    """An image and its transpose: a blob that is longer one way, off the middle of its pixels, on an uneven ground."""
+    rows, columns = np.indices((21, 21))
+    image = (20 + 2 * (-1) ** (rows + columns)).astype(np.uint8)
+    image[9:11, 8:12] = [[110, 60, 50, 45], [70, 60, 50, 45]]
+    for windowed in (False, True):
+        one, other = (
+            measure_blobs(each, foreground_runs(each, 40), 40, NOISE, background_dn=0.0, windowed=windowed)
+            for each in (image, image.T.copy())
+        )
+        np.testing.assert_allclose(other.centroids_px, one.centroids_px[:, ::-1], atol=1e-9)
+        np.testing.assert_allclose(other.sigma_px, one.sigma_px, rtol=1e-9)
+
+
+def test_what_is_above_the_threshold_beside_a_blob_is_not_its_background():
+    image = np.full((15, 30), 10, np.uint8)
+    image[6:9, 8:11] = 100
+    image[6:9, 13:16] = 200
+    blobs = measure_blobs(image, foreground_runs(image, 50), 50, NOISE, background_dn=0.0)
+    np.testing.assert_allclose(blobs.flux, [9 * 90.0, 9 * 190.0])
+
+
 def test_twelve_pixels_around_a_blob_are_enough_for_its_background():
     """A blob of 2 x 2 pixels and what touches it fill 16 of 28."""
     image = np.full((4, 7), 10, np.uint8)
