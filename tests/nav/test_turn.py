@@ -282,3 +282,21 @@ def test_a_tilt_is_each_image_s_in_axes_along_its_own_heading():
             along = np.array([[np.cos(heading), np.sin(heading), 0.0], [-np.sin(heading), np.cos(heading), 0.0]])
             expected = without_yaw(exp(np.append(along @ tilt, 0.0)) @ R_LB) @ R_BC
             np.testing.assert_allclose(image.features.R_HC, expected, atol=1e-12)
+
+
+def test_each_image_is_levelled_by_its_own_attitude():
+    """Directions far away, seen in a bank to one side and then in one to the other."""
+    rng, images = np.random.default_rng(9), []
+    azimuth, slope = rng.uniform(-10.0, 10.0, 100) * DEGREE, rng.uniform(-0.08, 0.08, 100)
+    far = np.column_stack([np.cos(azimuth), np.sin(azimuth), slope])
+    for bank, yaw in ((-0.3, -0.5 * TURN), (0.1, 0.5 * TURN)):
+        level = matrix_from_yaw_pitch_roll(0.0, 0.05, bank)
+        pixels = CAMERA.pixels_from_points(far @ matrix_from_yaw_pitch_roll(yaw, 0.0, 0.0) @ level)
+        images.append(_features(pixels, np.arange(100), level))
+    assert turn_between(*images, CAMERA, VisualSettings()).turn_rad == pytest.approx(TURN, abs=1e-6)
+
+
+def test_over_a_refused_image_the_gyro_goes_on_from_the_last_heading_not_the_key_frame_s(monkeypatch):
+    numbers = np.arange(100), np.arange(100), np.arange(100, 200)
+    images = [(PLACES[n] + k * SHIFT, n) for k, n in enumerate(numbers)]
+    assert _seen_heading(monkeypatch, images)[0] == pytest.approx(DEGREE + 0.05, abs=1e-6)
