@@ -17,6 +17,7 @@ from dockair.rotations import Array
 _SAMPLED_PX = 4  # every so many pixels say how bright a picture is
 _DARK_AND_BRIGHT_PERCENT = (1.0, 99.0)
 _MARGIN_PX = 64  # around a mask: features' neighbourhoods
+_UPSCALED_PX = 0.25  # too far right and down: OpenCV's SIFT begins with a reduced image at twice its size
 _LEAST_CONTRAST = 16  # grey levels that are spread over all; less is noise
 
 
@@ -77,7 +78,7 @@ def features_of(
     points, descriptors = _sift(settings.most_features, settings.contrast).detectAndCompute(small, allowed)
     if not points:
         return Features(np.empty((0, 2)), np.empty((0, 128), np.float32), R_HC, middle)
-    pixels = (np.array([point.pt for point in points]) + 0.5) / s - 0.5 + corner
+    pixels = (np.array([point.pt for point in points]) - _UPSCALED_PX + 0.5) / s - 0.5 + corner
     return Features(pixels, np.asarray(descriptors, np.float32), R_HC, middle)
 
 
@@ -109,9 +110,7 @@ def _stretched(grey: NDArray[Any], mask: NDArray[np.bool_] | None) -> NDArray[np
 
 @cache
 def _sift(most: int, contrast: float) -> Any:
-    return cv2.SIFT_create(  # type: ignore[attr-defined]
-        nfeatures=most, contrastThreshold=contrast, enable_precise_upscale=True
-    )
+    return cv2.SIFT_create(nfeatures=most, contrastThreshold=contrast)  # type: ignore[attr-defined]
 
 
 def matched(one: Features, two: Features, ratio: float) -> tuple[Array, Array]:

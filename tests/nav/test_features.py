@@ -24,7 +24,7 @@ def nearest_px(features, place):
 @pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
 def test_a_feature_lies_where_its_spot_is_in_pixels_of_the_whole_image(dtype):
     features = features_of(picture().astype(dtype), SETTINGS, None, None)
-    assert [nearest_px(features, place) < 0.15 for place in PLACES] == [True] * 5
+    assert [nearest_px(features, place) < 0.05 for place in PLACES] == [True] * 5
     assert features.middle_px == 299.5
 
 
