@@ -71,7 +71,7 @@ def test_what_was_seen_once_is_seen_again_and_a_gyro_stands_in_for_refused_frame
 
 @pytest.mark.slow
 def test_a_turn_in_the_world_is_seen_and_costs_the_heading_a_fifth_of_what_it_costs_the_raw_gyro(monkeypatch, tmp_path):
-    """110 s with most of a turn, 55 frames of the half hour's 900; a frame's error there is 0.035 degrees rms.
+    """110 s with most of a turn, 55 frames of the half hour's 900; a frame's error there is 0.034 degrees rms.
 
     The heading at the end is no measure in so short a time: the raw MTi gyro's error passes through zero by then.
     """
