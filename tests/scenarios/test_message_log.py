@@ -241,14 +241,21 @@ def test_a_class_that_is_no_dataclass_is_refused():
         decode({"class": "subprocess:Popen", "fields": {"args": "true"}})
 
 
-def test_a_full_disk_reaches_the_flight(hand_made, tmp_path, monkeypatch):
-    def refuse(*_):
-        raise OSError("no space left on device")
+def _log_that_fails(error, hand_made, tmp_path, monkeypatch):
+    """A log of one tick whose encoder raises an error, and that tick's messages."""
 
-    monkeypatch.setattr(message_log, "_message_row", refuse)
+    def fail(*_):
+        raise error
+
+    monkeypatch.setattr(message_log, "_message_row", fail)
     log = MessageLog(tmp_path, NavigatorRecipe(class_name="a:B", sheets=hand_made.sheets))
-    _, imu, frame, solution = hand_made.tick(1)
-    log.append(imu, frame, solution)
+    _, *messages = hand_made.tick(1)
+    log.append(*messages)
+    return log, messages
+
+
+def test_a_full_disk_reaches_the_flight(hand_made, tmp_path, monkeypatch):
+    log, _ = _log_that_fails(OSError("no space left on device"), hand_made, tmp_path, monkeypatch)
     with pytest.raises(MachineError, match="a disk that takes the recording; no space left on device"):
         log.close()
 
@@ -289,17 +296,11 @@ def test_a_disk_that_refuses_to_close_the_files_reaches_the_flight_unless_it_ref
 
 
 def test_a_mistake_of_ours_in_the_encoders_thread_keeps_its_kind(hand_made, tmp_path, monkeypatch):
-    def fail(*_):
-        raise ValueError("a mistake")
-
-    monkeypatch.setattr(message_log, "_message_row", fail)
-    log = MessageLog(tmp_path, NavigatorRecipe(class_name="a:B", sheets=hand_made.sheets))
-    _, imu, frame, solution = hand_made.tick(1)
-    log.append(imu, frame, solution)
+    log, messages = _log_that_fails(ValueError("a mistake"), hand_made, tmp_path, monkeypatch)
     with pytest.raises(ValueError, match="a mistake"):
         log.close()
     with pytest.raises(ValueError, match="a mistake"):  # nor are more ticks taken as if nothing had been
-        log.append(imu, frame, solution)
+        log.append(*messages)
 
 
 def test_a_flight_that_waits_for_the_encoder_goes_on_when_the_disk_refuses(hand_made, tmp_path, monkeypatch):
