@@ -34,7 +34,7 @@ _PER_DECADE = 10
 _ROUNDS = 8  # of re-weighting by the model
 _CORRELATIONS_PER_DECADE = 12
 _LEAST_SHARE = 1e-30  # of the largest variance: of samples that cancel none is left, and its weight would be infinite
-_LEAST_VARIANCE = 1e-100
+_LEAST_VARIANCE = 1e-100  # of a record that does not change at all: the square of a weight is still a number
 _SMALL = 0.01  # r below which the next term of the series of G is a share of 1e-12
 
 

@@ -6,7 +6,7 @@ from dockair.rotations import Array
 
 Place = tuple[float, float, float]  #: [m]; numbers, as comparing arrays takes its time
 
-_LEAST_STEP_M = 0.1
+_LEAST_STEP_M = 0.1  # on the layer, and below it, no step is fine enough
 
 
 class Keys:
