@@ -22,7 +22,7 @@ from dockair.messages import ImuSample, ReceiverCommand
 from dockair.scenarios.assembly.buildable import require_buildable
 from dockair.scenarios.envs.judge import AttemptJudge
 from dockair.scenarios.envs.options import command_from, scenario_from
-from dockair.scenarios.envs.tables import ACTION, OUTCOME_REWARD, RETRY_REWARD, action_cost, box, truth_info
+from dockair.scenarios.envs.tables import ACTION, RETRY_REWARD, action_cost, box, outcome_reward, truth_info
 from dockair.scenarios.envs.viewer import LiveViewer, require_viewer
 from dockair.scenarios.judgement.attempts import succeeded
 from dockair.scenarios.judgement.referee import Outcome
@@ -161,7 +161,8 @@ class Episodes(gymnasium.Env[Obs, NDArray[np.float32]], Generic[Obs]):
             reward += before_m - self._distance_m(self._tick.truth)
             reward -= action_cost(command.velocity_m_s, command.acceleration_m_s2, step_s)
         if self._outcome is not None:
-            reward += OUTCOME_REWARD[self._outcome]
+            unsafe = bool(self._flight.referee.unsafe)
+            reward += outcome_reward(self._outcome, is_success=self._is_success(), is_unsafe=unsafe)
         truncated = self._outcome in _TRUNCATED
         terminated = self._outcome is not None and not truncated
         return self.observation(), reward, terminated, truncated, self._info()
@@ -307,7 +308,7 @@ class Episodes(gymnasium.Env[Obs, NDArray[np.float32]], Generic[Obs]):
         return {
             "scenario": self._flight.scenario.name,
             "seed": self._seed,
-            "is_success": outcome is Outcome.CONTACT and self._docked_well(),
+            "is_success": self._is_success(),
             "outcome": outcome.value if outcome is not None else "",
             "unsafe": "; ".join(self._flight.referee.unsafe),
             "attempt": self._flight.referee.attempt if self._until_clear else self._judge.number,
@@ -316,6 +317,9 @@ class Episodes(gymnasium.Env[Obs, NDArray[np.float32]], Generic[Obs]):
             "truth": truth_info(tick.truth, self._distance_m(tick.truth), self._flight.referee.contact),
         }
 
-    def _docked_well(self) -> bool:
+    def _is_success(self) -> bool:
+        """Whether the episode has ended in a good contact."""
         assert self._flight is not None and self._tick is not None
+        if self._outcome is not Outcome.CONTACT:
+            return False
         return succeeded(self._flight.referee.attempt_log(self._tick.truth.time_s, self._outcome))

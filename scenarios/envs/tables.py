@@ -66,7 +66,7 @@ PIXEL_STATE = (
 #: The action, in order: `ReceiverCommand`, beyond the trimmed flight path, body axes.
 ACTION = (*_vector("velocity", "m/s", VELOCITY_LIMIT_M_S), *_vector("acceleration", "m/s^2", ACCELERATION_LIMIT_M_S2))
 
-#: Added to the last step's reward.
+#: Added to the last step's reward, by how the episode ended, if nothing was unsafe.
 OUTCOME_REWARD = {
     Outcome.CONTACT: 10.0,
     Outcome.MISS: -5.0,
@@ -76,6 +76,8 @@ OUTCOME_REWARD = {
     Outcome.TIMEOUT: 0.0,
     Outcome.DIVERGED: 0.0,
 }
+LOOSE_CONTACT_REWARD = 0.0  #: of a contact that is not good: better than a miss, and worth nothing
+UNSAFE_REWARD = OUTCOME_REWARD[Outcome.COLLISION]  #: whatever the outcome, where anything was unsafe
 RETRY_REWARD = -1.0  #: for an attempt that failed and was not the last
 _ACTION_COST_1_S = 0.02  # of a full deflection of every axis; small beside the 1.2 of a second's approach at 1.2 m/s
 
@@ -96,6 +98,23 @@ def action_cost(velocity_m_s: Array, acceleration_m_s2: Array, step_s: float) ->
     """Return what holding a command for a time costs."""
     deflection = np.concatenate([velocity_m_s / VELOCITY_LIMIT_M_S, acceleration_m_s2 / ACCELERATION_LIMIT_M_S2])
     return float(_ACTION_COST_1_S * step_s * np.mean(deflection**2))
+
+
+def outcome_reward(outcome: Outcome, *, is_success: bool, is_unsafe: bool) -> float:
+    """Return what an episode's end pays.
+
+    A contact is paid for by what it is asked for: else who learns from the reward comes to touch as hard as may be.
+
+    Args:
+        outcome: of the episode.
+        is_success: it ended in a good contact.
+        is_unsafe: something in it was unsafe.
+    """
+    if is_unsafe:
+        return UNSAFE_REWARD
+    if outcome is Outcome.CONTACT and not is_success:
+        return LOOSE_CONTACT_REWARD
+    return OUTCOME_REWARD[outcome]
 
 
 def observation_from(solution: NavSolution, imu: ImuSample | None) -> Array:

@@ -17,16 +17,20 @@ from dockair.errors import DockairError
 from dockair.messages import LedObservation
 from dockair.rotations import exp, matrix_from_yaw_pitch_roll
 from dockair.scenarios.envs import DockEnv, DockFastEnv, DockPixelsEnv
+from dockair.scenarios.envs.judge import AttemptJudge
 from dockair.scenarios.envs.tables import (
     ACTION,
+    LOOSE_CONTACT_REWARD,
     OBSERVATION,
     OUTCOME_REWARD,
     PIXEL_STATE,
+    UNSAFE_REWARD,
     Entry,
     action_cost,
     box,
     clipped,
     observation_from,
+    outcome_reward,
     truth_info,
 )
 from dockair.scenarios.judgement.attempts import Attempt
@@ -186,6 +190,31 @@ def test_success_is_a_contact_inside_the_limits(env, monkeypatch, offset_m, good
     env.step(np.zeros(6, np.float32))
     env._outcome = Outcome.CONTACT
     assert env._info()["is_success"] is good
+
+
+@pytest.mark.parametrize(
+    ("offset_m", "unsafe", "paid"),
+    [(0.14, (), 10.0), (0.16, (), 0.0), (0.14, ("touch at 2.70 m/s",), -20.0), (0.16, ("touch at 2.70 m/s",), -20.0)],
+)
+def test_a_contact_is_paid_for_when_it_is_good_and_safe(env, monkeypatch, offset_m, unsafe, paid):
+    """docs/environments.md#reward: who learns from the reward must not come to touch as hard as may be."""
+    _, before = env.reset(seed=0)
+    measured = {"radial_offset_m": offset_m, "closure_speed_m_s": 1.2, "angle_deg": 3.0, "left_m": 0.0, "up_m": 0.0}
+    contact = Attempt(number=1, begun_s=0.0, ended_s=9.0, decided_s=9.0, outcome="contact", **measured)
+    monkeypatch.setattr(Referee, "attempt_log", lambda self, now_s, outcome: (contact,))
+    monkeypatch.setattr(Referee, "unsafe", unsafe)
+    monkeypatch.setattr(AttemptJudge, "watch", lambda self, truth, touched: (False, Outcome.CONTACT))
+    _, reward, terminated, _, after = env.step(np.zeros(6, np.float32))
+    made_good = before["truth"]["distance_m"] - after["truth"]["distance_m"]
+    assert (reward - made_good, terminated) == (pytest.approx(paid, abs=1e-12), True)
+
+
+@pytest.mark.parametrize("outcome", Outcome)
+def test_an_end_pays_as_tabled_if_nothing_was_unsafe_and_as_a_collision_if_it_was(outcome):
+    assert outcome_reward(outcome, is_success=True, is_unsafe=False) == OUTCOME_REWARD[outcome]
+    assert outcome_reward(outcome, is_success=True, is_unsafe=True) == OUTCOME_REWARD[Outcome.COLLISION]
+    poor = 0.0 if outcome is Outcome.CONTACT else OUTCOME_REWARD[outcome]
+    assert outcome_reward(outcome, is_success=False, is_unsafe=False) == poor
 
 
 @pytest.mark.slow
@@ -392,6 +421,7 @@ def test_each_failed_attempt_but_the_last_costs_one_and_the_last_its_outcome_alo
     """A touch four metres behind the ring is over a control tick later: two in one step, then the last of three."""
     flown = DockEnv(QUICK, attempts=3, reward="sparse", ticks_per_step=4)
     flown.reset(seed=0)
+    monkeypatch.setattr(Referee, "unsafe", ())  # outside the basket, which would pay by itself
     world, ticks = flown._flight.world, iter(range(1000))
     step = world.step
     touches = (3, 23, 43)  # of the physics, ten of which are a control tick
@@ -486,6 +516,8 @@ def test_the_page_tables_what_the_code_has():
             assert re.search(rf"^\| {index}(-\d+)? \| `{stem}`", page, re.MULTILINE), stem
     for outcome, reward in OUTCOME_REWARD.items():
         assert re.search(rf"^\|.*`{outcome.value}`.*\| {reward:g} \|", page, re.MULTILINE), outcome
+    for which, reward in (("`contact`, not good", LOOSE_CONTACT_REWARD), ("any, and `unsafe`", UNSAFE_REWARD)):
+        assert re.search(rf"^\| {which}.*\| {reward:g} \|", page, re.MULTILINE), which
     assert set(OUTCOME_REWARD) == set(Outcome)
     for name in IDS:
         assert f"`{name}`" in page
