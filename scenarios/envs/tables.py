@@ -66,7 +66,7 @@ PIXEL_STATE = (
 #: The action, in order: `ReceiverCommand`, beyond the trimmed flight path, body axes.
 ACTION = (*_vector("velocity", "m/s", VELOCITY_LIMIT_M_S), *_vector("acceleration", "m/s^2", ACCELERATION_LIMIT_M_S2))
 
-#: Added to the last step's reward, by how the episode ended, if nothing was unsafe.
+#: Added to the last step's reward, by how the episode ended; of a contact, a good one.
 OUTCOME_REWARD = {
     Outcome.CONTACT: 10.0,
     Outcome.MISS: -5.0,
@@ -77,7 +77,7 @@ OUTCOME_REWARD = {
     Outcome.DIVERGED: 0.0,
 }
 LOOSE_CONTACT_REWARD = 0.0  #: of a contact that is not good: better than a miss, and worth nothing
-UNSAFE_REWARD = OUTCOME_REWARD[Outcome.COLLISION]  #: whatever the outcome, where anything was unsafe
+UNSAFE_REWARD = -5.0  #: and no more, where anything was unsafe: as a miss. Worse, and who learns keeps off the drogue
 RETRY_REWARD = -1.0  #: for an attempt that failed and was not the last
 _ACTION_COST_1_S = 0.02  # of a full deflection of every axis; small beside the 1.2 of a second's approach at 1.2 m/s
 
@@ -110,11 +110,9 @@ def outcome_reward(outcome: Outcome, *, is_success: bool, is_unsafe: bool) -> fl
         is_success: it ended in a good contact.
         is_unsafe: something in it was unsafe.
     """
-    if is_unsafe:
-        return UNSAFE_REWARD
-    if outcome is Outcome.CONTACT and not is_success:
-        return LOOSE_CONTACT_REWARD
-    return OUTCOME_REWARD[outcome]
+    loose = outcome is Outcome.CONTACT and not is_success
+    reward = LOOSE_CONTACT_REWARD if loose else OUTCOME_REWARD[outcome]
+    return min(reward, UNSAFE_REWARD) if is_unsafe else reward
 
 
 def observation_from(solution: NavSolution, imu: ImuSample | None) -> Array:

@@ -194,7 +194,7 @@ def test_success_is_a_contact_inside_the_limits(env, monkeypatch, offset_m, good
 
 @pytest.mark.parametrize(
     ("offset_m", "unsafe", "paid"),
-    [(0.14, (), 10.0), (0.16, (), 0.0), (0.14, ("touch at 2.70 m/s",), -20.0), (0.16, ("touch at 2.70 m/s",), -20.0)],
+    [(0.14, (), 10.0), (0.16, (), 0.0), (0.14, ("touch at 2.70 m/s",), -5.0), (0.16, ("touch at 2.70 m/s",), -5.0)],
 )
 def test_a_contact_is_paid_for_when_it_is_good_and_safe(env, monkeypatch, offset_m, unsafe, paid):
     """docs/environments.md#reward: who learns from the reward must not come to touch as hard as may be."""
@@ -210,9 +210,10 @@ def test_a_contact_is_paid_for_when_it_is_good_and_safe(env, monkeypatch, offset
 
 
 @pytest.mark.parametrize("outcome", Outcome)
-def test_an_end_pays_as_tabled_if_nothing_was_unsafe_and_as_a_collision_if_it_was(outcome):
+def test_an_end_pays_as_tabled_if_nothing_was_unsafe_and_no_more_than_a_miss_if_it_was(outcome):
     assert outcome_reward(outcome, is_success=True, is_unsafe=False) == OUTCOME_REWARD[outcome]
-    assert outcome_reward(outcome, is_success=True, is_unsafe=True) == OUTCOME_REWARD[Outcome.COLLISION]
+    unsafe = -20.0 if outcome is Outcome.COLLISION else -5.0
+    assert outcome_reward(outcome, is_success=True, is_unsafe=True) == unsafe
     poor = 0.0 if outcome is Outcome.CONTACT else OUTCOME_REWARD[outcome]
     assert outcome_reward(outcome, is_success=False, is_unsafe=False) == poor
 
@@ -421,7 +422,6 @@ def test_each_failed_attempt_but_the_last_costs_one_and_the_last_its_outcome_alo
     """A touch four metres behind the ring is over a control tick later: two in one step, then the last of three."""
     flown = DockEnv(QUICK, attempts=3, reward="sparse", ticks_per_step=4)
     flown.reset(seed=0)
-    monkeypatch.setattr(Referee, "unsafe", ())  # outside the basket, which would pay by itself
     world, ticks = flown._flight.world, iter(range(1000))
     step = world.step
     touches = (3, 23, 43)  # of the physics, ten of which are a control tick
@@ -516,7 +516,8 @@ def test_the_page_tables_what_the_code_has():
             assert re.search(rf"^\| {index}(-\d+)? \| `{stem}`", page, re.MULTILINE), stem
     for outcome, reward in OUTCOME_REWARD.items():
         assert re.search(rf"^\|.*`{outcome.value}`.*\| {reward:g} \|", page, re.MULTILINE), outcome
-    for which, reward in (("`contact`, not good", LOOSE_CONTACT_REWARD), ("any, and `unsafe`", UNSAFE_REWARD)):
+    unsafe = "any but `collision`, with something `unsafe`"
+    for which, reward in (("`contact`, not good", LOOSE_CONTACT_REWARD), (unsafe, UNSAFE_REWARD)):
         assert re.search(rf"^\| {which}.*\| {reward:g} \|", page, re.MULTILINE), which
     assert set(OUTCOME_REWARD) == set(Outcome)
     for name in IDS:
