@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dockair.calibration import Camera
-from dockair.nav.identify.octagon import RIGHT_ANGLES, SLOTS, _looked_up, find_octagons
+from dockair.nav.identify.octagon import _KEPT, RIGHT_ANGLES, SLOTS, _looked_up, find_octagons
 
 ANGLE = np.arange(8) * np.pi / 4
 CENTRE, RADIUS = np.array([900.0, 500.0]), 100.0
@@ -133,23 +133,50 @@ def test_the_number_of_hypotheses_is_counted_apart_for_right_angles():
     assert every.tested > 3 * right.tested
 
 
+def test_what_no_gate_lets_through_is_not_looked_up():
+    shut = look_up(octagon(), centre_gate=(5000.0, 500.0, 1.0))
+    assert shut.tested == shut.tested_right_angles == len(shut.count) == 0
+
+
+def test_radius_and_tolerance_are_in_pixels():
+    """Through so long a lens a ring of 100 px is found in any slots; its look-ups are 1 px and 1 % of that wide."""
+    found = look_up(octagon(tilt_rad=0.6))
+    whole = found.count == 8
+    assert whole.sum() >= 56
+    np.testing.assert_allclose(found.radius_px[whole], RADIUS, rtol=1e-6)
+    np.testing.assert_allclose(found.tolerance_px[whole], 1.0 + 0.01 * RADIUS, atol=0.02)
+
+
+def test_of_too_many_octagons_the_first_are_kept():
+    count = _KEPT + 10
+    ring = np.array([[1.0, 0.0, 0.0], [0.0, -0.1, 0.0], [0.0, 0.0, -0.1]])
+    points = -0.1 * np.column_stack([np.cos(ANGLE), np.sin(ANGLE)])
+    plausible, patterns = np.array([[0, 2, 4, 0]], np.int16), np.array([[2, 4]])
+    row, found, candidate = _looked_up(
+        points, plausible, patterns, np.zeros(count, np.int32), np.tile(ring, (count, 1, 1)), np.full((count, 2), 0.01)
+    )
+    assert row.tolist() == list(range(_KEPT)) and (found == 8).all()
+    np.testing.assert_array_equal(candidate, np.tile(np.arange(8), (_KEPT, 1)))
+
+
 @pytest.mark.parametrize("tolerance", [0.02, 0.06, 0.3])
 def test_the_grid_finds_what_a_search_through_all_candidates_finds(tolerance):
-    """Random rings over a crowd, look-ups a quarter, one and four cells wide."""
+    """Random rings over a crowd, look-ups up to a quarter, one and four cells wide; of two in one place the first."""
     rng = np.random.default_rng(6)
     points = rng.uniform(-1.0, 1.0, (30, 2))
+    points = np.vstack([points, points[10:20]])
     count = 2000
     rings = np.empty((count, 3, 3))
     rings[:, 0] = np.column_stack([np.ones(count), rng.uniform(-1.0, 1.0, (count, 2))])
     rings[:, 1:] = rng.uniform(-0.4, 0.4, (count, 2, 3))
-    size = np.column_stack([np.ones(count), np.full(count, tolerance)])
+    size = np.column_stack([np.ones(count), rng.choice([0.5 * tolerance, tolerance], count)])
     plausible, patterns = np.array([[0, 1, 2, 0]], np.int16), np.array([[2, 4]])
     row, found, candidate = _looked_up(points, plausible, patterns, np.zeros(count, np.int32), rings, size)
     expected = {}
-    for k, ring in enumerate(rings):
+    for k, (ring, (_, reach)) in enumerate(zip(rings, size, strict=True)):
         X = ring[0] + np.column_stack([np.cos(ANGLE), np.sin(ANGLE)]) @ ring[1:]
         distance = np.linalg.norm(X[:, None, 1:] / X[:, None, :1] - points, axis=2)
-        slots = np.where(distance.min(axis=1) < tolerance, distance.argmin(axis=1), -1)
+        slots = np.where(distance.min(axis=1) < reach, distance.argmin(axis=1), -1)
         slots[[0, 2, 4]] = 0, 1, 2
         if (slots >= 0).sum() >= 4:
             expected[k] = slots
