@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from dockair.calibration import Camera, LedRing
-from dockair.nav.identify.perspective import fit_ring, undistorted, undistorted_prediction
+from dockair.nav.identify.perspective import distorted, fit_ring, undistorted, undistorted_prediction
 from dockair.rotations import matrix_from_yaw_pitch_roll
 
 CAMERA = Camera()
@@ -36,6 +36,13 @@ def test_the_tilt_is_that_between_the_axes(ring_scene):
         scene = ring_scene(rng, visible=8, sigma_px=0.0, range_m=(2.2, 4.0))  # near: the mirrored tilt fits worse
         found = fit(scene.points, np.argsort(scene.numbers))
         assert found.tilt_rad == pytest.approx(np.arccos(scene.R_CD[0, 0]), abs=2e-3)
+
+
+def test_a_frontal_ring_has_no_tilt_however_it_is_turned():
+    """Half of them have a cosine of the tilt above 1, by rounding."""
+    for turn in np.linspace(0.0, 2.0 * np.pi, 50):
+        p_CL = np.array([6.0, 0.0, 0.0]) + LedRing().positions_D @ matrix_from_yaw_pitch_roll(0.0, 0.0, turn).T
+        assert fit(CAMERA.pixels_from_points(p_CL), np.arange(8)).tilt_rad < 1e-6
 
 
 def test_an_impostor_in_a_slot_is_dropped_and_the_true_led_taken_up(ring_scene):
@@ -98,3 +105,23 @@ def test_a_prediction_in_which_no_ray_makes_an_led_is_left_as_it_is():
     beyond = np.vstack([near, np.array(camera.principal_point_px) + [20000.0, 0.0]])
     assert np.isnan(undistorted(beyond, camera)[2]).all()
     np.testing.assert_array_equal(undistorted_prediction(beyond, camera), beyond)
+
+
+def test_the_tolerance_is_the_caller_s_and_the_ring_s_own_in_the_root_of_squares(ring_scene):
+    scene = ring_scene(np.random.default_rng(40), visible=8, range_m=(3.0, 5.0))
+    found = fit(scene.points, np.argsort(scene.numbers))
+    assert found.tolerance_px == pytest.approx(np.hypot(0.5, 0.005 * found.radius_px), rel=1e-9)
+
+
+def test_pixels_without_distortion_are_those_of_the_same_camera_without_it():
+    """Both ways, for points all over the frame; a camera without distortion leaves the very pixels."""
+    lens = Camera(distortion=(-0.15, 0.05, 1e-3, -5e-4, 0.01), principal_point_px=(1010.0, 550.0))
+    pinhole = Camera(principal_point_px=lens.principal_point_px)
+    rng = np.random.default_rng(41)
+    p_CL = 7.0 * np.column_stack([np.ones(50), rng.uniform(-0.35, 0.35, 50), rng.uniform(-0.18, 0.18, 50)])
+    bent, straight = lens.pixels_from_points(p_CL), pinhole.pixels_from_points(p_CL)
+    assert np.abs(bent - straight).max() > 5.0
+    np.testing.assert_allclose(undistorted(bent, lens), straight, atol=1e-6)
+    np.testing.assert_allclose(distorted(straight, lens), bent, atol=1e-6)
+    for convert in (undistorted, distorted):
+        assert convert(straight, pinhole) is straight
