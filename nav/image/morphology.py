@@ -51,8 +51,6 @@ def _apply(operation: int, mask: Mask, element: Element) -> Mask:
     mask = np.ascontiguousarray(mask)
     if mask.ndim != 2 or mask.dtype != np.bool_:
         raise DockairError("mask", expected="a (rows, columns) bool array", got=f"{mask.shape} {mask.dtype}")
-    if mask.size == 0:
-        return mask.copy()
     # a border of background as wide as the element, because OpenCV's own borders differ between its operations
     margin = element.shape[0] // 2 + 1
     padded = np.pad(mask, margin).view(np.uint8)
@@ -67,7 +65,7 @@ def erode(mask: Mask, element: Element) -> Mask:
 
 def dilate(mask: Mask, element: Element) -> Mask:
     """Dilation (rows, columns) bool of mask (rows, columns) bool."""
-    return _apply(cv2.MORPH_DILATE, mask, element)
+    return _apply(cv2.MORPH_DILATE, mask, np.ascontiguousarray(element[::-1, ::-1]))  # OpenCV takes B(x + s)
 
 
 def open_(mask: Mask, element: Element) -> Mask:

@@ -94,13 +94,53 @@ def test_opening_takes_a_bridge_from_between_two_leds():
     assert opened.area_px.tolist() == [16, 16]
 
 
+def test_of_an_element_that_is_not_symmetric_dilation_is_the_element_and_opening_keeps_it():
+    """Dilation looks the other way than erosion: with the same sign an opening would move what it keeps."""
+    S = np.array([[0, 0, 0], [0, 1, 1], [0, 0, 0]], np.uint8)
+    point = np.zeros((7, 7), bool)
+    point[3, 3] = True
+    grown = dilate(point, S)
+    np.testing.assert_array_equal(grown[2:5, 2:5], S.astype(bool))
+    np.testing.assert_array_equal(erode(grown, S), point)
+    mask = np.random.default_rng(5).random((40, 50)) < 0.7
+    np.testing.assert_array_equal(open_(mask, S), ndimage.binary_opening(mask, S))
+    runs = foreground_runs(mask.astype(np.uint8), 0)
+    assert open_components(runs, S, 1).area_px.sum() == open_(mask, S).sum()
+
+
+def test_a_disc_is_the_square_without_its_corners():
+    expected = np.ones((5, 5), np.uint8)
+    expected[[0, 0, 0, 0, 4, 4, 4, 4], [0, 1, 3, 4, 0, 1, 3, 4]] = 0
+    np.testing.assert_array_equal(structuring_element("disc", 5), expected)
+
+
+@pytest.mark.parametrize("shape", [(0, 5), (5, 0), (0, 0)])
+@pytest.mark.parametrize("operation", [erode, dilate, open_, close])
+def test_a_mask_without_pixels_stays_one(operation, shape):
+    assert operation(np.zeros(shape, bool), structuring_element()).shape == shape
+
+
+@pytest.mark.parametrize(("connectivity", "areas"), [(4, [9, 9]), (8, [18])])
+def test_pieces_that_touch_at_a_corner_are_one_only_with_eight_neighbours(connectivity, areas):
+    """Two squares, corner to corner, and a pixel in the angle between them that opening takes away."""
+    mask = np.zeros((8, 8), bool)
+    mask[1:4, 1:4] = mask[4:7, 4:7] = mask[3, 4] = True
+    runs = foreground_runs(mask.astype(np.uint8), 0, connectivity)
+    assert runs.count == 1
+    assert open_components(runs, structuring_element(), 1, connectivity).area_px.tolist() == areas
+
+
 def test_wrong_elements_are_refused():
     with pytest.raises(DockairError, match="square"):
         structuring_element("star", 3)
     with pytest.raises(DockairError, match="odd"):
         structuring_element("cross", 4)
+    with pytest.raises(DockairError, match="odd"):
+        structuring_element("cross", -1)
     with pytest.raises(DockairError, match="mask"):
         erode(np.zeros((3, 3)), structuring_element())
+    with pytest.raises(DockairError, match="mask"):
+        erode(np.zeros((3, 3, 2), bool), structuring_element())
 
 
 def test_opening_keeps_what_has_the_right_area_before_and_after_and_says_whence():
@@ -111,8 +151,11 @@ def test_opening_keeps_what_has_the_right_area_before_and_after_and_says_whence(
     mask[[1, 3], 19:24] = False
     mask[9, 1] = True  # one pixel, too small
     mask[8:11, 31:34] = mask[9, 34:37] = True  # a square with a streak, 12 pixels
-    runs = foreground_runs(mask.astype(np.uint8), 0)
-    opened, origin, area = open_and_trace(runs, structuring_element("square", 3), 9, 8, (3, 30))
-    assert area.tolist() == opened.area_px.tolist() == [4, 9, 12, 9]
-    assert runs.area_px[origin].tolist() == [4, 26, 26, 12]
+    mask[10:12, 10:12] = True  # 4 pixels again, after others
+    runs, S = foreground_runs(mask.astype(np.uint8), 0), structuring_element("square", 3)
+    for area_range_px in ((3, 30), (4, 26)):
+        opened, origin, area = open_and_trace(runs, S, 9, 8, area_range_px)
+        assert area.tolist() == opened.area_px.tolist() == [4, 9, 12, 9, 4]
+        assert runs.area_px[origin].tolist() == [4, 26, 26, 12, 4]
+    assert open_and_trace(runs, S, 9, 8, (9, 26))[2].tolist() == [9, 12, 9]
     assert len(open_and_trace(runs, structuring_element("square", 3), 9, 8, (10, 12))[0].offset) == 1
