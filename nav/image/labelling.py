@@ -47,8 +47,6 @@ class Runs:
     @property
     def area_px(self) -> NDArray[np.int64]:
         """(count,) pixels of each component."""
-        if self.count == 0:
-            return np.zeros(0, np.int64)
         return np.add.reduceat(self.stop - self.start, self.offset[:-1], dtype=np.int64)
 
     def select(self, keep: Mask) -> "Runs":

@@ -119,6 +119,21 @@ def test_first_pass_leaves_a_u_in_two_labels_that_the_table_joins():
     assert label_two_pass(mask, 4)[1] == 1
 
 
+@pytest.mark.parametrize(("connectivity", "count"), [(4, 3), (8, 1)])
+def test_the_table_has_an_entry_for_each_provisional_label_and_the_background(connectivity, count):
+    labels, parent = first_pass(np.eye(3, dtype=bool), connectivity)
+    assert labels.max() == count
+    assert parent.tolist() == list(range(count + 1))
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
+def test_a_threshold_that_no_pixel_can_have_is_the_nearest_that_one_can(dtype):
+    most = int(np.iinfo(dtype).max)
+    image = np.array([[0, 1, 0, most - 1, most]], dtype)
+    for threshold, starts in ((-1, [1, 3]), (0, [1, 3]), (1, [3]), (most - 1, [4]), (most, []), (most + 1, [])):
+        assert foreground_runs(image, threshold).start.tolist() == starts
+
+
 def test_a_diagonal_pair_is_one_object_only_with_eight_neighbours():
     mask = np.eye(2, dtype=bool)
     assert label_contour_tracing(mask, 8)[1] == 1
@@ -139,7 +154,8 @@ def test_areas_and_selection_of_runs_are_those_of_the_labels():
 def test_an_image_without_pixels_has_no_components(shape):
     assert label_contour_tracing(np.zeros(shape, bool))[1] == 0
     assert label_two_pass(np.zeros(shape, bool))[1] == 0
-    assert foreground_runs(np.zeros(shape, np.uint8), 3).count == 0
+    none = foreground_runs(np.zeros(shape, np.uint8), 3)
+    assert none.count == 0 and none.area_px.shape == (0,)
 
 
 def test_an_image_that_is_not_contiguous_is_labelled_right():
@@ -155,3 +171,5 @@ def test_other_connectivities_and_grey_images_are_refused():
         foreground_runs(np.zeros((2, 2), np.uint8), 1, 6)
     with pytest.raises(DockairError, match="mask"):
         label_two_pass(np.zeros((2, 2), np.uint8))
+    with pytest.raises(DockairError, match="mask"):
+        label_contour_tracing(np.zeros((2, 2, 2), bool))
