@@ -52,10 +52,30 @@ def test_trust_is_the_sum_over_all_other_circles(cap):
     np.testing.assert_allclose(trust(X, r, alpha=2.0, beta=0.5, cap_px=cap), 1.0 / (2.0 * D + 0.5 * E), rtol=1e-12)
 
 
+def test_one_circle_alone_has_no_end_of_trust():
+    assert trust(np.array([[3.0, 4.0]]), np.array([5.0])).tolist() == [np.inf]
+
+
+@pytest.mark.parametrize(("alpha", "beta"), [(1.0, 1.0), (1.0, 0.0), (0.0, 1.0), (0.2, 3.0)])
+def test_the_most_trusted_circle_is_that_of_the_weights_given(alpha, beta):
+    """Of six points whose most trusted circle is another for each of the weights; without weights both are 1."""
+    points = np.random.default_rng(27).uniform(0.0, 100.0, (6, 2))
+    centres, radii = circles_through(points, all_triples(6))
+    T = trust(centres, radii, alpha=alpha, beta=beta)
+    best = most_trusted_circle(points, alpha=alpha, beta=beta)
+    assert best.trust == T.max()
+    np.testing.assert_array_equal(best.centre_px, centres[T.argmax()])
+    if alpha == beta == 1.0:
+        assert most_trusted_circle(points).trust == T.max()
+        np.testing.assert_array_equal(trust(centres, radii), T)
+
+
 def test_triples_are_all_there_are():
     assert len(all_triples(10)) == 120
     assert len({tuple(t) for t in all_triples(10)}) == 120
     assert all_triples(2).shape == (0, 3)
+    with pytest.raises(ValueError, match="read-only"):
+        all_triples(10)[0, 0] = 1  # they are kept for the next who asks
 
 
 @pytest.mark.parametrize("clutter", [0, 1])
