@@ -1,9 +1,12 @@
 """The source's Gauss-Newton: the same minimum as Levenberg-Marquardt from a good start, divergence said from a bad."""
 
+from dataclasses import replace
+
 import numpy as np
+import pytest
 
 from dockair.calibration import Camera, LedRing
-from dockair.nav.pose.glsdc import glsdc
+from dockair.nav.pose.glsdc import GLSDC, glsdc
 from dockair.nav.pose.levenberg_marquardt import levenberg_marquardt
 from dockair.nav.pose.measurement import lines_of_sight_from_pixels
 from dockair.rotations import exp, log, matrix_from_yaw_pitch_roll
@@ -44,3 +47,17 @@ def test_divergence_is_a_status_with_nan_covariance_and_a_result_without_it_expl
             again = levenberg_marquardt(sight, end.R_CD, end.p_CD)
             assert np.linalg.norm(log(again.R_CD @ end.R_CD.T)) < 1e-3
     assert unconverged > 0
+
+
+@pytest.mark.parametrize(
+    ("noise_px", "off_sigma", "steps"), [(0.0, 3e-6, 2), (0.0, 3e-7, 1), (0.1, 1e-4, 2), (0.1, 1e-5, 1)]
+)
+def test_the_last_step_is_a_millionth_of_a_sigma_or_promises_less_than_rounding(noise_px, off_sigma, steps):
+    """Starts beside the minimum: a step longer than that brings one more, which is shorter by far."""
+    for R, p, sight, axis in poses(20, noise_px):
+        least = glsdc(sight, R, p)
+        least = glsdc(sight, least.R_CD, least.p_CD)
+        x = off_sigma * np.linalg.cholesky(least.covariance) @ np.array([*axis, *axis]) / np.sqrt(2.0)
+        start = exp(x[:3]) @ least.R_CD, least.p_CD + x[3:]
+        assert glsdc(sight, *start).iterations == steps
+        assert glsdc(sight, *start, settings=replace(GLSDC, tolerance_sigma=1.0)).iterations == 1
