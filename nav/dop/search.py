@@ -128,7 +128,7 @@ def _lower_bound(start: Array, pieces: Array, state: Array, count: int, wanted: 
         if state[i] >= 0:
             N += pieces[i]
     bound, rest = _value(N, L, wanted), count - taken
-    if rest == 0 or bound == np.inf:
+    if bound == np.inf:
         return bound
     for _ in range(_SHIFTS):
         _feasible(state, rest, w)
