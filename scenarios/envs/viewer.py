@@ -81,18 +81,18 @@ class LiveViewer:
 
         self._next_s, self._frame = 0.0, None
         self._p_TE, self._path = hose_exit(flight.truth), []
-        self._episode += 1
+        episode = self._episode + 1
         self._recording = None
         flush_and_cleanup_orphaned_recordings()  # the last episode's: rerun keeps its threads and memory otherwise
         self._recording = rr.RecordingStream("dockair", recording_id=uuid4(), send_properties=False)
-        self._recording.send_recording_name(f"{flight.scenario.name}, episode {self._episode}")
+        self._recording.send_recording_name(f"{flight.scenario.name}, episode {episode}")
         self._recording.set_log_time_enabled(False)  # the timelines are the flight's
         is_new = self._sink(self._recording)
-        if is_new or self._episode == 1:  # the layout stays; rerun never frees what it took to send one
+        if is_new or episode == 1:  # the layout stays; rerun never frees what it took to send one
             self._recording.send_blueprint(blueprint(flight.sheets.camera))
         log_still(self._recording, flight.sheets, shapes_of(flight.world.model))
         log_overlay_looks(self._recording, flight.sheets)
-        self._flight = flight  # not before: what could not be begun is begun again with the next tick
+        self._flight, self._episode = flight, episode  # not before: what could not be begun is begun again
 
     def _log_frame(self, frame: CameraFrame) -> None:
         import rerun as rr

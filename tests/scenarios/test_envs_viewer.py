@@ -112,6 +112,31 @@ def test_the_layout_is_sent_once_to_each_viewer(hand_made, monkeypatch, new, sen
     assert len(layouts) == sent
 
 
+def test_a_viewer_that_is_opened_by_hand_after_the_first_try_has_failed_gets_the_layout_of_a_first_episode(
+    hand_made, monkeypatch
+):
+    import rerun as rr
+
+    monkeypatch.setattr(envs_viewer, "shapes_of", lambda model: ())
+    layouts, names = [], []
+    monkeypatch.setattr(envs_viewer, "blueprint", lambda camera: layouts.append(1) or blueprint(camera))
+    monkeypatch.setattr(rr.RecordingStream, "send_recording_name", lambda recording, name: names.append(name))
+    is_open = False
+
+    def sink(recording) -> bool:
+        if not is_open:
+            raise MachineError("render_mode", expected="a display", remedy="open a viewer")
+        recording.memory_recording()
+        return False
+
+    viewer, flight = LiveViewer(sink), _flight(hand_made)
+    with pytest.raises(MachineError):
+        _show(viewer, hand_made, flight, 1)
+    is_open = True
+    _show(viewer, hand_made, flight, 1)
+    assert (len(layouts), names[-1]) == (1, "hand made, episode 1")
+
+
 @pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="counts threads where Linux lists them")
 def test_episodes_leave_no_threads_behind(hand_made, monkeypatch, tmp_path):
     monkeypatch.setattr(envs_viewer, "shapes_of", lambda model: ())
