@@ -25,6 +25,7 @@ from dockair.sim.shapes import shapes_of
 
 _PORT = 9876  # of rerun's viewer
 _SHOWN_HZ = 20.0  # a viewer needs no more, and each costs a few milliseconds
+_ROUNDING_S = 1e-6  # of the times of ticks: one that is due is not put off to the next for it
 
 Sink = Callable[[Any], bool]
 
@@ -56,7 +57,7 @@ class LiveViewer:
         time_s = tick.truth.time_s
         if time_s < self._next_s and not is_last:
             return
-        self._next_s = time_s + 1.0 / _SHOWN_HZ
+        self._next_s = time_s + 1.0 / _SHOWN_HZ - _ROUNDING_S
         self._draw(flight, tick)
 
     def _draw(self, flight: Flight, tick: Tick) -> None:

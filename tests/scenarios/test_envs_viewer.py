@@ -162,6 +162,16 @@ def test_a_viewer_that_is_asked_twice_for_one_tick_draws_it_once(hand_made, monk
     assert drawn == [0.01]
 
 
+def test_every_fifth_of_a_hundred_ticks_a_second_is_drawn_however_their_times_are_rounded(monkeypatch):
+    drawn, flight = [], object()
+    monkeypatch.setattr(LiveViewer, "_draw", lambda viewer, flight, tick: drawn.append(tick.truth.time_s))
+    viewer = LiveViewer(lambda recording: False)
+    viewer._flight = flight
+    for k in range(1, 1001):
+        viewer.show(flight, SimpleNamespace(truth=SimpleNamespace(time_s=10 * k * 0.001), frame=None))
+    assert drawn == [10 * k * 0.001 for k in range(1, 1001, 5)]
+
+
 def _episode(hand_made, monkeypatch, path, ticks):
     """What the viewer is sent of some ticks (truth, imu, frame, solution)."""
     monkeypatch.setattr(envs_viewer, "shapes_of", lambda model: ())
