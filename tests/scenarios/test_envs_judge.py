@@ -52,6 +52,23 @@ def test_who_crosses_at_the_limit_itself_tries_and_has_not_failed_yet():
     assert judge.unfinished is Outcome.MISS
 
 
+@pytest.mark.parametrize(("x", "over"), [(-0.5, True), (-0.4999, False), (0.9999, False), (1.0, True)])
+def test_at_the_limits_along_the_axis_themselves_an_attempt_is_over(x, over):
+    judge = AttemptJudge(1)
+    assert _watch(judge, -0.1, 0.2, x) == ((True, Outcome.MISS) if over else (False, None))
+
+
+def test_a_tip_in_the_plane_itself_has_crossed_it_and_from_there_on_is_not_behind_it():
+    judge = AttemptJudge(1)
+    _watch(judge, -0.1, 0.0)
+    assert judge.unfinished is Outcome.MISS
+    assert _watch(AttemptJudge(1), 0.0, 0.1, 3.0) == (False, None)
+
+
+def test_the_coupling_ends_an_attempt_that_nobody_saw_begin():
+    assert _watch(AttemptJudge(1), 0.3, latched=True) == (False, Outcome.CONTACT)
+
+
 def test_who_tries_and_who_passes_by_is_told_as_by_the_flights_referee():
     assert AttemptLimits().aside_m == RefereeLimits().aside_m
 
