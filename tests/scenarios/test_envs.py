@@ -6,6 +6,7 @@ import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import gymnasium
 import numpy as np
@@ -14,9 +15,10 @@ from gymnasium.utils.env_checker import check_env
 
 import dockair
 from dockair.errors import DockairError
-from dockair.messages import LedObservation
+from dockair.messages import CameraFrame, LedObservation, ReceiverCommand, Window
 from dockair.rotations import exp, matrix_from_yaw_pitch_roll
 from dockair.scenarios.envs import DockEnv, DockFastEnv, DockPixelsEnv
+from dockair.scenarios.envs import episode as envs_episode
 from dockair.scenarios.envs.judge import AttemptJudge
 from dockair.scenarios.envs.tables import (
     ACTION,
@@ -258,6 +260,17 @@ def test_the_receiver_goes_along_where_the_tanker_has_announced_to_turn():
     assert aside_m < 2.0
 
 
+def test_what_is_flown_is_the_action_on_the_path_that_the_tanker_has_announced(hand_made, env):
+    truth, imu, _, solution = hand_made.tick(1)
+    announced = ReceiverCommand(velocity_m_s=np.full(3, 9.0), turn_rate_rad_s=0.03, climb_rad=-0.02)
+    env._tick = Tick(truth=truth, imu=imu, frame=None, solution=replace(solution, command=announced), outcome=None)
+    velocity, acceleration = np.array([0.1, 0.2, 0.3]), np.array([0.4, 0.5, 0.6])
+    flown = env._on_the_path(ReceiverCommand(velocity_m_s=velocity, acceleration_m_s2=acceleration))
+    np.testing.assert_array_equal(flown.velocity_m_s, velocity)
+    np.testing.assert_array_equal(flown.acceleration_m_s2, acceleration)
+    assert (flown.turn_rate_rad_s, flown.climb_rad) == (0.03, -0.02)
+
+
 def test_an_observation_is_finite_and_inside_its_space_when_the_navigation_knows_nothing(hand_made, env):
     env.imu = None
     truth, _, _, solution = hand_made.tick(1)
@@ -305,6 +318,34 @@ def test_an_observation_s_attitude_sigmas_age_and_leds_are_the_solution_s(hand_m
     assert sigmas == pytest.approx(range(1, 10))  # `NavSolution.covariance`: attitude, place, velocity
     assert named["frame_age"] == pytest.approx(0.02)
     assert named["leds_seen"] == 5.0
+
+
+def test_what_is_known_exactly_has_a_standard_deviation_of_nought(hand_made):
+    solution = replace(hand_made.tick(2)[3], covariance=np.zeros((9, 9)))
+    named = dict(zip([entry.name for entry in OBSERVATION], observation_from(solution, None), strict=True))
+    assert {value for name, value in named.items() if name.startswith("sigma_")} == {0.0}
+
+
+def test_the_state_beside_a_picture_is_of_its_frame_and_of_the_newest_sample(hand_made):
+    """Without OpenGL: the frame is made by hand, 8 times 6 pixels from row 100, column 200 on."""
+    made = DockPixelsEnv()
+    truth, imu, _, solution = hand_made.tick(2)
+    made._tick, made.imu = Tick(truth=truth, imu=imu, frame=None, solution=solution, outcome=None), imu[-1]
+    names = [entry.name for entry in PIXEL_STATE]
+    before = dict(zip(names, made.observation()["state"], strict=True))
+    assert (before["frame_age"], before["pooled"], before["exposure"]) == (10.0, 0.0, 0.0)
+    pixels = np.full((8, 6), 9, np.uint8)
+    window = Window(row_start=100, row_stop=108, column_start=200, column_stop=206)
+    stamp_s = solution.time_stamp_s - 0.007
+    made._frame = CameraFrame(time_stamp_s=stamp_s, pixels=pixels, window=window, exposure_s=2e-4, gain=0.1)
+    observation = made.observation()
+    state = dict(zip(names, observation["state"], strict=True))
+    assert (state["column"], state["row"], state["pooled"], state["exposure"]) == (200.0, 100.0, 1.0, 2e-4)
+    assert state["frame_age"] == pytest.approx(0.007)
+    assert state["time"] == solution.time_stamp_s
+    for name, measured in (("gyro", imu[-1].angular_rate_rad_s), ("specific_force", imu[-1].specific_force_m_s2)):
+        np.testing.assert_array_equal([state[f"{name}_{axis}"] for axis in "xyz"], np.nan_to_num(measured))
+    assert observation["picture"].sum() == pixels.sum()
 
 
 def test_info_s_truth_is_of_the_world_now_and_of_the_contact_once_there_was_one(make_truth):
@@ -407,6 +448,37 @@ def test_an_attempt_that_goes_on_when_time_is_over_has_failed_and_one_that_did_n
         assert (info["outcome"], (terminated, truncated)) == (outcome, ends)
 
 
+def test_what_the_flights_own_referee_says_ends_an_episode_or_not(env, monkeypatch):
+    """Without `until_clear` only what no episode can go on after: a collision, a simulation that has broken down."""
+    env.reset(seed=0)
+    monkeypatch.setattr(env, "_is_dense", False)
+    step = env._flight.step
+    for until_clear, outcome, paid, ends in (
+        (False, Outcome.DIVERGED, 0.0, (False, True)),
+        (True, Outcome.DIVERGED, 0.0, (False, True)),
+        (False, Outcome.COLLISION, -20.0, (True, False)),
+        (False, Outcome.ABORT, 0.0, (False, False)),
+        (True, Outcome.ABORT, -5.0, (True, False)),
+    ):
+        env._outcome = None
+        monkeypatch.setattr(env, "_until_clear", until_clear)
+        monkeypatch.setattr(
+            env._flight, "step", lambda command, outcome=outcome: replace(step(command), outcome=outcome)
+        )
+        _, reward, *ended, info = env.step(np.zeros(6, np.float32))
+        assert (reward, tuple(ended)) == (paid, ends)
+        assert info["outcome"] == (outcome.value if any(ends) else "")
+
+
+@pytest.mark.parametrize(("seen", "outcome"), [(Outcome.CONTACT, Outcome.CONTACT), (None, Outcome.TIMEOUT)])
+def test_a_contact_in_the_last_tick_of_the_time_is_a_contact(seen, outcome):
+    tick = SimpleNamespace(truth=SimpleNamespace(time_s=60.0), touched=False, outcome=None)
+    scenario, referee = SimpleNamespace(flight=SimpleNamespace(duration_s=60.0)), SimpleNamespace(attempt=1)
+    flight = SimpleNamespace(scenario=scenario, referee=referee, step=lambda command: tick)
+    judge = SimpleNamespace(watch=lambda truth, touched: (False, seen), unfinished=None)
+    assert DockEnv(QUICK)._flown(flight, judge, ReceiverCommand()) == (tick, 0, outcome)
+
+
 def test_a_touch_between_two_control_ticks_begins_an_attempt(env, monkeypatch):
     """Touches last a few milliseconds, a control tick ten."""
     env.reset(seed=0)
@@ -472,6 +544,33 @@ def test_the_third_persons_view_is_a_picture_of_the_world(env):
     assert env.render() is None
 
 
+def test_the_view_is_640_by_480_of_the_middle_between_tip_and_ring_and_closed_with_the_flight(monkeypatch, make_truth):
+    """Without OpenGL."""
+    said = []
+
+    class View:
+        def __init__(self, model, width_px, height_px):
+            said.append((width_px, height_px))
+
+        def render(self, data, look_at_W):
+            said.append(look_at_W)
+
+        def close(self):
+            said.append("view")
+
+    monkeypatch.setattr(envs_episode, "ThirdPersonView", View)
+    made, truth = DockEnv(QUICK, render_mode="rgb_array"), make_truth(1.0, p_WD=np.array([4.0, 0.2, -0.1]))
+    world = SimpleNamespace(model=None, data=None)
+    made._flight = SimpleNamespace(world=world, truth=truth, close=lambda: said.append("flight"))
+    made.render()
+    made.close()
+    size, look_at_W, *closed = said
+    assert (size, sorted(closed)) == ((640, 480), ["flight", "view"])
+    np.testing.assert_allclose(look_at_W, 0.5 * (truth.p_WP + truth.p_WD))
+    with pytest.raises(gymnasium.error.ResetNeeded, match=r"render\(\)"):
+        made.render()
+
+
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:.*ERROR")  # gymnasium tells of the error itself, too
 def test_what_a_vector_environments_process_raises_comes_back_as_one_line():
@@ -522,6 +621,24 @@ def test_the_page_tables_what_the_code_has():
     assert set(OUTCOME_REWARD) == set(Outcome)
     for name in IDS:
         assert f"`{name}`" in page
+
+
+def test_the_ranges_on_the_page_are_the_spaces():
+    page = PAGE.read_text(encoding="utf-8")
+    sections = {
+        "\n## Action": ACTION, "\n## Observation of `Dock-v0`": OBSERVATION, "\n`state`: `Box(12,)`": PIXEL_STATE
+    }  # fmt: skip
+    row = re.compile(r"^\| (\d+)(?:-(\d+))? \|.*\| (-?[\d.π]+) to ([\d.π]+)(?: \||$)", re.MULTILINE)
+    for begin, entries in sections.items():
+        said = {}
+        for first, last, *limits in row.findall(page.partition(begin)[2].partition("\n## ")[0]):
+            low, high = (float(limit.replace("π", repr(np.pi))) for limit in limits)
+            said |= dict.fromkeys(range(int(first), int(last or first) + 1), (low, high))
+        left_out = [entry for k, entry in enumerate(entries) if k not in said]
+        assert all(entry.name.startswith("navigator_command") for entry in left_out)  # "as the action"
+        assert said == {k: (entry.low, entry.high) for k, entry in enumerate(entries) if entry not in left_out}
+    commanded = [(entry.low, entry.high) for entry in OBSERVATION if entry.name.startswith("navigator_command")]
+    assert commanded == [(entry.low, entry.high) for entry in ACTION]
 
 
 def test_the_page_tables_every_key_of_info(env):
