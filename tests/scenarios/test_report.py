@@ -443,6 +443,96 @@ def test_panels_show_places_from_behind_and_errors_in_the_middle_of_their_bins(m
     assert [size for size in at_end if np.isfinite(size)][-2:] == [0.5, 2.0]
 
 
+def test_the_overview_has_a_line_a_group_from_the_top_with_both_rates_and_their_intervals(monkeypatch):
+    """One that docks late in one of two flights; and one seed flown twice, never docked."""
+    late = [_attempt(1, "rim_strike", 0.3, "gust"), _attempt(2)]
+    missed = [_attempt(1, "miss", 0.4, "gust")]
+    rows = [_row(0), _row(1, attempts=late)] + [_row(0, scenario="severe", attempts=missed) for _ in range(2)]
+    groups = groups_of(rows)
+    monkeypatch.setattr(figures, "as_svg", lambda figure, name: figure)
+    (ax,) = overview(groups).axes
+    assert [label.get_text() for label in ax.get_yticklabels()] == [groups[0].label, groups[1].label + " †"]
+    assert ax.get_yticks().tolist() == [0, 1] and ax.yaxis_inverted()
+    drawn = [(line.get_marker(), *line.get_xdata(), *line.get_ydata()) for line in ax.lines]
+    expected = []
+    for k, shares in enumerate([((2, 2), (1, 2)), ((0, 2), (0, 2))]):
+        for marker, y, share in zip("os", (k - 0.13, k + 0.13), shares, strict=True):
+            low, high = wilson_interval(*share)
+            expected += [("None", 100 * low, 100 * high, y, y), (marker, 100 * share[0] / share[1], y)]
+    assert drawn == [pytest.approx(line) if line[0] == "None" else line for line in expected]
+    said = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert said == ["any attempt", "first attempt"]
+
+
+@pytest.mark.parametrize(
+    ("shown", "outcomes"),
+    [
+        ("contact", ("contact",)),
+        ("no contact", ("miss", "rim_strike", "collision")),
+        ("plane not crossed", ("breakaway", "given_up", "timeout", "diverged")),
+    ],
+)
+def test_the_tip_of_an_attempt_is_marked_by_whether_it_crossed_the_ring_s_plane(shown, outcomes):
+    nowhere = _attempt(9, outcomes[0], None, "gust") | {"up_m": 0.1}
+    tried = [_attempt(k, outcome, 0.2, "gust") for k, outcome in enumerate(outcomes)]
+    (group,) = groups_of([_row(0, attempts=[*tried, nowhere])])
+    ax = Figure().subplots()
+    figures._scatter(ax, group)
+    places = {found.get_label(): found.get_offsets().data.tolist() for found in ax.collections}
+    nothing = dict.fromkeys(("contact", "no contact", "plane not crossed"), [])
+    assert places == nothing | {shown: [[-0.2, 0.0]] * len(outcomes)}
+    crosses = [found.get_label() for found in ax.collections if len(found.get_paths()[0]) < 8]
+    assert crosses == ["plane not crossed"]
+
+
+def test_closing_speeds_are_counted_in_bins_of_5_cm_s_over_the_band_of_practice_and_the_limit():
+    (group,) = groups_of([_row(k, closure_speed_m_s=speed) for k, speed in enumerate((1.01, 1.04, 1.06, 2.79))])
+    ax = Figure().subplots()
+    figures._closing(ax, group)
+    band, *bins = ax.patches
+    found = {round(bar.get_x(), 9): bar.get_height() for bar in bins if bar.get_height()}
+    assert found == {1.0: 2, 1.05: 1, 2.75: 1}
+    assert {round(bar.get_width(), 9) for bar in bins} == {0.05}
+    assert (band.get_x(), band.get_x() + band.get_width()) == (1.0, 1.5)
+    assert set(ax.lines[0].get_xdata()) == {2.6}
+
+
+def test_why_attempts_failed_stands_above_why_flights_began_none(monkeypatch):
+    rows = [_row(0, attempts=[_attempt(1, "miss", 0.4, "gust"), _attempt(2, "miss", 0.4, "bow_wave")])]
+    rows += [_row(1, attempts=[_attempt(1, "miss", 0.4, "gust")]), _without_attempt(2, "never_steady")]
+    (group,) = groups_of(rows)
+    ax = _axes_of(group, monkeypatch)["why attempts failed, and why flights began none"]
+    bars = {label.get_text(): bar for label, bar in zip(ax.get_yticklabels(), ax.patches, strict=True)}
+    found = {name: (bar.get_y() + 0.5 * bar.get_height(), bar.get_width()) for name, bar in bars.items()}
+    assert found == {"gust": (0.0, 2), "bow wave": (1.0, 1), "never steady:\nabort": (2.0, 1)}
+    assert ax.yaxis_inverted()
+    assert [text.get_text() for text in ax.get_legend().get_texts()] == ["attempts", "flights without one"]
+
+
+def test_within_n_attempts_goes_on_to_the_most_that_any_flight_made(monkeypatch):
+    late = [_attempt(k, "rim_strike", 0.3, "gust") for k in (1, 2)] + [_attempt(3)]
+    (group,) = groups_of([_row(0), _row(1, attempts=late)])
+    ax = _axes_of(group, monkeypatch)["contact inside the limits within n attempts"]
+    bars = [line.get_ydata() for line in ax.lines if line.get_marker() != "o"]
+    intervals = [wilson_interval(count, 2) for count in (1, 1, 2)]
+    np.testing.assert_allclose(bars, 100.0 * np.array(intervals))
+    assert ax.get_xticks().tolist() == [1, 2, 3]
+
+
+def test_own_headings_are_shown_by_their_sizes_and_beside_the_median_of_what_was_expected(monkeypatch):
+    flown = ((-3.0, 4.0, 0.5), (1.0, 2.0, 0.7), (None, 9.0, None), (2.0, 2.5, 3.0))
+    rows = [
+        _row(k, heading_error_deg=end, heading_error_max_deg=most, heading_sigma_deg=sigma, heading_error_rms_deg=1.0)
+        for k, (end, most, sigma) in enumerate(flown)
+    ]
+    ax = _axes_of(groups_of(rows)[0], monkeypatch)["own heading against the truth, 4 flights"]
+    at_end, largest, expected = ax.lines
+    sizes = [sorted(size for size in line.get_xdata() if np.isfinite(size))[1:] for line in (at_end, largest)]
+    assert sizes == [[1.0, 2.0, 3.0], [2.0, 2.5, 4.0, 9.0]]
+    assert set(expected.get_xdata()) == {0.7}
+    assert [line.get_label() for line in (at_end, largest)] == ["at the end", "largest of the flight"]
+
+
 def test_errors_by_range_are_pooled_by_their_squares():
     """3 frames of 1 mm and 1 of 3 mm: sqrt((3 * 1 + 9) / 4) = sqrt 3 mm; bias (3 * 1 - 3) / 4 = 0."""
 

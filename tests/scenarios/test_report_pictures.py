@@ -5,6 +5,8 @@ import math
 
 import pytest
 
+from dockair.nav.guidance.phases import Phase
+from dockair.scenarios.report import timelines as pictures
 from dockair.scenarios.report.figures import panels
 from dockair.scenarios.report.groups import Group
 from dockair.scenarios.report.headings import headings_of, rms
@@ -51,6 +53,45 @@ def test_of_many_flights_the_title_says_how_many_are_shown():
     text = timelines(_group([_row(seed) for seed in range(100, 141)]))
     assert "phases of the first 40 of 41 flights" in text
     assert ">139</text>" in text and ">140</text>" not in text
+
+
+def _drawn(rows, monkeypatch):
+    """The picture of phases, not yet written."""
+    with monkeypatch.context() as patch:
+        patch.setattr(pictures, "as_svg", lambda figure, name: figure)
+        return timelines(_group(rows))
+
+
+def test_every_phase_has_a_colour_of_its_own_and_one_that_nobody_knows_is_black(monkeypatch):
+    names = [*(phase.value for phase in Phase), "loiter"]
+    figure = _drawn([_row(0, 10.0 * len(names), names)], monkeypatch)
+    (bars,) = figure.axes[0].collections
+    colours = [tuple(colour) for colour in bars.get_facecolors()]
+    assert len(set(colours)) == len(names) and colours[-1] == (0.0, 0.0, 0.0, 1.0)
+    (legend,) = figure.legends
+    keys = {
+        text.get_text(): patch.get_facecolor() for text, patch in zip(legend.texts, legend.get_patches(), strict=True)
+    }
+    assert keys == {name.replace("_", " "): colour for name, colour in zip(names, colours, strict=True)}
+
+
+def test_a_flight_s_bar_is_as_long_as_its_phases_and_stands_beside_its_seed_the_first_on_top(monkeypatch):
+    figure = _drawn([_row(7, 25.0), _row(3, 40.0, ("join_up", "approach", "clear"))], monkeypatch)
+    ax = figure.axes[0]
+    boxes = [[path.get_extents() for path in bars.get_paths()] for bars in ax.collections]
+    assert [[(box.x0, box.x1) for box in row] for row in boxes] == [
+        [(0.0, 10.0), (10.0, 25.0)], [(0.0, 10.0), (10.0, 20.0), (20.0, 40.0)],
+    ]  # fmt: skip
+    assert [0.5 * (row[0].y0 + row[0].y1) for row in boxes] == pytest.approx(ax.get_yticks().tolist(), abs=1e-9)
+    assert [label.get_text() for label in ax.get_yticklabels()] == ["7", "3"]
+    assert ax.yaxis_inverted()
+
+
+def test_where_a_flight_runs_on_it_is_said_beside_its_own_bar(monkeypatch):
+    (ax,) = _drawn([_row(seed, 100.0 if seed == 4 else 20.0) for seed in range(20)], monkeypatch).axes
+    assert [(text.get_position(), text.get_text()) for text in ax.texts] == [((25.0, 4), " until 100 s")]
+    assert ax.get_xlim() == (0.0, 25.0)
+    assert axis_end([*(10.0 * k for k in range(1, 11)), 1000.0]) == 125.0  # nine in ten are no longer than 100 s
 
 
 def test_a_long_flight_does_not_squeeze_the_others_and_is_said_to_run_on():
