@@ -48,11 +48,14 @@ def bench_world() -> dict[str, Any]:
     for _ in range(_SETTLE_TICKS):  # the first ones compile
         world.step(command)
     bare, start = _bare_step(world), world.save()
+
+    def restore() -> None:
+        world.restore(start)
+
     us: dict[str, list[float]] = {"a bare mj_step of the same model": [], "the whole world": []}
     for _ in range(_ROUNDS):
-        us["a bare mj_step of the same model"].append(_microseconds(bare))
-        world.restore(start)
-        us["the whole world"].append(_microseconds(lambda: world.step(command)))
+        us["a bare mj_step of the same model"].append(_microseconds(*bare))
+        us["the whole world"].append(_microseconds(restore, lambda: world.step(command)))
         for part, spent in _spent_in_parts(world, command).items():
             us.setdefault(part, []).append(spent)
     least = {what: min(times) for what, times in us.items()}
@@ -65,20 +68,20 @@ def bench_world() -> dict[str, Any]:
     return {"microseconds": least, "ratios": ratios}
 
 
-def _bare_step(world: World) -> Callable[[], None]:
-    """A step of MuJoCo alone, contacts looked for, from where the world is, under the forces of now."""
+def _bare_step(world: World) -> tuple[Callable[[], None], Callable[[], None]]:
+    """What goes to where the world is, under the forces of now, and a step of MuJoCo alone, contacts looked for."""
     model = copy.copy(world.model)
     model.opt.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
     data = mujoco.MjData(model)
     state = mujoco.mjtState.mjSTATE_INTEGRATION
     here = np.empty(mujoco.mj_stateSize(model, state))
     mujoco.mj_getState(world.model, world.data, here, state)
-    mujoco.mj_setState(model, data, here, state)
-    return lambda: mujoco.mj_step(model, data)
+    return lambda: mujoco.mj_setState(model, data, here, state), lambda: mujoco.mj_step(model, data)
 
 
-def _microseconds(call: Callable[[], object]) -> float:
-    """Mean time of a call in a round [us]."""
+def _microseconds(restore: Callable[[], None], call: Callable[[], object]) -> float:
+    """Mean time of a call in a round [us], which begins where `restore` goes to."""
+    restore()
     for _ in range(_WARM_TICKS):
         call()
     begun = time.thread_time()
