@@ -1,5 +1,7 @@
 """The loop's benchmark adds up; how fast it is belongs to the machine and is not tested."""
 
+from types import SimpleNamespace
+
 import pytest
 
 from dockair.scenarios.bench import loop
@@ -45,6 +47,49 @@ def test_an_environment_that_cannot_be_made_here_is_left_out(monkeypatch):
     monkeypatch.setattr(loop, "_at_once", lambda _, count: [{"x_real_time": 1.0}] * count)
     monkeypatch.setattr(loop, "environment_speeds", lambda: {"dockair/DockFast-v0": 300.0})
     assert list(loop.bench_loop()["ratios"]) == ["two flights at once over one"]
+
+
+class _Environment:
+    """Steps of 2 s, resets of 100 s; the third step is truncated, the fifth terminates."""
+
+    def __init__(self):
+        self.now_s, self.steps, self.resets = 0.0, 0, []
+        self.action_space = SimpleNamespace(sample=lambda: None, seed=lambda seed: None)
+
+    def reset(self, seed=None):
+        self.now_s += 100.0
+        self.resets.append(self.steps)
+
+    def step(self, action):
+        self.now_s += 2.0
+        self.steps += 1
+        return None, 0.0, self.steps == 5, self.steps == 3, {}
+
+    def close(self):
+        pass
+
+
+def test_only_steps_are_timed_and_an_episode_that_is_over_begins_anew(monkeypatch):
+    environment = _Environment()
+    monkeypatch.setattr(loop.time, "process_time", lambda: environment.now_s)
+    assert loop._time_of_steps(environment) == 2.0 * loop._STEPS
+    assert environment.resets == [3, 5]
+
+
+def test_an_environment_s_speed_is_that_of_its_quickest_turn(monkeypatch):
+    """Humanoid-v5 cannot be made here."""
+    import gymnasium
+
+    def make(name):
+        if name == "Humanoid-v5":
+            raise gymnasium.error.DependencyNotInstalled(name)
+        return _Environment()
+
+    times_s = iter([3.0, 2.0, 5.0])
+    monkeypatch.setattr(gymnasium, "make", make)
+    monkeypatch.setattr(loop, "_TURNS", 3)
+    monkeypatch.setattr(loop, "_time_of_steps", lambda environment: next(times_s))
+    assert loop.environment_speeds() == {"dockair/DockFast-v0": loop._STEPS / 2.0}
 
 
 def test_a_flight_that_fails_in_its_process_ends_the_bench(monkeypatch):
