@@ -1,5 +1,7 @@
 """The live viewer: what it logs while an episode is flown, and that each episode is a recording of its own."""
 
+import sys
+from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -8,6 +10,7 @@ import numpy as np
 import pytest
 
 from dockair.errors import MachineError
+from dockair.messages import CameraFrame, Window
 from dockair.rotations import matrix_from_yaw_pitch_roll
 from dockair.scenarios.envs import viewer as envs_viewer
 from dockair.scenarios.envs.viewer import LiveViewer
@@ -170,6 +173,62 @@ def test_every_fifth_of_a_hundred_ticks_a_second_is_drawn_however_their_times_ar
     for k in range(1, 1001):
         viewer.show(flight, SimpleNamespace(truth=SimpleNamespace(time_s=10 * k * 0.001), frame=None))
     assert drawn == [10 * k * 0.001 for k in range(1, 1001, 5)]
+
+
+def test_an_episode_begins_without_the_clock_the_frame_and_the_way_of_the_one_before(hand_made, monkeypatch):
+    monkeypatch.setattr(envs_viewer, "shapes_of", lambda model: ())
+    drawn = []
+
+    def draw(viewer, flight, tick):
+        drawn.append((tick.truth.time_s, viewer._frame, len(viewer._path)))
+        viewer._path.append(tick.truth.p_WP)
+
+    monkeypatch.setattr(LiveViewer, "_draw", draw)
+    viewer = LiveViewer(lambda recording: False)
+    (truth, imu, _, solution), (later, *_) = hand_made.tick(1), hand_made.tick(2)
+    first = Tick(truth=truth, imu=imu, frame=None, solution=solution, outcome=None)
+    for flight in (_flight(hand_made), _flight(hand_made)):
+        viewer.show(flight, first)
+        viewer.show(flight, replace(first, truth=later, frame=hand_made.frame(later)))  # not drawn: too soon
+    assert drawn == [(truth.time_s, None, 0)] * 2
+
+
+def test_a_frame_is_drawn_once_and_all_else_with_every_update(hand_made, monkeypatch):
+    monkeypatch.setattr(envs_viewer, "shapes_of", lambda model: ())
+    logged = Counter()
+    for name in ("log_moving", "log_overlays", "log_tip_path", "log_plots"):
+        monkeypatch.setattr(envs_viewer, name, lambda *given, name=name: logged.update([name]))
+    monkeypatch.setattr(LiveViewer, "_log_frame", lambda viewer, frame: logged.update(["frame"]))
+    viewer, flight = LiveViewer(lambda recording: False), _flight(hand_made)
+    for k in (1, 10, 20):
+        truth, imu, _, solution = hand_made.tick(k)
+        frame = hand_made.frame(truth) if k == 10 else None
+        viewer.show(flight, Tick(truth=truth, imu=imu, frame=frame, solution=solution, outcome=None))
+    assert logged == {"log_moving": 3, "log_overlays": 3, "log_tip_path": 3, "log_plots": 3, "frame": 1}
+
+
+def test_a_windows_pixels_lie_where_the_window_lies_on_the_sensor():
+    logged, viewer = {}, LiveViewer()
+    viewer._recording = SimpleNamespace(log=logged.__setitem__)
+    pixels = np.arange(48, dtype=np.uint8).reshape(6, 8)
+    window = Window(row_start=100, row_stop=106, column_start=200, column_stop=208)
+    viewer._log_frame(CameraFrame(time_stamp_s=0.0, pixels=pixels, window=window, exposure_s=1e-4, gain=0.1))
+    assert logged["camera/window"].translation.as_arrow_array().to_pylist() == [[200.0, 100.0, 0.0]]
+    assert logged["camera/window/pixels"].format.as_arrow_array().to_pylist()[0]["width"] == 8
+
+
+@pytest.mark.parametrize("is_open", [True, False])
+def test_of_a_viewer_that_was_opened_it_is_said_that_it_is_new(monkeypatch, is_open):
+    """By the program beside this Python."""
+    import rerun as rr
+
+    spawned = []
+    monkeypatch.setattr(envs_viewer.shutil, "which", lambda name, path=None: f"{path}/rerun" if path else "another")
+    monkeypatch.setattr(envs_viewer, "_is_open", lambda: is_open)
+    monkeypatch.setattr(envs_viewer, "has_display", lambda: True)
+    monkeypatch.setattr(rr, "spawn", lambda executable_path, recording: spawned.append((executable_path, recording)))
+    assert envs_viewer._spawned("recording") is not is_open
+    assert spawned == [(f"{Path(sys.executable).parent}/rerun", "recording")]
 
 
 def _episode(hand_made, monkeypatch, path, ticks):
