@@ -529,6 +529,13 @@ def test_the_newest_sample_is_observed_until_the_next(env):
     assert [named[f"gyro_{axis}"] for axis in "xyz"] == list(env.imu.angular_rate_rad_s) != [0.0, 0.0, 0.0]
 
 
+def test_no_sample_of_the_flight_before_is_observed_in_one_that_has_none_yet(hand_made, env):
+    env.imu = hand_made.tick(1)[1][-1]
+    observation, _ = env.reset(seed=0, options={"set": {"faults": [{"kind": "gyro_drop_out", "start_s": 0.0}]}})
+    named = dict(zip([entry.name for entry in OBSERVATION], observation, strict=True))
+    assert [named[f"gyro_{axis}"] for axis in "xyz"] == [0.0, 0.0, 0.0]
+
+
 @pytest.mark.slow
 @pytest.mark.gl
 def test_the_third_persons_view_is_a_picture_of_the_world(env):

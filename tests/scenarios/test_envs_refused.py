@@ -63,6 +63,7 @@ WRONG_OPTIONS = [
     (["scenario"], "options: expected a dictionary, got ['scenario']"),
     ([], "options: expected a dictionary, got []"),
     ("abc", "options: expected a dictionary, got 'abc'"),
+    (80 * "x", "options: expected a dictionary, got 'str'"),  # with its quotes longer than a line bears
     (np.zeros((9, 9)), "options: expected a dictionary, got 'ndarray of shape (9, 9)'"),
     ({1: 2, "a": 3}, "options: expected keys that are text, got 1"),
     ({None: 2}, "options: expected keys that are text, got 'NoneType'"),
@@ -197,6 +198,7 @@ WRONG_ACTIONS = [
     ([1j] + [0.0] * 5, r"\[1j, "),
     (np.full(6, np.nan, np.float32), r"array\(\[nan"),
     (np.zeros(5, np.float32), r"array\(\[0\."),
+    (np.zeros((1, 6)), r"array\(\[\[0\."),
     (np.zeros((20, 6)), r"'ndarray of shape \(20, 6\)'"),
 ]
 
