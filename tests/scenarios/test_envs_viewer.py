@@ -82,6 +82,9 @@ def test_each_episode_is_a_recording_with_truth_and_belief_at_the_viewers_rate(s
         assert any(key.startswith("/camera/window/pixels:") for key in rows)
         for drawn in ("ring:LineStrips2D:strips", "leds:Points2D:positions", "close_up:Transform3D:translation"):
             assert len(rows[f"/camera/{drawn}"]) == len(ranges)  # as over a recorded frame
+        assert "/camera/ring:LineStrips2D:colors" in rows
+        assert {key.rpartition(":")[2] for key in rows if key.endswith(("_time", "_tick"))} == {"sim_time"}
+        assert set(rows["/camera/window:sim_time"]) <= set(rows["/plots/range/belief:sim_time"])
 
 
 def test_without_the_viewers_program_the_machine_is_said_to_lack_it(hand_made, monkeypatch):
