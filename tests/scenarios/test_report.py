@@ -548,6 +548,47 @@ def test_errors_by_range_are_pooled_by_their_squares():
     assert bin_["count"] == 4
 
 
+def _table(text, begins):
+    """Cells of the first table after these words, row by row, without tags."""
+    table_ = text[text.index("<tr>", text.index(begins)) :].partition("</table>")[0]
+    cells = [re.findall(r"<td[^>]*>(.*?)</td>", row, re.DOTALL) for row in table_.split("<tr>")]
+    return [[re.sub(r"<[^>]*>", " ", cell).strip() for cell in row] for row in cells if row]
+
+
+def test_each_figure_of_the_navigation_stands_in_its_column_of_the_page():
+    entry = {"low_m": 2.0, "high_m": 3.5, "count": 4, "range_rmse_m": 2e-3, "range_sigma_m": 3e-3, "range_bias_m": 1e-3}
+    entry |= {"lateral_rmse_m": 4e-3, "lateral_sigma_m": 5e-3, "attitude_rmse_deg": 0.6, "attitude_sigma_deg": 0.7}
+    heading = {"heading_error_deg": -2.0, "heading_sigma_deg": 0.5, "heading_error_rms_deg": 1.5}
+    heading |= {"heading_error_max_deg": 3.0, "heading_beyond_3_sigma": 0.25}
+    text = " ".join(page("made", [_campaign([_row(0, nav_by_range=json.dumps([entry]), **heading)])]).split())
+    (cells,) = _table(text, "Navigation error by range")
+    assert cells == ["2–3.5", "4", "2.0 / 3.0", "+1.0", "4.0 / 5.0", "0.60 / 0.70"]
+    assert "RMS 1.50° over the flight and 2.00° at its end (expected 0.50°), largest 3.00°; beyond" in text
+    assert "deviations for 25.0 % of a flight on average" in text
+
+
+def test_each_count_of_a_pair_and_of_a_group_stands_in_its_column_of_the_page():
+    """Of seven flights ours dock at once on 0 and 1 and late on 6, perfect navigation on 1 to 4, pid on 1, 4 and 5."""
+    late = [_attempt(1, "miss", 0.4, "gust"), _attempt(2, offset_m=0.09)]
+    refuelled = {
+        "fuel_kg": 9.0,
+        "timeline": json.dumps([{"phase": "disconnect", "begun_s": 40.0, "reason": "refuelled"}]),
+    }
+    ours = [_flown_by({}, seed, seed < 2) for seed in range(6)]
+    ours += [_row(6, attempts=late) | refuelled]
+    truth = [_flown_by(_SENSING["truth"], seed, 1 <= seed <= 4) for seed in range(7)]
+    truth = [row | {"sensing": "truth", "navigator": "truth"} for row in truth]
+    pid = [_flown_by({"guidance.controller": "pid"}, seed, seed in (1, 4, 5)) for seed in range(7)]
+    text = page("made", [_campaign([*ours, *truth, *pid])])
+    (_, predictive, _) = _table(text, "<h2>Overview</h2>")
+    assert [cell.split()[0] for cell in predictive[2:5]] == ["2/7", "3/7", "1/7"]
+    assert predictive[5].split() == ["0.050", "0.082"]
+    (vision,) = _table(text, "What vision costs")
+    assert vision[-7:] == ["7", "7", "2", "4", "0.500", "1", "3"]
+    (crews,) = _table(text, "Two crews side by side")
+    assert crews[2:-1] == ["7", "7", "3", "2", "2", "1"]  # pid stands first
+
+
 def test_the_page_needs_no_other_file_and_its_links_lead_somewhere():
     rows = [_row(k, attempts=[_attempt(1, "miss", 0.4, "gust")]) for k in range(3)] + [_row(5)]
     text = page("made", [_campaign(rows)])
