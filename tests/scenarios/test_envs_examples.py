@@ -7,10 +7,12 @@ import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+import gymnasium
 import numpy as np
 import pytest
 
 from dockair.messages import LedObservation
+from dockair.scenarios.envs.tables import ACTION, OBSERVATION, box
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
@@ -144,3 +146,57 @@ def test_learning_runs_and_says_what_it_was_worth():
     said = r"generation 0: mean score +\S+, \d of 2 docked\ngains: \S+, \S+, \S+\n"
     said += "".join(rf"{when}: good contact in \d of 1 on new seeds\n" for when in ("before", "after"))
     assert re.fullmatch(said, done.stdout)
+
+
+class _Belief(gymnasium.Env):
+    """Answers with one belief, and keeps the commands."""
+
+    observation_space = box(OBSERVATION, np.float64)
+    action_space = box(ACTION, np.float32)
+
+    def __init__(self, **values: float) -> None:
+        names = [entry.name for entry in OBSERVATION]
+        self.belief, self.commands = np.zeros(len(names)), []
+        for name, value in values.items():
+            self.belief[names.index(name)] = value
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        return self.belief, {}
+
+    def step(self, action):
+        self.commands.append(action)
+        return self.belief, 0.5, False, False, {}
+
+
+def test_what_is_learned_is_added_to_the_linear_policys_acceleration_and_the_velocity_is_the_sum(example):
+    """Its rate is that in turning axes: a turn of 0.1 rad/s lifts a ring that is 2 m to the left by 0.2 m/s."""
+    module = example("learn_policy")
+    belief = _Belief(valid=1.0, p_PD_B_x=4.0, p_PD_B_y=0.5, v_PD_B_x=-1.0, v_PD_B_z=0.35, gyro_x=0.1)
+    env = module.Added(belief)
+    seen, _ = env.reset(seed=0)
+    np.testing.assert_allclose(seen, [4.0, 0.5, 0.0, -1.0, 0.0, 0.3, 0.0, 0.0, 0.0, 1.0], atol=1e-6)
+    assert env.observation_space.contains(seen)
+    linear = np.array([0.79 * 0.2, 0.57 * 0.5, 1.38 * 0.3])
+    np.testing.assert_allclose(module.linear(seen), linear, rtol=1e-6)
+    for count in (1, 2):
+        seen, reward, *_ = env.step(np.array([1.0, -0.5, 7.0], np.float32))
+        acceleration = linear + 0.5 * np.array([1.0, -0.5, 1.0])
+        np.testing.assert_allclose(belief.commands[-1], [*(0.05 * count * acceleration), *acceleration], rtol=1e-6)
+        np.testing.assert_allclose(seen[6:9], 0.05 * count * acceleration, rtol=1e-6)
+    assert reward == 0.5
+    assert not env.reset()[0][6:9].any()
+
+
+def test_what_is_learned_accelerates_by_no_more_than_the_most_and_the_velocity_has_a_limit(example):
+    belief = _Belief(valid=1.0, p_PD_B_y=-4.0, v_PD_B_x=-0.2)
+    env = example("learn_policy").Added(belief)
+    env.reset(seed=0)
+    for _ in range(60):
+        seen, *_ = env.step(np.array([1.0, -1.0, 0.0], np.float32))
+    np.testing.assert_allclose(belief.commands[-1], [2.5, -2.5, 0.0, 1.0, -1.0, 0.0], rtol=1e-6)
+    np.testing.assert_allclose(seen[6:9], [2.5, -2.5, 0.0])
+
+
+def test_the_linear_policy_does_nothing_while_nothing_may_be_flown_on(example):
+    assert not example("learn_policy").linear(np.array([4.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])).any()
