@@ -4,10 +4,10 @@
 
 The source leaves schedule and stop rule open; here mu is counted in the largest diagonal entry of H'WH, starts at 1e-4
 of it, falls up to tenfold after a step as good as promised and rises tenfold after one that raises the cost, which is
-not taken. It has converged when the undamped step is shorter than a millionth of its own standard deviation, or promises
-less than the cost's rounding; after half of the steps a hundredth is enough. One mu for metres and MRP alike holds back
-what is hardly seen, the camera's place sideways, by orders of magnitude more than the rest: it seldom diverges, but
-arrives late. For the reproduction; it takes no prior.
+not taken. It has converged when the undamped step is shorter than a millionth of its own standard deviation, or
+promises less than the cost's rounding; after half of the steps a hundredth is enough. One mu for metres and MRP alike
+holds back what is hardly seen, the camera's place sideways, by orders of magnitude more than the rest: it seldom
+diverges, but arrives late. For the reproduction; it takes no prior.
 """
 
 from dockair.nav.pose.descent import Descent, DescentSettings, descend
