@@ -3,9 +3,9 @@
     pip install stable-baselines3
     python examples/learn_policy.py [STEPS] [EVALUATED]
 
-Who begins with nothing comes to hover astern, where nothing is lost (docs/environments.md#learning); this begins with a
-policy that docks now and then, and learns to do better. What it begins with and what it has learned are then flown on
-seeds that neither has met, the latter by camera, too.
+Who begins with nothing comes to hover astern, where nothing is lost; this begins with a policy that docks now and then.
+What it begins with and what it has learned are then flown on seeds that neither has met, the latter by camera, too.
+What it was worth, and what else was tried: docs/environments.md#with-a-library.
 """
 
 import os
@@ -99,7 +99,7 @@ def evaluated(policy: Callable[[Seen], Seen], name: str, flights: int) -> str:
     return f"{name}: good contact in {good} of {flights} on new seeds, {unsafe} unsafe"
 
 
-def main(steps: str = "50000", flights: str = "20") -> None:
+def main(steps: str = "40000", flights: str = "40") -> None:
     """Learn, and say what it was worth."""
     import torch
     from stable_baselines3 import SAC
