@@ -9,6 +9,7 @@ best. The gains before and after are then flown on seeds that no candidate has m
 import multiprocessing
 import os
 import sys
+from collections.abc import Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor
 from functools import cache, partial
 
@@ -22,11 +23,30 @@ from dockair.scenarios.schema import load_scenario
 INDEX = {entry.name: k for k, entry in enumerate(OBSERVATION)}
 TICKS, STEP_S = 5, 0.05  # of the control for which a command is held
 CONDITIONS = {"flight.duration_s": 8.0}  # a good approach is over after 6
-CLOSING_M_S = 1.2
+CLOSING_M_S, MOST_M_S, MOST_M_S2 = 1.2, 2.5, 1.0
 START, START_SIGMA = np.array([0.2, 0.2, 0.5]), np.array([0.5, 1.0, 0.5])
 SIGMA_MIN = 0.05  # of a gain: few elites look more alike than they are
 ELITES = 0.35  # part of the candidates
 TRAINED_FROM, EVALUATED_FROM = 1000, 2000  # first seeds; the second are never trained on
+
+
+def place_and_rate(observation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(3,) where the ring is [m], and (3,) how that changes in axes that turn with the receiver [m/s]."""
+    p, v, gyro = (observation[INDEX[name] : INDEX[name] + 3] for name in ("p_PD_B_x", "v_PD_B_x", "gyro_x"))
+    return p, v - np.cross(gyro, p)
+
+
+def linear(gains: Sequence[float] | np.ndarray, p: np.ndarray, rate: np.ndarray) -> np.ndarray:
+    """(3,) acceleration [m/s^2].
+
+    Args:
+        gains: (3,) on offset [1/s^2] and its rate [1/s] across; on the rate less that of closing [1/s], forward.
+        p: (3,) offset.
+        rate: (3,) of it.
+    """
+    wanted = gains[0] * p + gains[1] * rate
+    wanted[0] = gains[2] * (rate[0] + CLOSING_M_S)
+    return np.clip(wanted, -MOST_M_S2, MOST_M_S2)
 
 
 class LinearPolicy:
@@ -36,18 +56,14 @@ class LinearPolicy:
         """Start with no command.
 
         Args:
-            gains: (3,) on offset [1/s^2] and its rate [1/s] across; on the rate less that of closing [1/s], forward.
+            gains: (3,) of `linear`.
         """
         self._gains, self._velocity = gains, np.zeros(3)
 
     def __call__(self, observation: np.ndarray) -> np.ndarray:
         """Return the action for an observation."""
-        p, v, gyro = (observation[INDEX[name] : INDEX[name] + 3] for name in ("p_PD_B_x", "v_PD_B_x", "gyro_x"))
-        rate = v - np.cross(gyro, p)  # in turning axes
-        wanted = self._gains[0] * p + self._gains[1] * rate
-        wanted[0] = self._gains[2] * (rate[0] + CLOSING_M_S)
-        acceleration = np.clip(wanted, -1.0, 1.0) * observation[INDEX["valid"]]
-        self._velocity = np.clip(self._velocity + STEP_S * acceleration, -2.5, 2.5)
+        acceleration = linear(self._gains, *place_and_rate(observation)) * observation[INDEX["valid"]]
+        self._velocity = np.clip(self._velocity + STEP_S * acceleration, -MOST_M_S, MOST_M_S)
         return np.concatenate([self._velocity, acceleration]).astype(np.float32)
 
 

@@ -15,20 +15,15 @@ from typing import Any
 
 import gymnasium
 import numpy as np
+from learn_gains import EVALUATED_FROM, INDEX, MOST_M_S, MOST_M_S2, STEP_S, TICKS, linear, place_and_rate
 from numpy.typing import NDArray
 
-import dockair  # noqa: F401 - makes the environments known
-from dockair.scenarios.envs.tables import OBSERVATION
 from dockair.scenarios.schema import load_scenario
 
-INDEX = {entry.name: k for k, entry in enumerate(OBSERVATION)}
-TICKS, STEP_S = 5, 0.05  # of the control for which a command is held
 CONDITIONS = {"flight.duration_s": 10.0}
-CLOSING_M_S, MOST_M_S, MOST_M_S2 = 1.2, 2.5, 1.0
 GAINS = 0.57, 1.38, 0.79  # those that examples/learn_gains.py finds
 ADDED_MOST_M_S2 = 0.5  # to what the linear policy accelerates by, on each axis
 FAST, BY_CAMERA = "dockair/DockFast-v0", "dockair/Dock-v0"
-EVALUATED_FROM = 2000  # first seed: no flight that is learned from has one so small
 
 Seen = NDArray[np.float32]
 
@@ -60,15 +55,14 @@ class Added(gymnasium.Wrapper[Seen, Seen, NDArray[np.float64], Seen]):
     def step(self, action: Seen) -> tuple[Seen, float, bool, bool, dict[str, Any]]:
         """Accelerate by so much more."""
         added = ADDED_MOST_M_S2 * np.clip(action, -1.0, 1.0)
-        acceleration = np.clip(linear(self._now) + added, -MOST_M_S2, MOST_M_S2)
+        acceleration = np.clip(begun_with(self._now) + added, -MOST_M_S2, MOST_M_S2)
         self._velocity_m_s = np.clip(self._velocity_m_s + STEP_S * acceleration, -MOST_M_S, MOST_M_S)
         command = np.concatenate([self._velocity_m_s, acceleration]).astype(np.float32)
         observation, reward, terminated, truncated, info = self.env.step(command)
         return self._seen(observation), float(reward), terminated, truncated, info
 
     def _seen(self, observation: NDArray[np.float64]) -> Seen:
-        p, v, gyro = (observation[INDEX[name] : INDEX[name] + 3] for name in ("p_PD_B_x", "v_PD_B_x", "gyro_x"))
-        seen = [p, v - np.cross(gyro, p), self._velocity_m_s, [observation[INDEX["valid"]]]]
+        seen = [*place_and_rate(observation), self._velocity_m_s, [observation[INDEX["valid"]]]]
         self._now = np.concatenate(seen).astype(np.float32)
         return self._now
 
@@ -78,12 +72,9 @@ def made(name: str = FAST) -> Added:
     return Added(gymnasium.make(name, scenario=load_scenario("default", CONDITIONS), ticks_per_step=TICKS))
 
 
-def linear(seen: Seen) -> Seen:
+def begun_with(seen: Seen) -> Seen:
     """(3,) acceleration [m/s^2] of the linear policy, for (10,) of what is observed."""
-    p, rate, valid = seen[0:3], seen[3:6], seen[9]
-    wanted = GAINS[0] * p + GAINS[1] * rate
-    wanted[0] = GAINS[2] * (rate[0] + CLOSING_M_S)
-    return np.clip(wanted, -MOST_M_S2, MOST_M_S2) * valid
+    return linear(GAINS, seen[0:3], seen[3:6]) * seen[9]
 
 
 def evaluated(policy: Callable[[Seen], Seen], name: str, flights: int) -> str:

@@ -178,7 +178,7 @@ def test_what_is_learned_is_added_to_the_linear_policys_acceleration_and_the_vel
     np.testing.assert_allclose(seen, [4.0, 0.5, 0.0, -1.0, 0.0, 0.3, 0.0, 0.0, 0.0, 1.0], atol=1e-6)
     assert env.observation_space.contains(seen)
     linear = np.array([0.79 * 0.2, 0.57 * 0.5, 1.38 * 0.3])
-    np.testing.assert_allclose(module.linear(seen), linear, rtol=1e-6)
+    np.testing.assert_allclose(module.begun_with(seen), linear, rtol=1e-6)
     for count in (1, 2):
         seen, reward, *_ = env.step(np.array([1.0, -0.5, 7.0], np.float32))
         acceleration = linear + 0.5 * np.array([1.0, -0.5, 1.0])
@@ -199,4 +199,4 @@ def test_what_is_learned_accelerates_by_no_more_than_the_most_and_the_velocity_h
 
 
 def test_the_linear_policy_does_nothing_while_nothing_may_be_flown_on(example):
-    assert not example("learn_policy").linear(np.array([4.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])).any()
+    assert not example("learn_policy").begun_with(np.array([4.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])).any()
