@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from dockair.errors import DockairError
+from dockair.scenarios.dotted_key import is_within, parts_of
 from dockair.scenarios.toml_files import PLANS, SCENARIOS, read_toml, toml_value
 
 #: Setting the one replaces the other, which the file may have given.
@@ -62,7 +63,7 @@ class ScenarioFile:
     def place(self, where: str) -> str:
         """Return where a dotted key was written: `--set key`, or file and key."""
         for key in self._settings:
-            if where == key or where.startswith((f"{key}.", f"{key}[")) or key.startswith(f"{where}."):
+            if is_within(where, key) or is_within(key, where):
                 return f"--set {where}"
         return f"{self._shown}: {where}"
 
@@ -93,10 +94,28 @@ def _drop(table: dict[str, Any], key: str) -> None:
 
 
 def _set(table: dict[str, Any], key: str, value: object) -> None:
-    *names, last = key.split(".")
-    for name in names:
-        table = table.setdefault(name, {})
-        if not isinstance(table, dict):
-            raise DockairError(f"--set {key}", expected="a known key", got=key)
-    table.pop(_ALTERNATIVES.get(key, ""), None)
-    table[last] = value
+    """Lay a value over a table; tables that are missing are made, entries of lists are not.
+
+    Raises:
+        DockairError: what should hold the value is neither, or a list without that entry.
+    """
+    *outer, last = parts_of(key)
+    holder: Any = table
+    for part in outer:
+        _require_holds(holder, part, key)
+        holder = holder.setdefault(part, {}) if isinstance(part, str) else holder[part]
+    _require_holds(holder, last, key)
+    if isinstance(last, str):
+        holder.pop(_ALTERNATIVES.get(key, ""), None)
+    holder[last] = value
+
+
+def _require_holds(holder: object, part: str | int, key: str) -> None:
+    """Refuse a key in what is no table, and a place that a list does not have."""
+    if isinstance(part, str) and not isinstance(holder, dict):
+        raise DockairError(f"--set {key}", expected="a known key", got=key)
+    if isinstance(part, int):
+        count = len(holder) if isinstance(holder, list) else 0
+        if part >= count:
+            has = f"a place from 0 to {count - 1}" if count else "a list that has entries; set whole, it gets them"
+            raise DockairError(f"--set {key}", expected=has, got=f"[{part}]")

@@ -18,6 +18,7 @@ from dockair.scenarios.campaign.draws import Point
 from dockair.scenarios.campaign.plan import Entry
 from dockair.scenarios.campaign.plan_file import PlanFile
 from dockair.scenarios.campaign.points import points_of, refuse_too_many, seeds_of
+from dockair.scenarios.dotted_key import is_within, parts_of
 from dockair.scenarios.scenario_hash import SHEETS, file_hash, require_decisive, scenario_hash
 from dockair.scenarios.schema import Scenario, load_scenario
 from dockair.scenarios.toml_files import toml_text
@@ -151,11 +152,14 @@ def _from_folder(settings: Mapping[str, Any], folder: Path) -> dict[str, Any]:
 
 
 def _merged(layers: Layers) -> dict[str, Any]:
-    """Return what is set, the later last: of two keys that exclude each other the last one is flown."""
+    """Return what is set, the later last: of two keys that exclude each other the last one is flown.
+
+    What is set again, by itself or with the list or table that it stands in, is what it was set to last.
+    """
     settings: dict[str, Any] = {}
     for _, layer in layers:
         for key, value in layer.items():
-            settings.pop(key, None)  # a key that is set again would keep its place otherwise
+            settings = {earlier: was for earlier, was in settings.items() if not is_within(earlier, key)}
             settings[key] = value
     return settings
 
@@ -204,8 +208,11 @@ def _require_as_drawn(source: PlanFile, scenario: Scenario, point: Point) -> Non
 
 def _value_at(scenario: Scenario, key: str) -> Any:
     value: Any = scenario
-    for name in key.split("."):
-        value = value.get(name) if isinstance(value, Mapping) else getattr(value, name, None)
+    for part in parts_of(key):
+        if isinstance(part, int):
+            value = value[part] if isinstance(value, tuple | list) and part < len(value) else None
+        else:
+            value = value.get(part) if isinstance(value, Mapping) else getattr(value, part, None)
     return value
 
 
@@ -244,7 +251,7 @@ def _blamed(where: str, layers: Layers, otherwise: str) -> str:
         return f"{otherwise}: {where}"
     for place, layer in layers[::-1]:
         for key in layer:
-            if wrong == key or wrong.startswith((f"{key}.", f"{key}[")) or key.startswith(f"{wrong}."):
+            if is_within(wrong, key) or is_within(key, wrong):
                 return place.replace("{key}", key)
     return f"{otherwise}: {wrong}"
 

@@ -11,6 +11,7 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, Field
 
 from dockair.scenarios.campaign.draws import Draw, SamplerName
+from dockair.scenarios.dotted_key import holders_of
 from dockair.scenarios.refusal import Expected, refused
 from dockair.scenarios.tables.table import Table, tuple_from_list
 from dockair.streams import LARGEST_SEED
@@ -42,16 +43,10 @@ def flat(value: Any, is_value: Callable[[dict[str, Any]], bool] = operator.not_)
             raise refused("every key once", f"{key}, twice")
         level[key] = entry
     for key in level:
-        for table in _tables_of(key):
-            if table in level:  # an empty one: it would take the key's place, or not, as they are written
+        for table in holders_of(key):
+            if table in level:  # an empty one, or a list: it would take the key's place, or not, as they are written
                 raise refused("every key once", f"{table} and {key}")
     return level
-
-
-def _tables_of(key: str) -> Iterator[str]:
-    """Return what a dotted key stands in: of a.b.c a and a.b."""
-    parts = key.split(".")
-    return (".".join(parts[:i]) for i in range(1, len(parts)))
 
 
 def _dotted(table: dict[str, Any], is_value: Callable[[dict[str, Any]], bool]) -> Iterator[tuple[str, Any]]:

@@ -51,8 +51,9 @@ Every key that a scenario's file may have and that `--set KEY=VALUE` may change.
 {defaults}
 
 A key stands in its table: `sun.azimuth_deg` is `azimuth_deg` under `[sun]` in the file, `--set sun.azimuth_deg=80` on
-the command line. An array of tables is set whole: `--set 'faults=[{{kind="dead_reel"}}]'`. A key without a default
-is one that its table must have; "none" means that nothing is given or asked for. In the file, texts stand in quotes.
+the command line. An array of tables is set whole, `--set 'faults=[{{kind="dead_reel"}}]'`; one that is there, by an
+entry's place from 0 on, too: `--set 'faults[0].start_s=8'`. A key without a default is one that its table must
+have; "none" means that nothing is given or asked for. In the file, texts stand in quotes.
 
 Gains of guidance and of the filter are no keys of a scenario: they stand, with their reasons, in
 `nav/guidance/guidance_settings.py` and `nav/fusion_settings.py`.

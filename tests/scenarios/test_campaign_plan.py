@@ -403,6 +403,57 @@ def test_a_drawn_key_may_be_written_as_nested_tables_as_one_that_is_set(plan):
     assert [*nested[0].drawn] == ["turbulence.sigma_m_s"]
 
 
+def test_what_an_entry_of_a_list_has_is_drawn_by_its_place(plan):
+    """When a fault acts, over the plan's own list of faults; each flight is flown again by its command."""
+    text = """
+scenarios = ["default", "gyro_faults"]
+seeds = 4
+set.faults = [{ kind = "camera_drop_out", stop_s = 20.0 }, { kind = "dead_reel" }]
+[draw."faults[0].start_s"]
+low = 5.0
+high = 15.0
+"""
+    jobs = jobs_of(plan(text))
+    assert len({job.drawn["faults[0].start_s"] for job in jobs[:4]}) == 4
+    for job in jobs:
+        drop_out, reel = job.scenario.faults
+        assert (drop_out.start_s, drop_out.stop_s, reel.start_s) == (job.drawn["faults[0].start_s"], 20.0, 0.0)
+        assert flown_again(job) == job.scenario
+
+
+def test_a_list_that_is_set_later_replaces_what_was_set_in_an_earlier_one(plan):
+    text = """
+scenarios = [{ scenario = "gyro_faults", set = { "faults[8].limit_deg_s" = 9.0 } }]
+"""
+    (job,) = jobs_of(plan(text))
+    assert job.scenario.faults[8].limit_deg_s == 9.0
+    (job,) = jobs_of(plan(text, settings={"faults": '[{ kind = "dead_reel" }]'}))
+    assert ([*job.settings], len(job.scenario.faults)) == (["faults"], 1)
+    assert flown_again(job) == job.scenario
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ('[draw."faults[1].start_s"]\nvalues = [1.0]', 'draw."faults[1].start_s": expected a place from 0 to 0'),
+        ('[draw."faults[0].cover"]\nvalues = [0.1]', 'draw."faults[0].cover": expected a key of the kind led_off'),
+        (
+            '"faults[0].start_s" = 1.0',
+            "p.toml: set: expected every key once, got 'faults and faults[0].start_s'",
+        ),
+    ],
+)
+def test_a_place_that_the_list_does_not_have_is_refused_where_it_stands(plan, text, said):
+    faults = 'scenarios = ["default"]\n[set]\nfaults = [{ kind = "led_off" }]\n'
+    assert said in refusal_of(plan, faults + text)
+
+
+def test_a_list_from_the_command_line_may_not_replace_what_is_drawn_in_it(plan):
+    text = 'scenarios = ["gyro_faults"]\n[draw."faults[0].start_s"]\nvalues = [1.0, 3.0]'
+    said = refusal_of(plan, text, settings={"faults": '[{ kind = "dead_reel" }]'})
+    assert 'draw."faults[0].start_s": expected a key in whose place nothing else is set' in said
+
+
 def test_what_the_command_line_asks_in_vain_is_said_to_be_its_own(plan):
     assert refusal_of(plan, 'scenarios = ["default"]', settings={"start.aft_m": "-1"}).startswith(
         "--set start.aft_m: expected"

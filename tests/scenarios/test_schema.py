@@ -283,6 +283,39 @@ def test_a_wrong_value_of_the_file_is_the_files_though_a_key_that_its_own_begins
         load_scenario(path, {"navigation.heading": False})
 
 
+def test_an_entry_of_a_list_is_set_by_its_place():
+    """Of the file's list, or of one that was set before it."""
+    settings = {"faults[1].start_s": "4.1", "faults[0].rate_deg_s[2]": -0.25}
+    faults, before = load_scenario("gyro_faults", settings).faults, load_scenario("gyro_faults").faults
+    assert (faults[1].start_s, faults[0].rate_deg_s) == (4.1, (0.0, 0.5, -0.25))
+    assert (faults[2:], faults[0].start_s, faults[1].stop_s) == (before[2:], before[0].start_s, before[1].stop_s)
+    given = [{"kind": "led_off", "leds": [1, 2]}]
+    (fault,) = load_scenario("default", {"faults": given, "faults[0].leds[1]": 5, "faults[0].stop_s": 3.0}).faults
+    assert (fault.leds, fault.stop_s, given) == ((1, 5), 3.0, [{"kind": "led_off", "leds": [1, 2]}])
+    assert load_scenario("default", {"start.sigma_m": [0.1, 0.2, 0.3], "start.sigma_m[0]": 0.0}).start.sigma_m[0] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "said"),
+    [
+        ("faults[9].stop_s", 30.0, "faults[9].stop_s: expected a place from 0 to 8, got '[9]'"),
+        ("gusts[0].at_s", 3.0, "gusts[0].at_s: expected a list that has entries; set whole, it gets them, got '[0]'"),
+        ("flight[0]", 3.0, "flight[0]: expected a list that has entries"),
+        ("seed[0].x", 3.0, "seed[0].x: expected a list that has entries"),
+        ("faults.start_s", 3.0, "faults.start_s: expected a known key"),
+        ("faults[-1].start_s", 3.0, "faults[-1]: expected a known key, got 'faults[-1]'"),
+        ("faults[0].leds", [1], "faults[0]: expected a key of the kind gyro_bias_step, got 'leds'"),
+        ("faults[0].start", 1.0, "faults[0].start: expected a known key, got 'start'; exists:"),
+        ("faults[1].stop_s", 3.0, "faults[1].stop_s: expected"),
+        ("faults[0].rate_deg_s[1]", "x", "faults[0].rate_deg_s[1]: expected three numbers"),
+    ],
+)
+def test_an_entry_that_is_not_there_and_a_wrong_value_in_one_are_refused_as_settings(key, value, said):
+    with pytest.raises(DockairError) as caught:
+        load_scenario("gyro_faults", {key: value})
+    assert str(caught.value).startswith(f"--set {said}")
+
+
 @pytest.mark.parametrize("key", ["flight.airspeed_m_s.x", "seed.x"])
 def test_a_setting_below_a_plain_value_is_refused(scenario_file, key):
     path = scenario_file('name = "mine"\nseed = 1\nflight.airspeed_m_s = 180.0')
