@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from textwrap import fill
 from typing import Any
 
 import matplotlib as mpl
@@ -20,6 +21,9 @@ from dockair.scenarios.report.svg import STYLE, as_svg, say
 _FRAME_M = 0.6  # half the side of the picture of where tips went
 _NO_RIM = "no rim: this table does not say its radius"  # of before it was a column
 _CLOSING_AXIS_M_S = 2.8
+_SHARES_IN = 0.36  # height of a group's two shares
+_LINE_IN = 0.15  # of a label's line
+_LABEL_WIDTH = 60  # characters: a third of the picture
 _ROWS_APART_IN = 0.12  # half of the gap between a label and the title below it
 #: Outcomes of attempts whose tip never crossed the ring's plane; of a collision or a strike it may have, or not.
 _NOT_CROSSED = ("breakaway", "given_up", "timeout", "diverged")
@@ -27,13 +31,16 @@ _NOT_CROSSED = ("breakaway", "given_up", "timeout", "diverged")
 
 def overview(groups: Sequence[Group]) -> str:
     """Success of every group at the first attempt and within all, with Wilson's intervals."""
+    labels = [fill(g.label + g.mark, _LABEL_WIDTH, break_long_words=False, break_on_hyphens=False) for g in groups]
+    lines = max(label.count("\n") + 1 for label in labels)
     with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(12.0, 1.0 + 0.36 * len(groups)), layout="constrained")
+        row_in = max(_SHARES_IN, _LINE_IN * (lines + 1))
+        figure = Figure(figsize=(12.0, 1.0 + row_in * len(groups)), layout="constrained")
         ax = figure.subplots()
         for k, group in enumerate(groups):
             _share(ax, k - 0.13, group.success, "tab:blue", "o", "any attempt" if k == 0 else None)
             _share(ax, k + 0.13, group.first_attempt, "tab:orange", "s", "first attempt" if k == 0 else None)
-        ax.set_yticks(range(len(groups)), [g.label + g.mark for g in groups])
+        ax.set_yticks(range(len(groups)), labels)
         ax.set_ylim(len(groups) - 0.5, -0.5)
         ax.set_xlim(-2.0, 102.0)
         ax.set_xlabel("contact inside the limits [%], 95 % interval")

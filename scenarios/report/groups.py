@@ -36,7 +36,8 @@ SENSING_IN_WORDS = {"camera": "camera", "measurements": "measurement model", "tr
 NOT_SAID = "not said"  # in place of a cause
 _SPELT_OUT = 3  # keys that a plan draws: of more a title says how many
 _NO_WORD = re.compile(r"[^\w.]+")
-_IN_COLUMNS = ("navigation.navigator", "camera.sensing", "guidance.controller")  # keys whose values have a column
+#: Keys whose values have a column.
+_IN_COLUMNS = ("name", "navigation.navigator", "camera.sensing", "guidance.controller")
 
 
 def counted(count: int, noun: str) -> str:
@@ -81,7 +82,7 @@ class Group:
     sensing: str
     navigator: str
     controller: str
-    settings: str  #: keys set over the scenario as in `--set` or "KEY drawn"; sensing, navigator, controller left out
+    settings: str  #: keys set over the scenario as in `--set` or "KEY drawn"; those that have a column are left out
     rows: tuple[Row, ...]
 
     @property

@@ -749,6 +749,21 @@ def test_where_no_frame_has_a_figure_there_is_a_dash():
     assert ">nan" not in text and "nan<" not in text and "/ nan" not in text
 
 
+def test_a_long_list_that_is_set_leaves_the_overview_s_axes_their_width(monkeypatch):
+    """Its label has as many lines as it needs, and every group as much height."""
+    faults = "[" + ", ".join(f'{{ kind = "led_off", leds = [{k}], start_s = {k}.5 }}' for k in range(8)) + "]"
+    groups = groups_of([_row(1), _row(0, command=_command("light_gusts", 0, faults=faults, name="many"))])
+    monkeypatch.setattr(figures, "as_svg", lambda figure, name: figure)
+    figure = overview(groups)
+    figure.draw_without_rendering()
+    (ax,) = figure.axes
+    assert ax.get_position().width > 0.5
+    boxes = [label.get_window_extent() for label in ax.get_yticklabels()]
+    assert not boxes[0].overlaps(boxes[1])
+    long = ax.get_yticklabels()[1].get_text()
+    assert long.count("\n") > 4 and long.replace("\n", " ") == groups[1].label and "name=" not in long
+
+
 def test_no_text_from_outside_is_read_as_mathematics():
     """Of matplotlib's own language it would be nonsense, which raises."""
     sheet, phase = "/tmp/$^$x_y$.toml", "$^$"
