@@ -19,6 +19,9 @@ from dockair.scenarios.statistics import wilson_interval
 _LINE_INTERVAL_S = 30.0  # between two lines where stderr is no terminal
 _BAR = 20  # characters: the figures beside it fit on a terminal of 80
 _CELL = 48  # characters of settings that a table's cell can hold
+_TOO_NARROW = (
+    "\N{DAGGER} a seed occurs twice: its flights share gusts and hardware, so that the intervals are too narrow"
+)
 
 Row = Mapping[str, Any]
 
@@ -129,13 +132,15 @@ def show_campaign(table: Mapping[str, Any]) -> None:
     for name in crew:
         shown.add_column(name)
     cells, whole = _settings_cells(table["groups"])
+    if not all(group["independent"] for group in table["groups"]):
+        whole.append(f"  {_TOO_NARROW}")
     if any(cells):
         shown.add_column("set")
     for group, cell in zip(table["groups"], cells, strict=True):
         offset, speed = group["radial_offset_m"], group["closure_speed_m_s"]
         shown.add_row(
             *(group["scenario"], group["sensing"]),
-            *(_share(group[name], group["flights"]) for name in shares.values()),
+            *(_share(group[name], group) for name in shares.values()),
             f"{offset['median']:.3f} m" if offset else "",
             f"{speed['min']:.2f}-{speed['max']:.2f} m/s" if speed else "",
             *(str(group[name]) for name in ("unsafe", "errors")),
@@ -196,8 +201,9 @@ def _show_gate(console: Console, gate: Mapping[str, Any] | None) -> None:
         console.print(f"gate failed: {reason}", style="red", soft_wrap=True)
 
 
-def _share(share: Mapping[str, Any], flights: int) -> str:
-    return f"{share['count']}/{flights} ({100 * share['low']:.0f}-{100 * share['high']:.0f} %)"
+def _share(share: Mapping[str, Any], group: Mapping[str, Any]) -> str:
+    mark = "" if group["independent"] else " \N{DAGGER}"
+    return f"{share['count']}/{group['flights']} ({100 * share['low']:.0f}-{100 * share['high']:.0f} %){mark}"
 
 
 def _in_words(seconds: float) -> str:

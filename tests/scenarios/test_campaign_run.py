@@ -1008,6 +1008,15 @@ def test_none_unsafe_is_told_as_a_number(here, tmp_path, capsys):
     assert heading.split()[-2:] == ["unsafe", "errors"] and row.split()[-2:] == ["0", "0"]
 
 
+def test_intervals_of_flights_that_share_a_seed_are_marked_as_too_narrow(here, tmp_path, capsys):
+    over = fly(plan(tmp_path, 2), tmp_path / "out").to_dict()
+    for independent, marks in ((True, 0), (False, 4)):  # three rates, and what the mark means
+        capsys.readouterr()
+        show_campaign(over | {"groups": [group | {"independent": independent} for group in over["groups"]]})
+        shown = capsys.readouterr().out
+        assert shown.count("\N{DAGGER}") == marks and ("too narrow" in shown) == (not independent)
+
+
 def test_flights_that_are_flown_again_count_once(here, tmp_path):
     fly(plan(tmp_path, 4), tmp_path / "out", "never")
     text = io.StringIO()
