@@ -8,6 +8,7 @@ from typing import Any
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.patches import Circle
@@ -113,6 +114,9 @@ def _places(attempts: Sequence[Mapping[str, Any]]) -> Array:
 
 def _closing(ax: Axes, group: Group) -> None:
     ax.set_title("closing speed of the contacts")
+    if not group.contacts:
+        say(ax, "no contact")
+        return
     ax.axvspan(*CLOSING_BAND_M_S, color="tab:green", alpha=0.12)
     ax.axvline(GOOD_CONTACT.closure_speed_m_s, color="tab:red", linestyle="--")
     speeds = group.closing_m_s
@@ -148,8 +152,8 @@ def _navigation(ax: Axes, group: Group) -> None:
         ax.plot(middle, [1e3 * entry[f"{name}_rmse_m"] for entry in bins], "o-", color=colour, label=name, markersize=3)
         ax.plot(middle, [1e3 * entry[f"{name}_sigma_m"] for entry in bins], "--", color=colour)
     ax.set(xlabel="range from the camera [m]", ylabel="RMS [mm]", xscale="log", yscale="log")
-    ax.set_xticks([2, 3, 5, 7, 10, 20], ["2", "3", "5", "7", "10", "20"])
-    ax.set_yticks([0.3, 1, 3, 10, 30, 100], ["0.3", "1", "3", "10", "30", "100"])
+    _ticks(ax.xaxis, (1, 2, 3, 5, 7, 10, 20), 2, 20)
+    _ticks(ax.yaxis, (0.1, 0.3, 1, 3, 10, 30, 100, 300, 1000, 3000, 10_000), 0.3, 100)
     ax.minorticks_off()
     ax.grid(alpha=0.3)
     ax.legend(frameon=False)
@@ -194,6 +198,13 @@ def _headings(ax: Axes, headings: Headings) -> None:
     ax.set(xlabel=f"size of the error [deg]{lost}", ylabel="share of the flights", ylim=(-0.02, 1.02))
     ax.set_xlim(left=0.0)
     ax.legend(frameon=False, fontsize=7, loc="lower right")
+
+
+def _ticks(axis: Axis, ticks: Sequence[float], low: float, high: float) -> None:
+    """Set the ticks from low to high, and those beyond, as far as there are values."""
+    first, last = axis.get_data_interval()
+    chosen = [tick for tick in ticks if min(low, first) <= tick <= max(high, last)]
+    axis.set_ticks(chosen, [f"{tick:g}" for tick in chosen])
 
 
 def _whole_numbers() -> MaxNLocator:

@@ -497,6 +497,24 @@ def test_closing_speeds_are_counted_in_bins_of_5_cm_s_over_the_band_of_practice_
     assert set(ax.lines[0].get_xdata()) == {2.6}
 
 
+def test_without_a_contact_the_panel_of_closing_speeds_says_so(monkeypatch):
+    missed = groups_of([_row(0, attempts=[_attempt(1, "miss", 0.4, "gust")])])[0]
+    ax = _axes_of(missed, monkeypatch)["closing speed of the contacts"]
+    assert [text.get_text() for text in ax.texts] == ["no contact"] and not ax.patches and not ax.axison
+
+
+def test_errors_by_range_have_ticks_as_far_as_they_go(monkeypatch):
+    """One error of 2 m, and the nearest bin, which is drawn at 1 m; and two that the usual axis holds."""
+    usual = ["2", "3", "5", "7", "10", "20"], ["0.3", "1", "3", "10", "30", "100"]
+    far = ["1", *usual[0]], [*usual[1], "300", "1000"]
+    for bins, expected in (((_bin(4, 2e-3), _bin(4, 5e-3, low_m=3.0)), usual), ((_bin(4, 2.0, low_m=0.0),), far)):
+        (group,) = groups_of(
+            [_row(0, nav_by_range=json.dumps([entry | {"high_m": 2.0 + entry["low_m"]} for entry in bins]))]
+        )
+        ax = _axes_of(group, monkeypatch)["navigation error (lines), expected (dashed)"]
+        assert tuple([label.get_text() for label in axis.get_ticklabels()] for axis in (ax.xaxis, ax.yaxis)) == expected
+
+
 def test_why_attempts_failed_stands_above_why_flights_began_none(monkeypatch):
     rows = [_row(0, attempts=[_attempt(1, "miss", 0.4, "gust"), _attempt(2, "miss", 0.4, "bow_wave")])]
     rows += [_row(1, attempts=[_attempt(1, "miss", 0.4, "gust")]), _without_attempt(2, "never_steady")]
@@ -588,6 +606,23 @@ def test_each_count_of_a_pair_and_of_a_group_stands_in_its_column_of_the_page():
     assert vision[-7:] == ["7", "7", "2", "4", "0.500", "1", "3"]
     (crews,) = _table(text, "Two crews side by side")
     assert crews[2:-1] == ["7", "7", "3", "2", "2", "1"]  # pid stands first
+
+
+def test_the_heading_of_a_column_of_numbers_stands_above_them():
+    """On the right, as they do: on the left it would stand nearer to the numbers of the column before."""
+    missed = {"attempts": [_attempt(1, "miss", 0.4, "gust")], "nav_by_range": json.dumps([_bin(4, 2e-3)])}
+    pid = _flown_by({"guidance.controller": "pid"}, 0, True)
+    text = page("made", [_campaign([_row(0), _row(1, **missed), _row(0, sensing="truth"), pid])])
+    tables = re.findall(r"<table>\s*<tr>(<th.*?)</tr>\s*<tr[^>]*>(.*?)</tr>", text, re.DOTALL)
+    cells = [[re.findall(r"<t[hd]([^>]*)>", row) for row in two] for two in tables]
+    of_numbers = [[["n" in re.findall(r"\w+", cell) for cell in row] for row in two] for two in cells]
+    assert len(of_numbers) == 6 and all(heading == numbers for heading, numbers in of_numbers)
+
+
+def test_every_picture_can_be_scrolled_where_the_page_is_narrow():
+    """Squeezed into a narrow page its labels could not be read."""
+    text = page("made", [_campaign([_row(0, timeline=json.dumps([{"phase": "clear", "begun_s": 0.0, "reason": ""}]))])])
+    assert text.count("<svg") == text.count('<div class="picture"><svg') == 3
 
 
 def test_the_page_needs_no_other_file_and_its_links_lead_somewhere():
