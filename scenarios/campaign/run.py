@@ -108,6 +108,8 @@ def run(
                     entry = _entry(outcome)
                     journal.append(entry)
                     told(entry["row"], outcome.answer.wall_time_s)
+        if left:
+            campaign_folder.remove_results(out)  # a report made meanwhile is of fewer flights than are done
         timing = {"workers": workers, "flown_last": len(left), "wall_time_last_s": time.perf_counter() - begun}
         return _finish(source, out, jobs, [journal.entries[job.key] for job in jobs], timing)
 

@@ -1008,6 +1008,12 @@ def test_none_unsafe_is_told_as_a_number(here, tmp_path, capsys):
     assert heading.split()[-2:] == ["unsafe", "errors"] and row.split()[-2:] == ["0", "0"]
 
 
+def test_a_report_made_while_a_campaign_runs_is_not_left_beside_the_rows_of_all_flights(here, tmp_path):
+    page = tmp_path / "out/report.html"
+    fly(plan(tmp_path), tmp_path / "out", watch=lambda jobs, entries: lambda row, wall_s: page.write_text("of fewer"))
+    assert not page.exists() and read_table(tmp_path / "out")
+
+
 def test_intervals_of_flights_that_share_a_seed_are_marked_as_too_narrow(here, tmp_path, capsys):
     over = fly(plan(tmp_path, 2), tmp_path / "out").to_dict()
     for independent, marks in ((True, 0), (False, 4)):  # three rates, and what the mark means
