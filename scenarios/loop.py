@@ -116,8 +116,7 @@ class Flight:
         signal = self._pod_light.due(truth.time_s, truth.reel_position_m)
         if signal is not None:
             signal_to(self.navigator, signal)
-        # LEDs in place of a frame only where they are asked for
-        solution = step_navigator(self.navigator, imu, frame)  # type: ignore[arg-type]
+        solution = step_navigator(self.navigator, imu, frame)
         self._next_command = solution.command
         self._window, self._exposure_s = solution.window or self.sheets.camera.full_window, solution.exposure_s
         outcome = self.referee.judge(

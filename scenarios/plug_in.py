@@ -1,15 +1,27 @@
 """A navigator of one's own, named in a scenario: what it has to be, and what is said when it fails.
 
 An exception out of somebody's own navigator is that somebody's mistake: one line that names the place. One out of
-Dockair's navigators is a mistake of ours and keeps its traceback.
+Dockair's navigators is a mistake of ours and keeps its traceback. What is logged shares no array with somebody's own
+navigator, which may overwrite those that it keeps from one tick to the next.
 """
 
 import inspect
 from collections.abc import Callable, Sequence
+from dataclasses import fields, replace
 from typing import Any, TypeVar
 
+import numpy as np
+
 from dockair.errors import DockairError
-from dockair.messages import CameraFrame, ImuSample, Navigates, NavSolution, PodSignal, TankerAnnouncement
+from dockair.messages import (
+    CameraFrame,
+    ImuSample,
+    LedObservation,
+    Navigates,
+    NavSolution,
+    PodSignal,
+    TankerAnnouncement,
+)
 from dockair.scenarios.answer import check_answer
 from dockair.scenarios.exact_json import import_by_name, name_of, said_by
 
@@ -47,20 +59,27 @@ def make_navigator(navigator_class: Callable[..., Navigates], *given: Any) -> Na
     return made
 
 
-def step_navigator(navigator: Navigates, imu: Sequence[ImuSample], frame: CameraFrame | None) -> NavSolution:
+def step_navigator(
+    navigator: Navigates, imu: Sequence[ImuSample], frame: CameraFrame | LedObservation | None
+) -> NavSolution:
     """Return what a navigator answers in a control tick.
 
     Raises:
         DockairError: it is somebody's own and raises an exception, or answers something else than a NavSolution whose
             fields are what `dockair.messages` says.
     """
+    is_ours = _is_ours(type(navigator))
+    if not is_ours:
+        imu = tuple(_copied(sample) for sample in imu)
+        frame = _copied(frame) if isinstance(frame, LedObservation) else frame  # a frame's pixels are read-only
     answer = _called(type(navigator), "step(imu, frame) without an exception", navigator.step, imu, frame)
     if not isinstance(answer, NavSolution):
         expected = "a NavSolution from step(imu, frame)"
         raise DockairError(name_of(type(navigator)), expected=expected, got=type(answer).__name__)
-    if not _is_ours(type(navigator)):
-        check_answer(name_of(type(navigator)), answer)
-    return answer
+    if is_ours:
+        return answer
+    check_answer(name_of(type(navigator)), answer)
+    return replace(_copied(answer), command=_copied(answer.command))
 
 
 def announce_to(navigator: Navigates, announcement: TankerAnnouncement) -> None:
@@ -98,6 +117,13 @@ def _called(owner: Any, expected: str, function: Callable[..., T], *given: Any) 
             raise
         package = owner.__module__.partition(".")[0]
         raise DockairError(name_of(owner), expected=expected, got=said_by(error, package)) from error
+
+
+def _copied(message: T) -> T:
+    """Return a message with arrays of its own."""
+    values = {f.name: getattr(message, f.name) for f in fields(message)}  # type: ignore[arg-type]
+    arrays = {name: value.copy() for name, value in values.items() if isinstance(value, np.ndarray)}
+    return replace(message, **arrays)  # type: ignore[type-var]
 
 
 def _is_ours(owner: Any) -> bool:

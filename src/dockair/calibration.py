@@ -248,12 +248,21 @@ class Mounting:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class StartGeometry:
-    """Nominal pre-contact geometry and how far it may be off: all that the navigation knows before its first frame."""
+    """Nominal pre-contact geometry and how far it may be off: all that the navigation knows before its first frame.
+
+    The arrays are read-only, in a flight as in its replay: a navigator that counts on from one has to copy it.
+    """
 
     p_PD_B: Array  #: (3,) drogue ring centre from the probe's tip, body axes [m]
     sigma_p_m: Array  #: (3,) its standard deviation, body axes [m]
     R_BD: Array  #: (3, 3) drogue axes in body axes
     sigma_R_rad: Array  #: (3,) standard deviation of the attitude that it returns to, about each axis
+
+    def __post_init__(self) -> None:
+        for name in (f.name for f in fields(self)):
+            array = np.array(getattr(self, name), dtype=float)
+            array.setflags(write=False)
+            object.__setattr__(self, name, array)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -1,5 +1,6 @@
 """What a navigator of one's own has to be, and what is said of one that is not."""
 
+import copy
 import dataclasses
 import linecache
 import re
@@ -8,11 +9,12 @@ import numpy as np
 import pytest
 
 from dockair.errors import DockairError
-from dockair.messages import NavSolution, ReceiverCommand, Window
+from dockair.messages import ImuSample, LedObservation, NavSolution, ReceiverCommand, Window
 from dockair.nav.guidance.phases import Phase
 from dockair.nav.navigator import Navigator
 from dockair.scenarios import plug_in
 from dockair.scenarios.loop import fly
+from dockair.scenarios.message_log import estimate_row
 from dockair.scenarios.navigator_recipe import NavigatorRecipe
 from dockair.scenarios.plug_in import announce_to, navigator_class_of, signal_to, step_navigator
 from dockair.scenarios.schema import load_scenario
@@ -180,6 +182,60 @@ GOOD = NavSolution(
 )  # fmt: skip
 
 
+class Overwrites(Steps):
+    """Keeps all arrays that it is given and answers; writes into them in every tick."""
+
+    def __init__(self, sheets):
+        command = ReceiverCommand(velocity_m_s=np.zeros(3), acceleration_m_s2=np.zeros(3))
+        self.answer = dataclasses.replace(GOOD, p_PD_B=np.zeros(3), covariance=np.eye(9), command=command)
+
+    def step(self, imu, frame):
+        given = [sample.angular_rate_rad_s for sample in imu] + [sample.specific_force_m_s2 for sample in imu]
+        answered = [self.answer.p_PD_B, self.answer.covariance, *self._of_the_command()]
+        for array in given + answered + ([] if frame is None else [frame.centroids_px, frame.sigma_px]):
+            array += 1.0
+        if frame is not None:
+            frame.led_numbers[:] = 0
+        return self.answer
+
+    def _of_the_command(self):
+        return self.answer.command.velocity_m_s, self.answer.command.acceleration_m_s2
+
+
+def test_a_navigator_that_overwrites_its_arrays_changes_nothing_that_was_said_before():
+    rates, pixels = np.zeros(3), np.zeros((2, 2))
+    imu = (ImuSample(time_stamp_s=0.0, angular_rate_rad_s=rates, specific_force_m_s2=rates),)
+    seen = LedObservation(time_stamp_s=0.0, led_numbers=np.array([3, 4]), centroids_px=pixels, sigma_px=np.ones(2))
+    navigator = Overwrites(None)
+    first = step_navigator(navigator, imu, seen)
+    before = copy.deepcopy(_numbers_of(first))
+    second = step_navigator(navigator, imu, seen)
+    for name, now in _numbers_of(first).items():
+        np.testing.assert_array_equal(now, before[name])
+    assert second.p_PD_B[0] == second.command.velocity_m_s[0] == first.p_PD_B[0] + 1.0
+    assert not rates.any() and not pixels.any() and seen.led_numbers.tolist() == [3, 4] and (seen.sigma_px == 1.0).all()
+
+
+def _numbers_of(solution):
+    return {name: value for name, value in estimate_row(solution).items() if not isinstance(value, str)}
+
+
+class CountsOn(Steps):
+    """From the start's place, which it did not copy."""
+
+    def __init__(self, sheets):
+        self.p = sheets.start.p_PD_B
+
+    def step(self, imu, frame):
+        self.p += 1.0
+
+
+def test_the_start_is_not_to_be_written_into_in_a_flight_as_in_its_replay():
+    changes = {"navigation.navigator": f"{HERE}:CountsOn", "camera.sensing": "measurements"}
+    with pytest.raises(DockairError, match=r"CountsOn: expected step.*got 'ValueError: output array is read-only \("):
+        fly(load_scenario("still_air", changes), 0)
+
+
 class Answers(Steps):
     def __init__(self, **changes):
         self.answer = dataclasses.replace(GOOD, **changes)
@@ -199,7 +255,9 @@ class Answers(Steps):
 )
 def test_a_solution_that_can_be_flown_is_passed_on(changes):
     navigator = Answers(**changes)
-    assert step_navigator(navigator, (), None) is navigator.answer
+    passed_on = step_navigator(navigator, (), None)
+    for name, value in estimate_row(navigator.answer).items():
+        np.testing.assert_array_equal(estimate_row(passed_on)[name], value)
 
 
 @pytest.mark.parametrize(
