@@ -450,6 +450,15 @@ def test_a_picture_shows_a_frame_whose_range_is_known_though_a_navigator_of_ones
     assert drawn[0][-1] == pytest.approx(4.005)  # the hand-made belief is 5 mm off
 
 
+def test_a_picture_is_drawn_of_a_belief_that_is_claimed_to_be_worth_nothing(hand_made, tmp_path):
+    """A navigator of one's own may call its place infinitely unsure."""
+    log = FlightLog()
+    for truth, imu, frame, solution in hand_made.ticks(20):
+        log.append(truth, imu, frame, replace(solution, covariance=np.full((9, 9), np.inf)))
+    log.write_parquet(tmp_path)
+    assert picture_of_flight(tmp_path).stat().st_size > 10_000
+
+
 def test_a_picture_shows_the_frame_with_most_leds_named_though_another_is_nearer_to_the_range(
     hand_made, tmp_path, monkeypatch
 ):
