@@ -107,9 +107,10 @@ def _in_words(shape: tuple[int | str, ...]) -> str:
 
 
 def _shown(value: Any) -> str:
-    """In one line: an array of other shape or kind by these, small ones by their numbers."""
+    """In one line: an array of other shape or kind by these, small ones by their numbers; a list as what it is."""
     if isinstance(value, np.ndarray):
-        if value.size <= 9 and value.dtype.kind in "fiu":
+        if value.ndim > 0 and value.size <= 9 and value.dtype.kind in "fiu":
             return f"{value.tolist()}"
         return f"an array {value.shape} of {value.dtype}"
-    return " ".join(repr(value).split())[:80] if value is not None else "None"
+    said = " ".join(repr(value).split())[:80]
+    return f"the list {said}" if isinstance(value, list) else said
