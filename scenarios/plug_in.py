@@ -78,8 +78,9 @@ def step_navigator(
         raise DockairError(name_of(type(navigator)), expected=expected, got=type(answer).__name__)
     if is_ours:
         return answer
+    answer = _copied(answer)
     check_answer(name_of(type(navigator)), answer)
-    return replace(_copied(answer), command=_copied(answer.command))
+    return replace(answer, command=_copied(answer.command))
 
 
 def announce_to(navigator: Navigates, announcement: TankerAnnouncement) -> None:
@@ -120,9 +121,9 @@ def _called(owner: Any, expected: str, function: Callable[..., T], *given: Any) 
 
 
 def _copied(message: T) -> T:
-    """Return a message with arrays of its own."""
-    values = {f.name: getattr(message, f.name) for f in fields(message)}  # type: ignore[arg-type]
-    arrays = {name: value.copy() for name, value in values.items() if isinstance(value, np.ndarray)}
+    """Return a message with arrays of its own, and these numpy's plain ones: no matrix, and nothing masked."""
+    values = {f.name: getattr(message, f.name) for f in fields(message) if f.init}  # type: ignore[arg-type]
+    arrays = {name: np.array(value) for name, value in values.items() if isinstance(value, np.ndarray)}
     return replace(message, **arrays)  # type: ignore[type-var]
 
 

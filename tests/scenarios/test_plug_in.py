@@ -251,6 +251,7 @@ class Answers(Steps):
         {"valid": np.bool_(False), "p_PD_B": np.full(3, np.nan), "covariance": np.full((9, 9), np.nan)},
         {"window": Window(0, 10, np.int64(0), 10), "exposure_s": 1e-4, "candidates_px": np.zeros((5, 2))},
         {"time_stamp_s": 3, "covariance": np.full((9, 9), np.nan)},
+        {"p_PD_B": np.ma.masked_array(np.ones(3), mask=[0, 1, 0])},
     ],
 )
 def test_a_solution_that_can_be_flown_is_passed_on(changes):
@@ -258,6 +259,7 @@ def test_a_solution_that_can_be_flown_is_passed_on(changes):
     passed_on = step_navigator(navigator, (), None)
     for name, value in estimate_row(navigator.answer).items():
         np.testing.assert_array_equal(estimate_row(passed_on)[name], value)
+    assert type(passed_on.p_PD_B) is np.ndarray
 
 
 @pytest.mark.parametrize(
