@@ -67,6 +67,7 @@ def picture_of_flight(out_dir: str | Path, limits: RefereeLimits | None = None) 
     upper = figure.add_subplot(below[0, -1])
     _draw_approach(upper, flight)
     _draw_errors([figure.add_subplot(below[k, -1], sharex=upper) for k in (1, 2, 3)], flight)
+    figure.draw_without_rendering()  # the layout goes by the ticks of before the axes had their aspect
     figure.savefig(folder / FILE_NAME, pil_kwargs={"optimize": True})
     return folder / FILE_NAME
 

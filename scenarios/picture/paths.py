@@ -51,14 +51,17 @@ def draw_side_view(axes: Any, flight: Any, limits: RefereeLimits) -> None:
 
 def draw_along_axis(figure: Any, axes: Any, flight: Any, limits: RefereeLimits) -> None:
     """Draw the tip's last metres before the ring as the receiver sees them, with the basket's rim and the limit."""
-    _, moment = contact(flight)
-    p_DP = tip_in_drogue_axes(flight)[: moment + 1]
+    p_DP = tip_in_drogue_axes(flight)
+    p_DP = p_DP[: path_end(p_DP[:, 0], *contact(flight)) + 1]
     begin = approach_begin(p_DP[:, 0])
     path = p_DP[begin:]
     angle = np.linspace(0.0, 2.0 * np.pi, 97)
-    for radius, style, label in ((limits.rim_radius_m, "-", "rim"), (limits.radial_offset_m, "--", "good docking")):
+    for radius, style in ((limits.rim_radius_m, "-"), (limits.radial_offset_m, "--")):
         axes.plot(radius * np.cos(angle), radius * np.sin(angle), color=HOSE, lw=1.2, ls=style)
-        axes.text(0.0, radius, f"{label}, {radius:.2f} m", fontsize=7, ha="center", va="bottom")
+    outer = max(limits.rim_radius_m, limits.radial_offset_m)
+    above, below = f"rim, {limits.rim_radius_m:.2f} m", f"dashed: good docking, {limits.radial_offset_m:.2f} m"
+    for height, words, side in ((outer, above, "bottom"), (-outer, below, "top")):  # after a wide miss they are small
+        axes.text(0.0, height, words, fontsize=7, ha="center", va=side)
     to_go = np.maximum(-path[:, 0], 0.0)
     points = axes.scatter(path[:, 1], path[:, 2], c=to_go, cmap="viridis", s=5, vmin=0.0, zorder=3)
     crossing = ring_crossing(path[:, 0])
@@ -84,6 +87,18 @@ def approach_begin(forward_m: Array) -> int:
     """Return the tick at which the tip last came nearer than _FROM_M behind the ring; the first if it always was."""
     farther = np.flatnonzero(forward_m < -_FROM_M)
     return int(farther[-1]) + 1 if len(farther) and farther[-1] + 1 < len(forward_m) else 0
+
+
+def path_end(forward_m: Array, held: bool, moment: int) -> int:
+    """Return the tick at which the way to the ring ends, from the one of the hold or of the nearest point.
+
+    A tip that goes apart from the drogue's axis is nearest before it comes into the ring's plane, where the referee
+    takes its miss: the way goes on to there, if it does not go back over _FROM_M first.
+    """
+    if held or forward_m[moment] >= 0.0:
+        return moment
+    ends = np.flatnonzero((forward_m[moment:] >= 0.0) | (forward_m[moment:] < -_FROM_M))
+    return moment + int(ends[0]) if len(ends) and forward_m[moment + ends[0]] >= 0.0 else moment
 
 
 def ring_crossing(forward_m: Array) -> int | None:

@@ -15,6 +15,7 @@ from dockair.scenarios.picture.paths import (
     approach_begin,
     draw_along_axis,
     draw_side_view,
+    path_end,
     ring_crossing,
     tip_in_drogue_axes,
 )
@@ -45,6 +46,27 @@ def test_the_cross_stands_where_the_tip_last_comes_into_the_rings_plane_from_beh
     assert ring_crossing(np.array([-2.0, -0.1, 0.02, 0.2])) == 2
     assert ring_crossing(np.array([-2.0, -0.1, 0.02, -0.05, -0.01, 0.0, 0.2])) == 5
     assert ring_crossing(np.array([-2.0, -0.1])) is None
+
+
+def test_the_way_of_a_miss_goes_on_to_the_rings_plane_where_it_is_judged():
+    """A tip that goes aside as it comes is nearest before the plane; one that turns back never comes to it."""
+    comes = np.array([-4.0, -1.0, -0.4, -0.1, 0.2, 0.5])
+    assert path_end(comes, False, 2) == 4
+    assert path_end(comes, True, 2) == 2
+    assert path_end(comes, False, 5) == 5
+    assert path_end(np.array([-4.0, -1.0, -0.4, -2.0, -3.5, 0.2]), False, 2) == 2
+    assert path_end(np.array([-4.0, -1.0, -0.4, -2.0]), False, 2) == 2
+
+
+def test_of_a_wide_miss_the_words_for_rim_and_limit_stay_apart(hand_made, tmp_path):
+    ticks = [hand_made.tick(k) for k in (600, 630)]
+    aside = [(replace(truth, p_WP=truth.p_WP + np.array([0.0, 4.0, 0.0])), *rest) for truth, *rest in ticks]
+    figure = Figure(figsize=(3.0, 2.5))
+    axes = figure.add_subplot()
+    draw_along_axis(figure, axes, _flight(tmp_path, aside), RefereeLimits())
+    figure.draw_without_rendering()
+    above, below = (text.get_window_extent() for text in axes.texts)
+    assert above.y0 > below.y1
 
 
 def test_the_rim_is_that_of_the_ring_that_was_flown(hand_made, tmp_path):

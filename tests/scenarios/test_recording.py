@@ -401,6 +401,18 @@ def test_the_picture_of_a_flight_is_small_and_not_blank(flown):
     assert pixels.std() > 10.0
 
 
+def test_no_word_of_a_picture_is_cut_off_where_the_tip_goes_far_up_and_down(hand_made, tmp_path):
+    """An equal scale on both axes brings finer ticks, whose longer numbers push the words beside them out."""
+    log = FlightLog()
+    for k in range(1, 700, 20):
+        truth, imu, _, solution = hand_made.tick(k)
+        up = np.array([0.0, 0.0, 2.0 * np.sin(k / 70.0)])
+        log.append(replace(truth, p_WP=truth.p_WP + up), imu, None, solution)
+    log.write_parquet(tmp_path)
+    pixels = np.asarray(Image.open(picture_of_flight(tmp_path)).convert("L"))
+    assert (pixels[:, :2] > 250).all()
+
+
 def test_a_picture_shows_the_only_frame_of_a_camera_that_drops_out_after_it(hand_made, tmp_path, monkeypatch):
     """The frame of tick 2 stays the last one used; the frame drawn is that one."""
     log = FlightLog()
