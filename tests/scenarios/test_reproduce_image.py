@@ -6,6 +6,7 @@ import cv2
 import mujoco
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from dockair.nav.image.labelling import label_contour_tracing
 from dockair.scenarios.reproduce import registry
@@ -32,8 +33,22 @@ def folder(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def made(folder):
-    return {wanted: registry.reproduce(wanted, folder) for wanted in (*DRAWN, *SIMULATED)}
+def drawn():
+    """Filled by `made`: the figure of each picture, by the picture's name."""
+    return {}
+
+
+@pytest.fixture(scope="module")
+def made(folder, drawn):
+    save = Figure.savefig
+
+    def keep(figure, path, **options):
+        drawn[path.name] = figure
+        save(figure, path, **options)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Figure, "savefig", keep)
+        return {wanted: registry.reproduce(wanted, folder) for wanted in (*DRAWN, *SIMULATED)}
 
 
 def _cases(result):
@@ -49,6 +64,18 @@ def test_each_has_the_printed_form_is_json_and_draws_a_picture(made, folder, wan
         assert list(row) == ["case", "ours", "reference"]
         assert row["reference"].keys() <= row["ours"].keys()
     assert cv2.imread(str(folder / picture_name(wanted))).std() > 10.0
+
+
+@pytest.mark.parametrize("wanted", ["image/fig10", "image/fig11", "image/fig16", "image/fig17", "image/fig18-20"])
+def test_an_axis_with_numbers_says_what_they_are(made, drawn, wanted):
+    panels = [axes for axes in drawn[picture_name(wanted)].axes if axes.name == "rectilinear"]
+    assert all("px" in axes.get_ylabel() or "votes" in axes.get_ylabel() for axes in panels)
+
+
+def test_the_kalman_filters_picture_says_the_mean_nis_of_the_table(made, drawn):
+    titles = [axes.get_title() for axes in drawn[picture_name("image/fig18-20")].axes[::2]]
+    rows = made["image/fig18-20"]["rows"]
+    assert [title.split()[-1] for title in titles] == [f"{row['ours']['mean_nis']:.3f}" for row in rows]
 
 
 def test_the_whole_chapter_is_registered():

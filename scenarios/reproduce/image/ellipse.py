@@ -111,5 +111,6 @@ def _draw(leds: Array, path: Path) -> None:
     draw_points(right, ellipse.to_circle(seen), color="black")
     draw_points(right, ellipse.to_circle(leds[list(_MISSING)]), mfc="none", color="black", ms=7.0)
     right.set_title("projected to the circle: spokes every 45°", fontsize=9)
+    right.set(xlabel="[px]", ylabel="[px]")
     left.legend(frameon=False, fontsize=8, loc="center")
     figure.savefig(path)

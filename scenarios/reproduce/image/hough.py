@@ -168,8 +168,9 @@ def _draw_alone(points: Array, votes: Votes, path: Path) -> None:
             _circle(left, point, radius, lw=0.8, color=colour)
     draw_points(left, points, color="black")
     left.set_title("circles around each LED: 48 px (grey), 80 px (blue)", fontsize=9)
-    left.set(xlim=(0, SIZE_PX[0]), ylim=(SIZE_PX[1], 0))
+    left.set(xlim=(0, SIZE_PX[0]), ylim=(SIZE_PX[1], 0), xlabel="u [px]", ylabel="v [px]")
     _draw_map(middle, votes)
+    middle.set(xlabel="u [px]", ylabel="v [px]")
     middle.set_title(f"votes at {votes.radius_px:.0f} px", fontsize=9)
     _draw_votes_over_radius(right, votes, _RADIUS_PX)
     figure.savefig(path)
@@ -199,7 +200,7 @@ def _draw_noise(scene: Scene, votes: Votes, chosen: NDArray[np.int64], path: Pat
     _circle(fourth, votes.centre_px, votes.radius_px, lw=1.0, color="tab:red")
     fourth.set_title(f"(d) within 10 % of the circle: {len(chosen)}, of which LEDs {(chosen < 8).sum()}", fontsize=9)
     for axes in (first, third, fourth):
-        axes.set(xlim=(0, SIZE_PX[0]), ylim=(SIZE_PX[1], 0))
+        axes.set(xlim=(0, SIZE_PX[0]), ylim=(SIZE_PX[1], 0), xlabel="u [px]", ylabel="v [px]")
     figure.savefig(path)
 
 

@@ -124,7 +124,7 @@ def reproduce(out: Path | None) -> dict[str, Any]:
         for case, run in runs.items()
     ]
     if out is not None:
-        _draw(runs, out / picture_name(ID))
+        _draw(runs, [row["ours"]["mean_nis"] for row in rows], out / picture_name(ID))
     return {"id": ID, "source": _SOURCE, "rows": rows}
 
 
@@ -170,19 +170,19 @@ def _row(printed: Printed, case: str, run: Tracked, sigma_px: float, mean_nis: f
     }
 
 
-def _draw(runs: dict[str, Tracked], path: Path) -> None:
+def _draw(runs: dict[str, Tracked], mean_nis: list[float], path: Path) -> None:
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=_SIZE_IN, dpi=_DPI, layout="constrained")
     panels = figure.subplots(3, 2, width_ratios=(1.6, 1.0))
-    for (left, right), (case, run) in zip(panels, runs.items(), strict=True):
+    for (left, right), (case, run), mean in zip(panels, runs.items(), mean_nis, strict=True):
         for axis, colour in ((0, "tab:blue"), (1, "tab:orange")):
             left.plot(
                 run.time_s, (run.estimated - run.true)[:, axis], lw=0.6, color=colour, label=f"error in {'uv'[axis]}"
             )
         for sign in (-3.0, 3.0):
             left.plot(run.time_s, sign * run.sigma[:, 0], color="black", lw=1.0, ls="--")
-        left.set(ylabel="px", ylim=(-5.0, 5.0), title=f"{case}: error and 3 σ, mean NIS {np.nanmean(run.nis):.3f}")
+        left.set(ylabel="px", ylim=(-5.0, 5.0), title=f"{case}: error and 3 σ, mean NIS {mean:.3f}")
         right.plot(*run.measured.T, ".", ms=1.5, color="tab:green", label="measured")
         right.plot(*run.estimated.T, lw=0.9, color="tab:red", label="estimated")
         right.plot(*run.true.T, lw=1.4, color="black", label="true", marker="o" if case == "at rest" else "")

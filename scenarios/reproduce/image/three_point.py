@@ -107,7 +107,7 @@ def _draw(scene: Scene, chosen: TrustedCircle, path: Path) -> None:
         draw_points(fourth, ellipse.centre_px[None], color="tab:blue", ms=6.0)
     fourth.set_title("(d) within 10 % of the most trusted circle, and their ellipse", fontsize=9)
     for axes in (first, second, fourth):
-        axes.set(xlim=(0, SIZE_PX[0]), ylim=(SIZE_PX[1], 0))
+        axes.set(xlim=(0, SIZE_PX[0]), ylim=(SIZE_PX[1], 0), xlabel="u [px]", ylabel="v [px]")
     figure.savefig(path)
 
 
