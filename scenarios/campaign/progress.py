@@ -13,7 +13,7 @@ from rich.text import Text
 from dockair.scenarios.campaign.jobs import Job
 from dockair.scenarios.campaign.row import flight_of, unflown
 from dockair.scenarios.commands.output import plain_console, print_whole
-from dockair.scenarios.report.groups import groups_of
+from dockair.scenarios.report.groups import counted, groups_of
 from dockair.scenarios.statistics import wilson_interval
 
 _LINE_INTERVAL_S = 30.0  # between two lines where stderr is no terminal
@@ -108,7 +108,7 @@ class CampaignProgress:
         if not self._now:
             return "none done yet"
         left_s = (self._total - self._earlier - self._now) * elapsed_s / self._now
-        errors = f", {self._errors} errors" if self._errors else ""
+        errors = f", {counted(self._errors, 'error')}" if self._errors else ""
         return f"{60.0 * self._now / elapsed_s:.1f} a minute, {_in_words(left_s)} left{errors}"
 
     def _rates(self) -> str:

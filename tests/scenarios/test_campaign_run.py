@@ -1067,6 +1067,8 @@ def test_the_pace_is_that_of_this_run_and_what_is_left_is_what_no_run_has_flown(
     assert progress._pace() == "5.0 a minute, 10 min 0 s left"
     progress._errors = 2
     assert progress._pace() == "5.0 a minute, 10 min 0 s left, 2 errors"
+    progress._errors = 1
+    assert progress._pace().endswith("left, 1 error")
 
 
 @pytest.mark.parametrize(
