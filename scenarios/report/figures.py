@@ -15,7 +15,7 @@ from matplotlib.patches import Circle
 from matplotlib.ticker import MaxNLocator
 
 from dockair.rotations import Array
-from dockair.scenarios.report.groups import CLOSING_BAND_M_S, GOOD_CONTACT, Group, Share
+from dockair.scenarios.report.groups import CLOSING_BAND_M_S, GOOD_CONTACT, Group, Share, counted
 from dockair.scenarios.report.headings import Headings, headings_of
 from dockair.scenarios.report.svg import STYLE, as_svg, say
 
@@ -164,12 +164,12 @@ def _causes(ax: Axes, group: Group) -> None:
     if not group.causes and not group.causes_without_attempt:
         say(ax, "none failed")
         return
-    counted = (
+    kinds = (
         (group.causes, "tab:red", "attempts"),
         (group.endings_without_attempt, "tab:purple", "flights without one"),
     )
     names: list[str] = []
-    for causes, colour, label in counted:
+    for causes, colour, label in kinds:
         if causes:
             places = range(len(names), len(names) + len(causes))
             bars = ax.barh(places, [count for _, count in causes], color=colour, alpha=0.7, label=label)
@@ -183,7 +183,7 @@ def _causes(ax: Axes, group: Group) -> None:
 
 
 def _headings(ax: Axes, headings: Headings) -> None:
-    ax.set_title(f"own heading against the truth, {headings.flights} flights")
+    ax.set_title(f"own heading against the truth, {counted(headings.flights, 'flight')}")
     for values, colour, label in (
         (headings.at_end_deg, "tab:blue", "at the end"),
         (headings.largest_deg, "tab:orange", "largest of the flight"),

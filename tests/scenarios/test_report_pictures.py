@@ -119,4 +119,5 @@ def test_headings_are_of_the_flights_that_kept_one():
 def test_headings_have_a_panel_where_flights_kept_one():
     text = panels(_group([_heading(0), _heading(1, heading_error_deg=None, heading_sigma_deg=None)]))
     assert "own heading against the truth, 2 flights" in text and "1 lost at the end" in text
+    assert "own heading against the truth, 1 flight<" in panels(_group([_heading(0)]))
     assert "own heading" not in panels(_group([_row(0)]))
