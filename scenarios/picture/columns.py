@@ -54,3 +54,13 @@ def fresh(flight: Any) -> NDArray[np.int64]:
         return np.arange(len(stamps), dtype=np.int64)
     before = np.nan_to_num(np.concatenate([[np.nan], stamps[:-1]]), nan=-np.inf)
     return np.asarray(np.flatnonzero(stamps > before), dtype=np.int64)
+
+
+def without_frame(flight: Any) -> NDArray[np.int64]:
+    """Return the ticks at which the newest frame used came more than two of the usual intervals before."""
+    came = fresh(flight)
+    if len(came) < 2:
+        return np.empty(0, dtype=np.int64)
+    ticks = np.arange(came[0], len(flight), dtype=np.int64)
+    since = ticks - came[np.searchsorted(came, ticks, side="right") - 1]
+    return np.asarray(ticks[since > 2.0 * np.median(np.diff(came))])

@@ -13,7 +13,7 @@ from dockair.errors import DockairError
 from dockair.rotations import Array
 from dockair.scenarios import flight_log, message_log
 from dockair.scenarios.judgement.attempts import RefereeLimits
-from dockair.scenarios.picture.columns import contact, fresh, not_valid, values, vectors
+from dockair.scenarios.picture.columns import contact, fresh, not_valid, values, vectors, without_frame
 from dockair.scenarios.picture.paths import draw_along_axis, draw_side_view
 from dockair.scenarios.recording.frames import shown_pixels
 
@@ -153,7 +153,7 @@ def _draw_errors(panels: Sequence[Any], flight: Any) -> None:
     """Draw the belief's error along, to the left and up, one above the other, over three of its own sigmas."""
     time_s = values(flight, "time_s")
     gone = not_valid(flight)
-    shown = np.union1d(fresh(flight), np.flatnonzero(gone))
+    shown = np.union1d(np.union1d(fresh(flight), without_frame(flight)), np.flatnonzero(gone))
     error_mm = 1e3 * (vectors(flight, "nav_p_PD_B") - vectors(flight, "truth_p_PD_B"))
     bound_mm = 3e3 * vectors(flight, "nav_sigma_p_PD_B")
     error_mm, bound_mm = (np.where(gone[:, None], np.nan, each)[shown] for each in (error_mm, bound_mm))

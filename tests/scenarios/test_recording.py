@@ -18,7 +18,7 @@ from dockair.scenarios.flight_log import FlightLog
 from dockair.scenarios.message_log import MessageLog, read_messages
 from dockair.scenarios.navigator_recipe import NavigatorRecipe
 from dockair.scenarios.picture import flight as picture
-from dockair.scenarios.picture.columns import not_valid
+from dockair.scenarios.picture.columns import not_valid, without_frame
 from dockair.scenarios.picture.flight import picture_of_flight
 from dockair.scenarios.recording.episode import drawn_ticks, write_episode
 from dockair.scenarios.recording.frames import FRAME_BYTES, padded_shape, shown_frames, shown_pixels
@@ -411,6 +411,14 @@ def test_no_word_of_a_picture_is_cut_off_where_the_tip_goes_far_up_and_down(hand
     log.write_parquet(tmp_path)
     pixels = np.asarray(Image.open(picture_of_flight(tmp_path)).convert("L"))
     assert (pixels[:, :2] > 250).all()
+
+
+def test_the_belief_is_drawn_on_while_the_camera_is_out():
+    """A line from the last frame before to the first one after would hide what it is off meanwhile."""
+    stamps = [np.nan, 0.0, 0.0, 0.02, 0.02, 0.04, 0.04, 0.04, 0.04, 0.04, 0.04, 0.1, 0.1, 0.12]
+    assert without_frame(pa.table({"nav_frame_time_stamp_s": stamps})).tolist() == [10]
+    assert without_frame(pa.table({"nav_frame_time_stamp_s": [np.nan, 0.0, 0.0]})).tolist() == []
+    assert without_frame(pa.table({"nav_frame_time_stamp_s": [np.nan] * 9})).tolist() == []
 
 
 def test_a_picture_shows_the_only_frame_of_a_camera_that_drops_out_after_it(hand_made, tmp_path, monkeypatch):
