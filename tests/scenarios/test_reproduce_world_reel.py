@@ -1,9 +1,11 @@
 """The reproductions of contact, reel and hose whip: what they measure, on short runs and on runs made by hand."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from dockair.parameters import load_parameters
 from dockair.scenarios.judgement.referee import Outcome
@@ -51,6 +53,21 @@ def test_moment_at_which_the_coupling_lets_go_is_in_the_row_only_if_it_does():
     held, lost = (world_whip._row(_made_by_hand(held=held))["ours"] for held in (True, False))
     assert "let_go_s" not in held and lost["let_go_s"] == pytest.approx(0.030)
     json.dumps([held, lost], allow_nan=False)
+
+
+def test_numbers_on_an_axis_of_the_hoses_shapes_stand_apart(tmp_path, monkeypatch):
+    run, drawn = _made_by_hand(), []
+    run = replace(run, p_WH=np.repeat(run.p_WH, 200, axis=0))
+    monkeypatch.setattr(Figure, "savefig", lambda figure, path: drawn.append(figure))
+    speeds = world_whip.SPEEDS_M_S
+    world_whip._draw([replace(run, speed_m_s=v, dead=dead) for v in speeds for dead in (False, True)], tmp_path / "x")
+    drawn[0].draw_without_rendering()
+    for axes in drawn[0].axes:
+        low, high = axes.get_xlim()
+        shown = [
+            tick.label1.get_window_extent() for tick in axes.xaxis.get_major_ticks() if low <= tick.get_loc() <= high
+        ]
+        assert all(left.x1 < right.x0 for left, right in zip(shown, shown[1:], strict=False))
 
 
 def test_engagement_with_a_working_reel_at_the_usual_speed_does_not_whip():

@@ -183,6 +183,7 @@ def _draw_shapes(axes: Any, run: Engagement, name: str) -> None:
         shape = run.p_WH[round(time_s * PHYSICS_HZ / _SHAPE_TICKS)]
         axes.plot(shape[:, 0], shape[:, 2], lw=1.2, color=str(shade), label=f"{time_s:.2f} s")
     axes.set(title=f"hose from the side, {name}", xlim=(-16.0, 4.0), ylim=(-6.5, 2.0), xlabel="x [m]")
+    axes.set_xticks(range(-15, 5, 5))
     axes.set_aspect("equal")
     if run.speed_m_s == SPEEDS_M_S[0]:
         axes.set_ylabel("z [m]")
