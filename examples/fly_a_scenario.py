@@ -25,7 +25,7 @@ def main(scenario_name: str = "default", seed: str = "0") -> None:
     if result.contact is not None:
         print(f"  {result.contact.radial_offset_m:.3f} m off centre at {result.contact.closure_speed_m_s:.2f} m/s")
 
-    flight = pq.read_table("out/example/flight.parquet")  # truth beside belief, one row a control tick
+    flight = pq.read_table("out/example/flight.parquet", use_threads=False, pre_buffer=False)  # truth beside belief
     error_m = flight["nav_p_PD_B_x_m"].to_numpy() - flight["truth_p_PD_B_x_m"].to_numpy()
     print(f"  range error, median: {1e3 * np.median(np.abs(error_m)):.1f} mm")
 

@@ -38,6 +38,7 @@ from dockair.messages import (
 )
 from dockair.rotations import Array
 from dockair.scenarios.navigator_recipe import NavigatorRecipe, recorded_file
+from dockair.scenarios.parquet_file import open_parquet
 
 QUEUE_TICKS = 200  # ticks waiting for the encoder; at 50 frames/s of 2.2 MB full frames at most 220 MB
 ROW_GROUP_TICKS = 100
@@ -231,11 +232,10 @@ def read_messages(out_dir: str | Path, *, pixels: bool = True) -> Iterator[TickM
 def _rows(out_dir: Path, name: str, needed: set[str]) -> Iterator[dict[str, Any]]:
     path, expected = recorded_file(out_dir, name), "a whole table as a flight records it"
     try:
-        with path.open("rb") as data, pq.ParquetFile(data) as file:  # Arrow takes no path but of UTF-8
+        with open_parquet(path) as file:
             if missing := sorted(needed - set(file.schema_arrow.names)):
                 raise DockairError(str(path), expected=expected, got=f"none with the column {missing[0]}")
             for group in range(file.num_row_groups):
-                # without threads: one that lets go of the file as Python ends aborts the process, and groups are small
                 yield from file.read_row_group(group, use_threads=False).to_pylist()
     except (pa.ArrowException, OSError) as error:  # cut off, or of another kind
         raise DockairError(str(path), expected=expected, got=str(error).partition("\n")[0]) from None

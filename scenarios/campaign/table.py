@@ -7,6 +7,7 @@ from typing import Any
 
 from dockair.errors import DockairError
 from dockair.scenarios.campaign.row import COLUMNS, column_names, is_row
+from dockair.scenarios.parquet_file import read_parquet
 from dockair.scenarios.whole_file import write_whole
 
 FILE_NAME = "flights.parquet"
@@ -38,13 +39,11 @@ def read_table(folder: Path) -> list[dict[str, Any]]:
         DockairError: it is damaged, or somebody else's.
     """
     import pyarrow as pa
-    import pyarrow.parquet as pq
 
     path = folder / FILE_NAME
     expected = "the table of a campaign (removed, it is made again by the command that flew it)"
     try:
-        with path.open("rb") as file:  # Arrow takes no path but of UTF-8
-            rows: list[dict[str, Any]] = pq.read_table(file).to_pylist()
+        rows: list[dict[str, Any]] = read_parquet(path).to_pylist()
     except (pa.ArrowException, OSError, ValueError) as error:
         raise DockairError(str(path), expected=expected, got=" ".join(str(error).split())) from None
     if not all(map(is_row, rows)):

@@ -6,13 +6,13 @@ from typing import Any
 
 import cv2
 import numpy as np
-import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from dockair.errors import DockairError
 from dockair.rotations import Array
 from dockair.scenarios import flight_log, message_log
 from dockair.scenarios.judgement.attempts import RefereeLimits
+from dockair.scenarios.parquet_file import read_parquet
 from dockair.scenarios.picture.columns import contact, fresh, not_valid, values, vectors, without_frame
 from dockair.scenarios.picture.paths import draw_along_axis, draw_side_view
 from dockair.scenarios.recording.frames import shown_pixels
@@ -50,8 +50,7 @@ def picture_of_flight(out_dir: str | Path, limits: RefereeLimits | None = None) 
     path = folder / flight_log.FILE_NAME
     if not path.is_file():
         raise DockairError(str(path), expected="a flight's log", got="no such file")
-    with path.open("rb") as file:  # Arrow takes no path but of UTF-8
-        flight = pq.read_table(file)
+    flight = read_parquet(path)
     frame = _chosen_frame(folder, flight)
     figure = Figure(figsize=_SIZE_IN, dpi=_DPI, layout="constrained")
     FigureCanvasAgg(figure)
