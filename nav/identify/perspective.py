@@ -97,7 +97,7 @@ def undistorted(pixels: Array, camera: Camera) -> Array:
         return pixels
     with np.errstate(all="ignore"):
         rays = camera.rays_from_pixels(pixels)
-    return np.asarray(-camera.focal_length_px * rays[:, 1:] / rays[:, :1] + np.array(camera.principal_point_px))
+        return np.asarray(-camera.focal_length_px * rays[:, 1:] / rays[:, :1] + np.array(camera.principal_point_px))
 
 
 def undistorted_prediction(pixels: Array, camera: Camera) -> Array:

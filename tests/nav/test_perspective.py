@@ -107,6 +107,13 @@ def test_a_prediction_in_which_no_ray_makes_an_led_is_left_as_it_is():
     np.testing.assert_array_equal(undistorted_prediction(beyond, camera), beyond)
 
 
+def test_a_pixel_whose_ray_runs_away_by_its_length_alone_is_not_finite_and_warns_of_nothing():
+    """The squares of its slopes overflow, the slopes do not."""
+    camera = Camera(distortion=(-0.09, 0.11, 5e-4, -3e-4, 0.0))
+    far = np.array(camera.principal_point_px) + [[-5866.3, 0.0]]
+    assert not np.isfinite(undistorted(far, camera)).any()
+
+
 def test_the_tolerance_is_the_caller_s_and_the_ring_s_own_in_the_root_of_squares(ring_scene):
     scene = ring_scene(np.random.default_rng(40), visible=8, range_m=(3.0, 5.0))
     found = fit(scene.points, np.argsort(scene.numbers))
