@@ -36,6 +36,16 @@ def require_fit(drogue: DrogueParameters, coupling: CouplingParameters) -> None:
         raise DockairError(where, expected=f"less than {end} by more than {gap}", got=coupling.depth_m)
 
 
+def require_leds(ring: LedRing) -> None:
+    """Refuse a ring of more or fewer LEDs than the drogue carries.
+
+    Raises:
+        DockairError: it is one.
+    """
+    if ring.count != _LEDS:
+        raise DockairError("ring.count", expected=f"{_LEDS} LEDs, as many as the drogue carries", got=ring.count)
+
+
 def throat_radius_m(drogue: DrogueParameters, coupling: CouplingParameters) -> float:
     """Of the circle on which the middles of the ribs end, around the coupling's bore."""
     return coupling.socket_radius_m + drogue.rib_radius_m
@@ -105,8 +115,7 @@ def place_leds(model: mujoco.MjModel, data: mujoco.MjData, ring: LedRing) -> Non
     Raises:
         DockairError: a ring of more or fewer LEDs than the drogue carries.
     """
-    if ring.count != _LEDS:
-        raise DockairError("ring.count", expected=f"{_LEDS} LEDs, as many as the drogue carries", got=ring.count)
+    require_leds(ring)
     for k, (_, y, z) in enumerate(ring.positions_D):
         model.site(f"led_{k}").pos[1:] = y, z
         model.geom(f"led_housing_{k}").pos[1:] = y, z

@@ -15,7 +15,7 @@ from dockair.scenarios.assembly.nominal_sheets import nominal_camera, nominal_ri
 from dockair.scenarios.plug_in import navigator_class_of
 from dockair.scenarios.schema import Scenario
 from dockair.sim.air.turbulence import gust_sigma
-from dockair.sim.basket import require_fit
+from dockair.sim.basket import require_fit, require_leds
 from dockair.sim.camera.camera_noise import CameraNoise
 from dockair.sim.camera.defects import Defects
 from dockair.sim.camera.electronics import OUTPUT_BITS, output_black, output_gain
@@ -84,7 +84,8 @@ def _check_gusts(scenario: Scenario) -> None:
 
 
 def _check_ring(ring: LedRing, drogue: DrogueParameters) -> None:
-    """The LEDs sit on the rim that the drogue's sheet describes."""
+    """As many LEDs as the drogue carries sit on the rim that its sheet describes."""
+    require_leds(ring)
     if ring.diameter_m != drogue.ring_diameter_m:
         where, expected = "parameters.drogue.ring_diameter_m", f"the LED ring's own diameter, {ring.diameter_m} m"
         raise DockairError(where, expected=f"{expected} (hardware.ring)", got=drogue.ring_diameter_m)

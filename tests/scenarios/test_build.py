@@ -326,6 +326,14 @@ def test_a_sensor_whose_full_well_reads_less_than_full_scale_is_refused(changes,
     require_buildable(load_scenario("still_air", own | {"parameters.sensor.conversion_gain_dn_e": 0.09}))
 
 
+def test_a_ring_of_more_leds_than_the_drogue_carries_is_refused_before_anything_is_built(tmp_path):
+    """A campaign asks before it flies: what every flight would be refused for is said once."""
+    sheet = tmp_path / "ring.toml"
+    sheet.write_text("diameter_m = 0.5\ncount = 12")
+    with pytest.raises(DockairError, match="ring.count: expected 8 LEDs, as many as the drogue carries, got 12"):
+        require_buildable(load_scenario("truth_navigation", {"hardware.ring": str(sheet)}))
+
+
 def test_a_camera_sheet_is_read_whoever_navigates(tmp_path):
     sheet = tmp_path / "camera.toml"
     sheet.write_text('name = "none"')
