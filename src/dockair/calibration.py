@@ -57,15 +57,18 @@ def _limits_in_words(cls: type[Any], name: str) -> str:
     if name not in cls.LIMITS:
         return "its numbers"
     low, high, unit = cls.LIMITS[name]
-    return f"a number from {low:g} to {high:g} {unit}"
+    return f"a {'whole ' if _is_whole(cls, name) else ''}number from {low:g} to {high:g} {unit}"
+
+
+def _is_whole(cls: type[Any], name: str) -> bool:
+    return isinstance(next(f.default for f in fields(cls) if f.name == name), int)
 
 
 def _check_limits(sheet: Any, where: str) -> None:
     """Refuse a number outside its limits, which a wrong unit usually is, and what is no number."""
     for name, (low, high, _) in sheet.LIMITS.items():
         value = getattr(sheet, name)
-        whole = isinstance(next(f.default for f in fields(sheet) if f.name == name), int)
-        kinds = (int, np.integer) if whole else (int, float, np.integer, np.floating)
+        kinds = (int, np.integer) if _is_whole(type(sheet), name) else (int, float, np.integer, np.floating)
         if isinstance(value, bool) or not isinstance(value, kinds) or not low <= value <= high:
             raise DockairError(f"{where}.{name}", expected=_limits_in_words(type(sheet), name), got=value)
 
