@@ -25,7 +25,8 @@ def draw_side_view(axes: Any, flight: Any, limits: RefereeLimits) -> None:
     tip, drogue = (R_EW.apply(vectors(flight, name) - p_WE) for name in ("truth_p_WP", "truth_p_WD"))
     hose = R_EW[moment].apply(np.array(flight["truth_p_WH_m"][moment].as_py()).reshape(-1, 3) - p_WE[moment])
     ahead = max(drogue[:, 0].max(), hose[-1, 0])
-    hose = hose[hose[:, 0] < ahead + 0.3 * (ahead - tip[:, 0].min())]  # what is on to the pod would make the rest small
+    wide = max(ahead - tip[:, 0].min(), _PROBE_M)  # a tip may have been ahead of the hose's end all the while
+    hose = hose[hose[:, 0] < ahead + 0.3 * wide]  # what is on to the pod would make the rest small
     R_ED, R_EB = (R_EW[moment] * attitude(flight, name)[moment] for name in ("truth_q_WD", "truth_q_WB"))
     rim = limits.rim_radius_m * R_ED.apply([0.0, 0.0, 1.0])
     basket = np.array([drogue[moment] + rim, hose[-1], drogue[moment] - rim])

@@ -107,6 +107,17 @@ def test_from_the_left_the_probe_reaches_from_its_tip_aft_along_the_receiver(han
     np.testing.assert_allclose(probe.get_xydata()[1], (tip - truth.R_WB[:, 0])[[0, 2]], atol=1e-9)
 
 
+def test_hose_and_basket_are_drawn_of_a_tip_that_was_ahead_of_them_all_the_while(hand_made, tmp_path):
+    ticks = []
+    for truth, imu, frame, solution in hand_made.ticks(5):
+        ticks.append((replace(truth, p_WP=truth.p_WP + [20.0, 0.0, 0.0]), imu, frame, solution))
+        assert (ticks[-1][0].p_WP - truth.p_WD)[0] > 1.0
+    flight, axes = _flight(tmp_path, ticks), Figure().add_subplot()
+    draw_side_view(axes, flight, RefereeLimits())
+    (hose,) = (line for line in axes.lines if line.get_label() == "hose and basket")
+    assert len(hose.get_xdata()) >= 1
+
+
 @pytest.mark.parametrize("heading_deg", [0.0, 70.0])
 def test_level_axes_begin_in_the_hoses_exit_and_look_along_the_tankers_heading(hand_made, tmp_path, heading_deg):
     """From the second tick on everything is 9 km off and turned: paths lie where they would here."""
