@@ -113,7 +113,9 @@ def _set(table: dict[str, Any], key: str, value: object) -> None:
 def _require_holds(holder: object, part: str | int, key: str) -> None:
     """Refuse a key in what is no table, and a place that a list does not have."""
     if isinstance(part, str) and not isinstance(holder, dict):
-        raise DockairError(f"--set {key}", expected="a known key", got=key)
+        in_a_list = isinstance(holder, list)
+        expected = "a place in a list, as in faults[0].start_s" if in_a_list else "a known key"
+        raise DockairError(f"--set {key}", expected=expected, got=part if in_a_list else key)
     if isinstance(part, int):
         count = len(holder) if isinstance(holder, list) else 0
         if part >= count:

@@ -302,7 +302,7 @@ def test_an_entry_of_a_list_is_set_by_its_place():
         ("gusts[0].at_s", 3.0, "gusts[0].at_s: expected a list that has entries; set whole, it gets them, got '[0]'"),
         ("flight[0]", 3.0, "flight[0]: expected a list that has entries"),
         ("seed[0].x", 3.0, "seed[0].x: expected a list that has entries"),
-        ("faults.start_s", 3.0, "faults.start_s: expected a known key"),
+        ("faults.0.stop_s", 3.0, "faults.0.stop_s: expected a place in a list, as in faults[0].start_s, got '0'"),
         ("faults[-1].start_s", 3.0, "faults[-1]: expected a known key, got 'faults[-1]'"),
         ("faults[0].leds", [1], "faults[0]: expected a key of the kind gyro_bias_step, got 'leds'"),
         ("faults[0].start", 1.0, "faults[0].start: expected a known key, got 'start'; exists:"),
