@@ -78,7 +78,9 @@ class Pretended:
 
 
 class Navigator:
-    """Answers what it is told to, and listens."""
+    """Answers what it is told to, and listens; stands for Dockair's own, for another's messages are copied."""
+
+    __module__ = "dockair.nav.navigator"
 
     def __init__(self, pretended):
         self._pretended = pretended
