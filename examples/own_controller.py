@@ -17,7 +17,9 @@ from dockair.scenarios.envs.tables import OBSERVATION
 
 INDEX = {entry.name: k for k, entry in enumerate(OBSERVATION)}
 STAND_OFF_M, CLOSING_M_S = 4.0, 1.2
-POSITION_GAIN, RATE_GAIN = 0.6, 1.4  # 1/s^2, 1/s: the poles of a damped approach
+ACROSS = 4.0, 3.5  # 1/s^2 of the offset, 1/s of its rate: damped, and quicker than the drogue swings (2 to 3 rad/s) ...
+FORWARD = 0.6, 1.4  # ... and likewise where the engine is slower to answer
+MOST_M_S2 = 3.0
 LINED_UP_M, LINED_UP_M_S, LINED_UP_S = 0.25, 0.3, 2.0
 
 
@@ -47,12 +49,12 @@ class Controller:
         steady = np.hypot(p[1], p[2]) < LINED_UP_M and np.linalg.norm(rate) < LINED_UP_M_S
         self._lined_up_s = self._lined_up_s + self._step_s if steady else 0.0
         self.closing = self.closing or self._lined_up_s > LINED_UP_S
-        wanted = POSITION_GAIN * p + RATE_GAIN * rate
+        wanted = ACROSS[0] * p + ACROSS[1] * rate
         if self.closing:
-            wanted[0] = RATE_GAIN * (rate[0] + CLOSING_M_S)
+            wanted[0] = FORWARD[1] * (rate[0] + CLOSING_M_S)
         else:
-            wanted[0] = POSITION_GAIN * (p[0] - STAND_OFF_M) + RATE_GAIN * rate[0]
-        acceleration = np.clip(wanted, -1.0, 1.0)
+            wanted[0] = FORWARD[0] * (p[0] - STAND_OFF_M) + FORWARD[1] * rate[0]
+        acceleration = np.clip(wanted, -MOST_M_S2, MOST_M_S2)
         self._velocity = np.clip(self._velocity + acceleration * self._step_s, -2.5, 2.5)
         return self._velocity, acceleration
 
