@@ -294,6 +294,11 @@ def _got(error: typer.TyperException, said: str, words: list[str]) -> str:
     return ""
 
 
+def _noted(said: str, error: BaseException) -> str:
+    """Return the line that is said of an error, with its notes: what is kept of a flight in spite of it."""
+    return "; ".join([said, *getattr(error, "__notes__", ())])
+
+
 def main() -> None:
     """Run a command; what a person did wrong ends in one line on stderr, not in a traceback."""
     outlive_readers()
@@ -304,7 +309,7 @@ def main() -> None:
         if status == 130:  # typer makes a status of Ctrl-C
             print("dockair: stopped", file=sys.stderr)
     except DockairError as error:
-        print(f"dockair: {error}", file=sys.stderr)
+        print(f"dockair: {_noted(str(error), error)}", file=sys.stderr)
         sys.exit(error.exit_code)
     except typer.TyperException as error:
         said = error.format_message()
@@ -317,11 +322,13 @@ def main() -> None:
     except OSError as error:
         if error.errno in _NO_FILE:
             path = error.filename2 or error.filename or "a file"  # of two, the second is the one that was to be written
-            print(f"dockair: {path}: expected a file that may be used, got {error.strerror}", file=sys.stderr)
+            said = f"{path}: expected a file that may be used, got {error.strerror}"
+            print(f"dockair: {_noted(said, error)}", file=sys.stderr)
             sys.exit(2)
         if error.errno not in NO_ROOM:
             raise
-        print(f"dockair: {error.filename or 'disk'}: expected room to write, got a full disk", file=sys.stderr)
+        said = f"{error.filename or 'disk'}: expected room to write, got a full disk"
+        print(f"dockair: {_noted(said, error)}", file=sys.stderr)
         sys.exit(3)
     except (typer.Abort, KeyboardInterrupt):
         print("dockair: stopped", file=sys.stderr)

@@ -1,6 +1,8 @@
 """Everything that is kept of a flight, behind one object: the loop appends control ticks and asks for the result."""
 
 import json
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
@@ -75,7 +77,8 @@ class Recorder:
     def finish(self, flight: "Flight", outcome: Outcome, seed: int, wall_time_s: float) -> Result:
         """Return the result; with a folder, write result.json, flight.parquet, episode.rrd and flight.png there.
 
-        The messages have to be settled.
+        The messages have to be settled. Where one of the last two cannot be made, the folder keeps the flight without
+        it, and what is raised says so in a note.
 
         Args:
             flight: that is over.
@@ -111,7 +114,7 @@ class Recorder:
         result.write(folder)
         (folder / AS_BUILT).write_text(json.dumps(flight.as_built.record(), indent=1) + "\n", encoding="utf-8")
         self._log.write_parquet(folder)
-        with utf8_path_of(folder) as place:  # Rerun takes no other
+        with self._kept_without("episode.rrd"), utf8_path_of(folder) as place:  # Rerun takes no other
             write_episode(
                 place,
                 self._log,
@@ -121,7 +124,20 @@ class Recorder:
                 messages=read_messages(folder, pixels=False) if self._messages is not None else (),
                 summary=summary_of(result),
             )
-        picture_of_flight(folder, flight.referee.limits)
+        with self._kept_without("flight.png"):
+            picture_of_flight(folder, flight.referee.limits)
+
+    @contextmanager
+    def _kept_without(self, name: str) -> Iterator[None]:
+        """Write a file that is only made to be looked at: where it fails, the flight is kept all the same."""
+        assert self._folder is not None
+        try:
+            yield
+        except Exception as error:
+            (self._folder.under_way / name).unlink(missing_ok=True)  # half of it
+            self._folder.keep()
+            error.add_note(f"{self._path} holds the flight, without {name}")
+            raise
 
 
 def summary_of(result: Result) -> str:

@@ -335,12 +335,15 @@ def test_interrupting_a_flight_is_no_traceback(command, flights, monkeypatch):
 
 def test_a_full_disk_is_one_line_and_status_three(command, flights, monkeypatch):
     def fly(*_, **__):
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "out/default-0/episode.rrd")
+        error = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "out/default-0/flight.png")
+        error.add_note("out/default-0 holds the flight, without flight.png")
+        raise error
 
     monkeypatch.setitem(sys.modules, "dockair.scenarios.loop", SimpleNamespace(fly=fly))
     status, out, err = command("fly")
     assert (status, out) == (3, "")
-    assert err == "dockair: out/default-0/episode.rrd: expected room to write, got a full disk\n"
+    full = "out/default-0/flight.png: expected room to write, got a full disk"
+    assert err == f"dockair: {full}; out/default-0 holds the flight, without flight.png\n"
 
 
 @pytest.mark.parametrize("number", [errno.EISDIR, errno.ENOTDIR, errno.EACCES, errno.EPERM, errno.ENAMETOOLONG])

@@ -59,6 +59,31 @@ def test_recordings_are_one_to_the_viewer_where_scenario_settings_and_seed_are(t
     assert found["first"].startswith("truth_navigation-0-")
 
 
+@pytest.mark.parametrize(
+    ("made_by", "left_out"),
+    [
+        ("picture.flight.picture_of_flight", {"flight.png"}),
+        ("recording.episode.write_episode", {"episode.rrd", "flight.png"}),
+    ],
+)
+def test_a_flight_is_kept_where_what_is_only_looked_at_cannot_be_made(tmp_path, monkeypatch, made_by, left_out):
+    out = tmp_path / "out"
+    out.mkdir()
+    for name in ALWAYS:
+        (out / name).write_text("an earlier flight's")
+
+    def refuse(folder, *_, **__):
+        (folder / min(left_out)).write_text("half")
+        raise ValueError("no such font")
+
+    monkeypatch.setattr(f"dockair.scenarios.{made_by}", refuse)
+    with pytest.raises(ValueError, match="no such font") as raised:
+        fly(_short("truth_navigation", 0.1), 1, out)
+    assert raised.value.__notes__ == [f"{out} holds the flight, without {min(left_out)}"]
+    assert {path.name for path in out.iterdir()} == ALWAYS - left_out
+    assert json.loads((out / "result.json").read_text())["seed"] == 1
+
+
 def test_without_a_folder_nothing_is_written(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert fly(_short("truth_navigation", 0.1), 0).out_dir is None
