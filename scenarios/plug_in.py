@@ -11,6 +11,7 @@ from dataclasses import fields, replace
 from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dockair.errors import DockairError
 from dockair.messages import (
@@ -123,8 +124,14 @@ def _called(owner: Any, expected: str, function: Callable[..., T], *given: Any) 
 def _copied(message: T) -> T:
     """Return a message with arrays of its own, and these numpy's plain ones: no matrix, and nothing masked."""
     values = {f.name: getattr(message, f.name) for f in fields(message) if f.init}  # type: ignore[arg-type]
-    arrays = {name: np.array(value) for name, value in values.items() if isinstance(value, np.ndarray)}
+    arrays = {name: _plain(value) for name, value in values.items() if isinstance(value, np.ndarray)}
     return replace(message, **arrays)  # type: ignore[type-var]
+
+
+def _plain(array: NDArray[Any]) -> NDArray[Any]:
+    """Return a copy, of floats that numpy's linear algebra takes: neither of 16 bits nor of more than 64."""
+    is_odd = array.dtype.kind == "f" and array.dtype.itemsize not in (4, 8)
+    return np.array(array, dtype=np.float64 if is_odd else None)
 
 
 def _is_ours(owner: Any) -> bool:

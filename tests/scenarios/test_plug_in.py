@@ -262,6 +262,17 @@ def test_a_solution_that_can_be_flown_is_passed_on(changes):
     assert type(passed_on.p_PD_B) is np.ndarray
 
 
+@pytest.mark.parametrize("kind", [np.float16, np.longdouble])
+def test_floats_of_a_kind_that_numpys_linear_algebra_does_not_take_are_passed_on_as_64_bit(kind):
+    answer = {"p_PD_B": np.full(3, 0.5, kind), "R_BD": np.eye(3, dtype=kind), "covariance": np.eye(9, dtype=kind)}
+    command = ReceiverCommand(velocity_m_s=np.full(3, 0.25, kind))
+    passed_on = step_navigator(Answers(**answer, command=command), (), None)
+    for name, answered in answer.items():
+        assert getattr(passed_on, name).dtype == np.float64
+        np.testing.assert_array_equal(getattr(passed_on, name), answered)
+    assert passed_on.command.velocity_m_s.dtype == np.float64 and passed_on.command.velocity_m_s[0] == 0.25
+
+
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
