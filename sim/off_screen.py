@@ -5,13 +5,14 @@ Without multisampling, which costs tenfold off-screen; whoever wants smooth edge
 
 import os
 import sys
+import threading
 from typing import Any
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from dockair.errors import MachineError
+from dockair.errors import DockairError, MachineError
 from dockair.sim.opengl import drawing_remedy
 
 _SMALLEST_FONT = 50
@@ -64,6 +65,32 @@ class Canvas:
         self._context = self._renderer = None
 
 
+class _ThreadsContext:
+    """An off-screen context, current; while it is so in the thread that made it, OpenGL lets no other have it."""
+
+    def __init__(self, context: Any, where: str) -> None:
+        self._context, self._where, self._thread = context, where, threading.current_thread()
+
+    def make_current(self) -> None:
+        """Let what is drawn next be drawn into it.
+
+        Raises:
+            DockairError: another thread has it.
+        """
+        try:
+            self._context.make_current()
+        except Exception as error:  # whatever the driver's loader raises
+            thread = threading.current_thread()
+            if thread is self._thread:
+                raise
+            expected = f"the thread in which its OpenGL context was made, {self._thread.name!r}"
+            raise DockairError(self._where, expected=expected, got=thread.name) from error
+
+    def free(self) -> None:
+        """Free the context."""
+        self._context.free()
+
+
 def gl_context(width: int, height: int) -> Any:
     """Make an off-screen context; which kind does not depend on who imported mujoco first."""
     chosen = os.environ.get("MUJOCO_GL", "egl" if sys.platform.startswith("linux") else "")
@@ -91,7 +118,7 @@ def open_renderer(model: mujoco.MjModel, width: int, height: int, font: int, whe
     samples, quality.offsamples = quality.offsamples, 0  # the renderer reads it from the model when it is made
     context: Any = None
     try:
-        context = gl_context(width, height)
+        context = _ThreadsContext(gl_context(width, height), where)
         context.make_current()
         renderer = mujoco.MjrContext(model, font)
     except Exception as error:  # whatever the driver's loader raises, the cause is the machine

@@ -174,6 +174,7 @@ class Episodes(gymnasium.Env[Obs, NDArray[np.float32]], Generic[Obs]):
 
         Raises:
             gymnasium.error.ResetNeeded: there is no flight yet.
+            DockairError: the first picture of this flight was drawn in another thread.
         """
         if self.render_mode is None:
             return None
@@ -187,7 +188,11 @@ class Episodes(gymnasium.Env[Obs, NDArray[np.float32]], Generic[Obs]):
         return self._view.render(self._flight.world.data, 0.5 * (truth.p_WP + truth.p_WD))
 
     def close(self) -> None:
-        """Free the off-screen contexts."""
+        """Free the off-screen contexts; who drew pictures closes in the same thread.
+
+        Raises:
+            DockairError: in another thread; what could be freed is.
+        """
         held = self._flight, self._view
         self._view = self._flight = self._tick = None
         with ExitStack() as closing:  # the flight, too, where the view cannot be

@@ -1,12 +1,13 @@
 """The off-screen context: what kind it is, and what a machine without one is told."""
 
 import sys
+import threading
 
 import mujoco
 import numpy as np
 import pytest
 
-from dockair.errors import MachineError
+from dockair.errors import DockairError, MachineError
 from dockair.sim import off_screen
 from dockair.sim.off_screen import Canvas, gl_context, open_renderer
 
@@ -39,6 +40,24 @@ def test_a_renderer_that_fails_leaves_no_context_behind(monkeypatch: pytest.Monk
         open_renderer(MODEL, 8, 8, FONT, "render")
     assert len(freed) == 1
     assert MODEL.vis.quality.offsamples == 4
+
+
+@pytest.mark.gl
+@pytest.mark.parametrize("use", ["render", "close"])
+def test_a_canvas_that_another_thread_uses_is_refused_with_the_names_of_both(use: str) -> None:
+    canvas, said = Canvas(MODEL, 8, 8, "camera"), []
+    do = {"close": canvas.close, "render": lambda: canvas.render(mujoco.MjvScene(), np.empty((8, 8, 3), np.uint8))}
+
+    def refused() -> None:
+        with pytest.raises(DockairError) as caught:
+            do[use]()
+        said.append(str(caught.value))
+
+    other = threading.Thread(target=refused, name="other")
+    other.start()
+    other.join()
+    assert said == ["camera: expected the thread in which its OpenGL context was made, 'MainThread', got 'other'"]
+    canvas.close()
 
 
 @pytest.mark.gl
