@@ -122,7 +122,10 @@ def scenarios(
             library_output.show_keys(found)
         return
     if name is not None:
+        from dockair.scenarios.assembly.buildable import require_buildable
+
         chosen = load_scenario(name)
+        require_buildable(chosen)  # what its own sheets hold, and its navigator: shown is what can be flown
         if as_json:
             print_json(chosen.model_dump(mode="json"))
         else:

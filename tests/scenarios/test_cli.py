@@ -480,6 +480,21 @@ def test_the_library_is_listed_with_its_claims(command):
     assert all(name in out for name in listed)
 
 
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"diameter": 0.5}, "ring.toml: diameter: expected a known key, got 'diameter'"),
+        ({"diameter_m": 0.6}, "expected the LED ring's own diameter, 0.6 m (hardware.ring), got 0.5"),
+    ],
+)
+def test_a_scenario_whose_own_sheet_cannot_be_flown_is_refused_where_it_is_shown(command, tmp_path, changes, said):
+    ring = {"diameter_m": 0.5, "count": 8} | changes
+    (tmp_path / "ring.toml").write_text("".join(f"{key} = {value}\n" for key, value in ring.items()))
+    (tmp_path / "own.toml").write_text('name = "own"\nhardware.ring = "ring.toml"\n')
+    status, out, err = command("scenarios", str(tmp_path / "own.toml"))
+    assert (status, out) == (2, "") and said in err
+
+
 def test_the_keys_are_listed_all_or_those_with_a_part_of_their_name(command):
     status, out, _ = command("scenarios", "--keys", "--json")
     assert status == 0
