@@ -56,6 +56,18 @@ class AsBuilt:
         return dict(self.differences)
 
 
+def require_borne(ring: LedRing, leds: LedParameters) -> None:
+    """Refuse a ring with an LED so bright that it takes more current than LEDs bear.
+
+    Raises:
+        DockairError: it is one.
+    """
+    brightest, most_a = float(ring.relative_brightness.max()), read_sheet("leds")["drive_current_a"].high
+    if brightest * leds.drive_current_a > most_a:
+        expected = f"at most {most_a / leds.drive_current_a:.4g} times sheet leds' LED, which bears {most_a} A"
+        raise DockairError("ring.brightness", expected=expected, got=brightest)
+
+
 def draw_as_built(
     camera: Camera,
     ring: LedRing,
@@ -69,12 +81,9 @@ def draw_as_built(
     The same numbers are drawn whatever the standard deviations are: setting one to zero leaves the others' draws.
 
     Raises:
-        DockairError: a ring with an LED so bright that it takes more current than LEDs bear.
+        DockairError: of `require_borne`.
     """
-    brightest, most_a = float(ring.relative_brightness.max()), read_sheet("leds")["drive_current_a"].high
-    if brightest * leds.drive_current_a > most_a:
-        expected = f"at most {most_a / leds.drive_current_a:.4g} times sheet leds' LED, which bears {most_a} A"
-        raise DockairError("ring.brightness", expected=expected, got=brightest)
+    require_borne(ring, leds)
     camera_angle, imu_angle, camera_shift = rng.standard_normal((3, 3))
     lens = rng.standard_normal(3)
     diameter = parameters.ring_diameter_sigma_m * rng.standard_normal()

@@ -173,10 +173,11 @@ class Faults:
         return {k: fault.exposure_s for k, fault in enumerate(self._faults) if isinstance(fault, ExposureStuck)}
 
     @property
-    def most_hot_pixels(self) -> int:
-        """The largest number of hot pixels at any time."""
-        counts = [self.camera(fault.start_s).hot_pixels for fault in self._faults if isinstance(fault, HotPixels)]
-        return max(counts, default=0)
+    def most_hot_pixels(self) -> tuple[int, int]:
+        """Which fault's beginning makes them most, by its place in the list, and how many then; (-1, 0) without any."""
+        hot = [(k, fault) for k, fault in enumerate(self._faults) if isinstance(fault, HotPixels)]
+        counts = [(k, self.camera(fault.start_s).hot_pixels) for k, fault in hot]
+        return max(counts, key=lambda one: one[1], default=(-1, 0))
 
     def led_factors(self, time_s: float, exposure_s: float = 0.0) -> Array:
         """(n,) what is left of each LED's light in an exposure.

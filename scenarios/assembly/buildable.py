@@ -11,19 +11,23 @@ from dockair.calibration import Camera, LedRing
 from dockair.errors import DockairError
 from dockair.parameters import load_parameters
 from dockair.scenarios.assembly.measured import require_measurable
+from dockair.scenarios.assembly.mounting_parameters import MountingParameters
 from dockair.scenarios.assembly.nominal_sheets import nominal_camera, nominal_ring
 from dockair.scenarios.plug_in import navigator_class_of
 from dockair.scenarios.schema import Scenario
 from dockair.sim.air.turbulence import gust_sigma
+from dockair.sim.as_built import require_borne
 from dockair.sim.basket import require_fit, require_leds
 from dockair.sim.camera.camera_noise import CameraNoise
 from dockair.sim.camera.defects import Defects
 from dockair.sim.camera.electronics import OUTPUT_BITS, output_black, output_gain
 from dockair.sim.camera.readout import row_time_s, shortest_period_s
-from dockair.sim.camera.sheets import CameraSheets, SensorParameters
+from dockair.sim.camera.sheets import CameraSheets, LedParameters, SensorParameters
 from dockair.sim.faults import Faults
 from dockair.sim.hose.chain import DrogueParameters
 from dockair.sim.hose.coupling import CouplingParameters
+from dockair.sim.outlines import TankerParameters, nose_x_m
+from dockair.sim.skins import tanker_skins
 
 
 def require_buildable(scenario: Scenario) -> None:
@@ -36,7 +40,8 @@ def require_buildable(scenario: Scenario) -> None:
     _check_gusts(scenario)
     ring, own = nominal_ring(scenario), scenario.parameters
     drogue = load_parameters("drogue", DrogueParameters, own.get("drogue"))
-    _check_ring(ring, drogue)
+    _check_ring(scenario, ring, drogue)
+    _check_outlines(scenario)
     require_fit(drogue, load_parameters("coupling", CouplingParameters, own.get("coupling")))
     faults = Faults([table.fault for table in scenario.faults], ring.count)
     camera = nominal_camera(scenario)  # which is built whoever navigates
@@ -83,12 +88,31 @@ def _check_gusts(scenario: Scenario) -> None:
         raise error.at("flight.altitude_m") from None
 
 
-def _check_ring(ring: LedRing, drogue: DrogueParameters) -> None:
-    """As many LEDs as the drogue carries sit on the rim that its sheet describes."""
-    require_leds(ring)
+def _check_ring(scenario: Scenario, ring: LedRing, drogue: DrogueParameters) -> None:
+    """As many LEDs as the drogue carries, none too bright, sit on the rim that its sheet describes."""
+    try:
+        require_leds(ring)
+        require_borne(ring, load_parameters("leds", LedParameters, scenario.parameters.get("leds")))
+    except DockairError as error:
+        raise error.at(f"{scenario.hardware.ring}: {error.where.partition('.')[2]}") from None
     if ring.diameter_m != drogue.ring_diameter_m:
         where, expected = "parameters.drogue.ring_diameter_m", f"the LED ring's own diameter, {ring.diameter_m} m"
         raise DockairError(where, expected=f"{expected} (hardware.ring)", got=drogue.ring_diameter_m)
+
+
+def _check_outlines(scenario: Scenario) -> None:
+    """Behind the probe's tip is room for a nose, and the hose's unit has something to hang on."""
+    own, sheet = scenario.parameters, scenario.hardware.receiver_sheet("mounting")
+    try:
+        nose_x_m(load_parameters(sheet, MountingParameters, own.get(sheet)).mounting())
+    except DockairError as error:
+        raise error.at(f"parameters.{sheet}.probe_tip_m") from None
+    tanker, pod = load_parameters("tanker", TankerParameters, own.get("tanker")), scenario.tanker.pod
+    try:
+        tanker_skins(tanker.at_pod(pod))
+    except DockairError as error:
+        key, place = ("exit_m", tanker.exit_m) if pod == "centreline" else ("wing_exit_m", tanker.wing_exit_m)
+        raise DockairError(f"parameters.tanker.{key}", expected=error.expected, got=place.tolist()) from None
 
 
 def _check_camera_rate(camera_hz: int, camera: Camera, sheets: CameraSheets) -> None:

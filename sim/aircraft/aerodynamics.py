@@ -155,7 +155,7 @@ def _stack(p: AirframeParameters) -> Array:
 def _first_and_step(key: str, nodes: Array) -> list[float]:
     steps = np.diff(nodes)
     if not np.all(np.abs(steps - steps[0]) < 1e-6 * steps[0]):
-        raise DockairError(f"airframe.{key}", expected="evenly spaced nodes, rising", got=nodes.tolist())
+        raise DockairError(f"parameters.airframe.{key}", expected="evenly spaced nodes, rising", got=nodes.tolist())
     return [float(nodes[0]), float(nodes[-1] - nodes[0]) / len(steps)]
 
 

@@ -208,4 +208,4 @@ def _check(parameters: TankerPathParameters, airspeed_m_s: float) -> None:
     turn_s = math.pi * airspeed_m_s / (STANDARD_GRAVITY_M_S2 * math.tan(p.bank_rad))
     if _entry_s(p) > turn_s:
         expected = f"a rate at which rolling in and out fits into a turn of 180 degrees ({turn_s:.1f} s)"
-        raise DockairError("tanker.roll_rate_rad_s", expected=expected, got=p.roll_rate_rad_s)
+        raise DockairError("parameters.tanker_path.roll_rate_rad_s", expected=expected, got=p.roll_rate_rad_s)

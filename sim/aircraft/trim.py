@@ -130,13 +130,13 @@ def steady_trim(
         level = straight and climb_rad == 0.0 and downwash_m_s == 0.0
         flight = "level" if level else f"with a slope of {climb_rad:g} rad, turning at {turn_rate_rad_s:g} rad/s,"
         expected = f"an airspeed at which the receiver can fly {flight} in air of {air.density_kg_m3:.3f} kg/m^3"
-        raise DockairError("airspeed_m_s", expected=expected, got=airspeed_m_s)
+        raise DockairError("flight.airspeed_m_s", expected=expected, got=airspeed_m_s)
     return trim
 
 
 def _check_airspeed(airspeed_m_s: float) -> None:
     if not airspeed_m_s > 0.0:
-        raise DockairError("airspeed_m_s", expected="an airspeed > 0", got=airspeed_m_s)
+        raise DockairError("flight.airspeed_m_s", expected="an airspeed > 0", got=airspeed_m_s)
 
 
 def _inside(parameters: AirframeData, trim: Trim, air: Air) -> bool:

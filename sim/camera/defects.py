@@ -43,9 +43,10 @@ class Defects:
         self._dirt: tuple[float, Dirt | None] = 0.0, None
         self._places = np.empty((0, 2), dtype=np.int64)
         _check_exposures(faults, exposure)
-        size, most = camera.height_px * camera.width_px, faults.most_hot_pixels
+        size, (index, most) = camera.height_px * camera.width_px, faults.most_hot_pixels
         if most > size:
-            raise DockairError("faults.count", expected=f"up to {size} hot pixels, all of the sensor's", got=most)
+            expected = f"up to {size} hot pixels at a time, all of the sensor's"
+            raise DockairError(f"faults[{index}].count", expected=expected, got=most)
 
     def dirt(self, cover: float) -> Dirt | None:
         """Return the smudges of a cover; None for 0."""

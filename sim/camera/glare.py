@@ -212,17 +212,18 @@ class Glare:
         lost = self.shares["lost"]
         if lost < 0.0:
             raise DockairError(
-                "glare", expected="transmittance x (1 + veil + halo + ghosts) <= 1", got=round(1.0 - lost, 4)
+                "parameters.glare", expected="transmittance x (1 + veil + halo + ghosts) <= 1", got=round(1.0 - lost, 4)
             )
 
 
 def _check_shapes(parameters: GlareParameters) -> None:
+    where = "parameters.glare"
     if parameters.iris_blades in (1, 2):
-        raise DockairError("glare.iris_blades", expected="0 (round) or at least 3", got=parameters.iris_blades)
-    for names in (
+        raise DockairError(f"{where}.iris_blades", expected="0 (round) or at least 3", got=parameters.iris_blades)
+    for first, *others in (
         ("halo_share", "halo_core_rad", "halo_exponent"),
         ("ghost_position", "ghost_defocus_m", "ghost_share"),
     ):
-        lengths = [len(getattr(parameters, name)) for name in names]
+        lengths = [len(getattr(parameters, name)) for name in (first, *others)]
         if len(set(lengths)) > 1:
-            raise DockairError(f"glare.{names[0]}", expected=f"as many values as {names[1]}, {names[2]}", got=lengths)
+            raise DockairError(f"{where}.{first}", expected=f"as many values as {', '.join(others)}", got=lengths)

@@ -92,7 +92,7 @@ def airy_px(lens: LensParameters, camera: Camera, wavelength_m: float) -> float:
     """
     if not lens.focus_distance_m > camera.focal_length_m:
         expected = f"more than the camera's focal length, {camera.focal_length_m} m"
-        raise DockairError("lens.focus_distance_m", expected=expected, got=lens.focus_distance_m)
+        raise DockairError("parameters.lens.focus_distance_m", expected=expected, got=lens.focus_distance_m)
     m = lens.focus_distance_m / (lens.focus_distance_m - camera.focal_length_m)
     return m * wavelength_m * lens.f_number / camera.pixel_pitch_m
 

@@ -285,7 +285,7 @@ class CameraSheets:
         opens_m, first_m = self.filter.cut_on_m - 0.5 * self.filter.cut_on_ramp_m, float(self.sensor.wavelength_m[0])
         if first_m > opens_m:
             expected = f"the first at {opens_m:g} m or less, where the filter opens"
-            raise DockairError("sensor.wavelength_m", expected=expected, got=first_m)
+            raise DockairError("parameters.sensor.wavelength_m", expected=expected, got=first_m)
 
     @classmethod
     def load(

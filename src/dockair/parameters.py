@@ -96,7 +96,7 @@ def load_parameters(sheet: str, cls: type[T], overrides: Mapping[str, Any] | Non
         overrides: values that replace the sheet's, inside its ranges.
 
     Raises:
-        DockairError: unknown sheet or key, value out of range, keys and fields differ.
+        DockairError: unknown sheet or key, value out of range, keys and fields differ, or what the class refuses.
     """
     parameters = read_sheet(sheet)
     names = {f.name for f in fields(cls)}  # type: ignore[arg-type]
@@ -111,7 +111,10 @@ def load_parameters(sheet: str, cls: type[T], overrides: Mapping[str, Any] | Non
         if isinstance(parameters[key].value, int) and not float(value).is_integer():
             raise DockairError(where, expected="an integer", got=value)
         values[key] = type(parameters[key].value)(value)
-    return cls(**{key: _frozen(value) for key, value in values.items()})
+    try:
+        return cls(**{key: _frozen(value) for key, value in values.items()})
+    except DockairError as error:  # the class knows its key, not of which sheet of its kind it is
+        raise error.at(f"parameters.{sheet}.{error.where.partition('.')[2]}") from None
 
 
 def _frozen(value: Any) -> Any:

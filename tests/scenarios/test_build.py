@@ -267,8 +267,8 @@ def test_a_scenarios_coded_ring_is_built_and_told_to_the_navigation(tmp_path):
     [
         (CODED.replace("327", "340"), "angles_deg: expected LED k within 18 deg of 45 k deg"),
         (CODED.replace("[4,", "[0,"), "brightness: expected numbers above 0"),
-        (CODED.replace("[4,", "[200,"), "ring.brightness: expected at most 89.82 times"),
-        ("diameter_m = 0.5\ncount = 6\n", "ring.count: expected 8 LEDs"),
+        (CODED.replace("[4,", "[200,"), "ring.toml: brightness: expected at most 89.82 times"),
+        ("diameter_m = 0.5\ncount = 6\n", "ring.toml: count: expected 8 LEDs"),
     ],
 )
 def test_a_ring_that_cannot_be_built_is_refused(tmp_path, sheet, words):
@@ -330,8 +330,36 @@ def test_a_ring_of_more_leds_than_the_drogue_carries_is_refused_before_anything_
     """A campaign asks before it flies: what every flight would be refused for is said once."""
     sheet = tmp_path / "ring.toml"
     sheet.write_text("diameter_m = 0.5\ncount = 12")
-    with pytest.raises(DockairError, match="ring.count: expected 8 LEDs, as many as the drogue carries, got 12"):
+    with pytest.raises(
+        DockairError, match=r"ring\.toml: count: expected 8 LEDs, as many as the drogue carries, got 12"
+    ):
         require_buildable(load_scenario("truth_navigation", {"hardware.ring": str(sheet)}))
+
+
+@pytest.mark.parametrize(
+    ("changes", "where"),
+    [
+        ({"parameters.drogue.rim_x_m": 0.0}, "parameters.drogue.rim_x_m"),
+        (
+            {"camera.filter": "band_pass", "parameters.filter_band_pass.cut_on_m": 9e-7},
+            "parameters.filter_band_pass.cut_on_m",
+        ),
+        ({"parameters.mounting.probe_tip_m": [-5.0, -0.9, 0.6]}, "parameters.mounting.probe_tip_m"),
+        (
+            {"hardware.airframe": "unmanned", "parameters.mounting_unmanned.probe_tip_m": [-5.0, -0.6, 0.4]},
+            "parameters.mounting_unmanned.probe_tip_m",
+        ),
+        ({"parameters.tanker.exit_m": [-19.5, 0.0, 20.0]}, "parameters.tanker.exit_m"),
+        (
+            {"tanker.pod": "right_wing", "parameters.tanker.wing_exit_m": [-19.5, 25.0, 20.0]},
+            "parameters.tanker.wing_exit_m",
+        ),
+    ],
+)
+def test_what_cannot_be_built_is_named_by_the_key_that_sets_it(changes, where):
+    with pytest.raises(DockairError) as refused:
+        require_buildable(load_scenario("still_air", changes))
+    assert refused.value.where == where
 
 
 def test_a_camera_sheet_is_read_whoever_navigates(tmp_path):

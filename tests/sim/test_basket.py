@@ -31,24 +31,32 @@ def test_tip_anywhere_at_the_bottom_of_the_bore_is_near_enough_to_latch():
 @pytest.mark.parametrize(
     ("drogue", "coupling", "words"),
     [
-        ({"rim_x_m": 0.01}, {}, "drogue.rim_x_m: expected more than drogue.rim_tube_radius_m = 0.02"),
-        ({"rim_x_m": 0.02}, {}, "drogue.rim_x_m"),
+        ({"rim_x_m": 0.01}, {}, "parameters.drogue.rim_x_m: expected more than drogue.rim_tube_radius_m = 0.02"),
+        ({"rim_x_m": 0.02}, {}, "parameters.drogue.rim_x_m"),
         (
             {"rim_x_m": 0.01, "rim_tube_radius_m": 0.005, "led_housing_gap_m": 0.01},
             {},
-            "drogue.led_housing_gap_m: expected less than drogue.rim_x_m = 0.01",
+            "parameters.drogue.led_housing_gap_m: expected less than drogue.rim_x_m = 0.01",
         ),
-        ({"rim_x_m": 0.1, "throat_x_m": 0.1}, {}, "drogue.throat_x_m: expected more than drogue.rim_x_m = 0.1"),
+        (
+            {"rim_x_m": 0.1, "throat_x_m": 0.1},
+            {},
+            "parameters.drogue.throat_x_m: expected more than drogue.rim_x_m = 0.1",
+        ),
         ({"throat_x_m": 0.3}, {}, "parameters.coupling.depth_m: expected more than drogue.throat_x_m = 0.3"),
         ({}, {"depth_m": 0.6}, "parameters.coupling.depth_m: expected less than drogue.hose_joint_x_m = 0.55"),
         ({}, {"depth_m": 0.47, "stop_gap_m": 0.1}, "parameters.coupling.depth_m: expected less than"),
-        ({}, {"probe_tip_radius_m": 0.05}, "coupling.probe_tip_radius_m: expected less than coupling.socket"),
+        (
+            {},
+            {"probe_tip_radius_m": 0.05},
+            "parameters.coupling.probe_tip_radius_m: expected less than coupling.socket",
+        ),
         (
             {},
             {"probe_boom_radius_m": 0.04},
-            "coupling.probe_boom_radius_m: expected at most coupling.probe",
+            "parameters.coupling.probe_boom_radius_m: expected at most coupling.probe",
         ),
-        ({"inertia_kg_m2": [1.5, 0.5, 0.5]}, {}, "drogue.inertia_kg_m2: expected the inertia of a body"),
+        ({"inertia_kg_m2": [1.5, 0.5, 0.5]}, {}, "parameters.drogue.inertia_kg_m2: expected the inertia of a body"),
     ],
 )
 def test_a_basket_or_coupling_out_of_order_is_refused_although_every_value_is_in_its_range(

@@ -155,7 +155,7 @@ def test_more_hot_pixels_than_the_sensor_has_are_refused_before_the_flight(make_
     """2048 x 1088 = 2 228 224; two faults of 1.2 million are too many only where they overlap."""
     half = faults.HotPixels(count=1_200_000, stop_s=AFTER_S)
     make_camera(faults=(half, replace(half, start_s=AFTER_S, stop_s=9.0)))
-    with pytest.raises(DockairError, match=r"faults.count: expected up to 2228224 hot pixels, .* got 2400000"):
+    with pytest.raises(DockairError, match=r"faults\[1\].count: expected up to 2228224 hot pixels .* got 2400000"):
         make_camera(faults=(half, replace(half, start_s=AFTER_S - 0.1, stop_s=9.0)))
 
 

@@ -178,9 +178,9 @@ def test_most_hot_pixels_at_any_time_are_those_of_all_faults_that_overlap() -> N
     """7 and 5 together from 2 s to 4 s; the 9 that come later, and the 4 that begin as the 9 end, do not add up."""
     apart = HotPixels(count=9, start_s=6.0, stop_s=8.0), HotPixels(count=4, start_s=8.0)
     overlapping = HotPixels(count=7, stop_s=4.0), HotPixels(count=5, start_s=2.0, stop_s=6.0)
-    assert _faults(*apart).most_hot_pixels == 9
-    assert _faults(*apart, StuckFrame(), *overlapping).most_hot_pixels == 12
-    assert _faults(StuckFrame()).most_hot_pixels == 0
+    assert _faults(*apart).most_hot_pixels == (0, 9)
+    assert _faults(*apart, StuckFrame(), *overlapping).most_hot_pixels == (4, 12)
+    assert _faults(StuckFrame()).most_hot_pixels == (-1, 0)
 
 
 # Hot pixels

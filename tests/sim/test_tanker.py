@@ -177,7 +177,7 @@ def test_changes_are_told_in_their_order_with_what_follows():
         ({"bank_rad": 1.6}, "tanker.bank_rad"),
         ({"bank_rad": float("nan")}, "tanker.bank_rad"),
         ({"roll_rate_rad_s": -0.1}, "tanker.roll_rate_rad_s"),
-        ({"roll_rate_rad_s": 0.001}, "tanker.roll_rate_rad_s"),
+        ({"roll_rate_rad_s": 0.001}, "parameters.tanker_path.roll_rate_rad_s"),
         ({"starts_s": -1.0}, "tanker.starts_s"),
         ({"leg_s": float("inf")}, "tanker.leg_s"),
     ],
@@ -198,7 +198,7 @@ def test_racetrack_is_flown_as_long_as_rolling_in_and_out_fits_into_the_turn():
 
     turned = racetrack(0.98).at(1.98 * np.pi / TURN)
     assert abs(turned.heading_rad) == pytest.approx(np.pi, abs=1e-9)
-    with pytest.raises(DockairError, match=r"tanker\.roll_rate_rad_s: expected a rate at which"):
+    with pytest.raises(DockairError, match=r"^parameters\.tanker_path\.roll_rate_rad_s: expected a rate at which"):
         racetrack(1.02)
 
 
