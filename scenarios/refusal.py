@@ -10,6 +10,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails, PydanticCustomError
 
 from dockair.errors import DockairError
+from dockair.scenarios.tables.table import as_written
 
 _WORDS = {float: "a number", int: "an integer", bool: "true or false", str: "a string", dict: "a table"}
 _UNKNOWN = "extra_forbidden"  # pydantic's word for a key that does not exist
@@ -55,7 +56,7 @@ def refusal(error: ValidationError, model: type[BaseModel], place: Callable[[str
     if first["type"] == "missing":
         return DockairError(where, expected=_expected(field), got="nothing", also=also)
     choices = () if _is_list_asked(field, first["loc"]) else _choices(field)
-    return DockairError(where, expected=_expected(field), got=first["input"], exists=choices, also=also)
+    return DockairError(where, expected=_expected(field), got=as_written(first["input"]), exists=choices, also=also)
 
 
 def _of_the_list(one: ErrorDetails) -> ErrorDetails:

@@ -20,7 +20,7 @@ from pydantic import BeforeValidator, Field
 
 from dockair.errors import DockairError
 from dockair.scenarios.refusal import Expected
-from dockair.scenarios.tables.table import Table, tuple_from_list
+from dockair.scenarios.tables.table import Table, as_written, tuple_from_list
 
 SamplerName = Literal["grid", "random", "latin_hypercube"]
 Value = bool | int | float | str
@@ -59,7 +59,8 @@ class Draw(Table):
         if self.log and self.low is not None and self.low <= 0.0:
             raise DockairError(f"{where}.low", expected="a number above 0 where log = true", got=self.low)
         if self.values is not None and not (self.values and all(isinstance(v, Value) for v in self.values)):
-            raise DockairError(f"{where}.values", expected="one number, text, true or false at least", got=self.values)
+            expected = "one number, text, true or false at least"
+            raise DockairError(f"{where}.values", expected=expected, got=as_written(self.values))
 
     def at(self, u: float) -> Value:
         """Return the value at u in [0, 1], Eqs. (1) to (3)."""

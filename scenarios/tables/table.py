@@ -14,3 +14,8 @@ class Table(BaseModel):
 def tuple_from_list(value: Any) -> Any:
     """Arrays of TOML are lists; ours are tuples, which nobody can change."""
     return tuple(value) if isinstance(value, list) else value
+
+
+def as_written(value: Any) -> Any:
+    """Return a tuple as the list that it was in TOML: so errors say what was got."""
+    return list(value) if isinstance(value, tuple) else value

@@ -49,8 +49,8 @@ def _from_toml(cls: type[Any], path: str | Path) -> Any:
     try:
         return cls(**{k: tuple(v) if isinstance(v, list) else v for k, v in table.items()})
     except DockairError as error:
-        where = f"{path}: {error.where.partition('.')[2]}"
-        raise error.at(where) from None
+        name = error.where.partition(".")[2]
+        raise DockairError(f"{path}: {name}", expected=error.expected, got=table[name]) from None
 
 
 def _limits_in_words(cls: type[Any], name: str) -> str:
@@ -133,7 +133,8 @@ class Camera:
         if (np.abs(np.array(camera.principal_point_px) - middle) > bound).any():
             (u, v), (u_end, v_end) = middle - bound, middle + bound
             expected = f"u from {u:g} to {u_end:g} px, v from {v:g} to {v_end:g} px, around the sensor's middle"
-            raise DockairError(f"{path}: principal_point_px", expected=expected, got=camera.principal_point_px)
+            got = list(camera.principal_point_px)
+            raise DockairError(f"{path}: principal_point_px", expected=expected, got=got)
         return camera
 
     @property

@@ -121,9 +121,9 @@ def test_sheet_is_read_from_toml(tmp_path):
         ('width_px = "2048"', "width_px", "from 16 to 16384 px, got '2048'"),
         ("width_px = true", "width_px", "from 16 to 16384 px, got True"),
         ("width_px = 1440.5", "width_px", "expected a whole number from 16 to 16384 px, got 1440.5"),
-        ("principal_point_px = [5.629, 2.989]", "principal_point_px", "v from 271.5 to 815.5 px"),  # millimetres
+        ("principal_point_px = [5.629, 2.989]", "principal_point_px", "middle, got [5.629, 2.989]"),  # millimetres
         ("principal_point_px = [1023.5, 1023.5]", "principal_point_px", "u from 511.5 to 1535.5 px, v from 271.5"),
-        ("principal_point_px = [1023.5]", "principal_point_px", "2 numbers [px]"),
+        ("principal_point_px = [1023.5]", "principal_point_px", "2 numbers [px], none beyond 4096, got [1023.5]"),
         ('principal_point_px = ["a", "b"]', "principal_point_px", "2 numbers [px]"),
     ],
 )

@@ -225,6 +225,8 @@ def test_every_packaged_plan_can_be_flown_and_says_what_for(name):
         ('scenarios = ["mine.toml"]', "mine.toml: expected a scenario file, got 'no such file'"),
         ('scenarios = ["default", "default"]', "scenarios: expected every flight once, got 'default, seed 0, twice'"),
         ('scenarios = ["default"]\nseeds = 0', "seeds: expected how many seeds, from 1 to 100000"),
+        ('scenarios = ["default"]\nseeds = []', "each from 0 to 2^63 - 1, got []"),
+        ("scenarios = []", "with scenario, seeds, set, got []"),
         ('scenarios = ["default"]\nseeds = [-1]', "seeds[0]: expected how many seeds"),
         ('scenarios = ["default"]\nseeds = true', "seeds: expected how many seeds"),
         ('scenarios = ["default"]\nseeds = [1, 1]', "expected every flight once, got 'default, seed 1, twice'"),

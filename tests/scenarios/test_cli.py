@@ -142,7 +142,7 @@ def flights(monkeypatch, tmp_path):
         (("fly", "--record", "some"), "Invalid value for '--record': Value error, 'some' is not one of"),
         (
             ("fly", "--set", "start.sigma_m=[1.0, 2.0]"),
-            "--set start.sigma_m: expected three numbers, each 0 to 20, got (1.0, 2.0)",
+            "--set start.sigma_m: expected three numbers, each 0 to 20, got [1.0, 2.0]",
         ),
         (("fly", "--sed", "1"), "No such option: --sed"),
         (("fyl",), "No such command 'fyl'"),

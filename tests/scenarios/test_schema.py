@@ -44,7 +44,7 @@ SIGMAS = "three numbers, each 0 to 20"
         ("seed = 1.0", "seed", f"{SEED}, got 1.0"),
         ("seed = true", "seed", f"{SEED}, got True"),
         ("sun.present = 1", "sun.present", "true or false, got 1"),
-        ("start.sigma_m = [1.0, 2.0]", "start.sigma_m", f"{SIGMAS}, got (1.0, 2.0)"),
+        ("start.sigma_m = [1.0, 2.0]", "start.sigma_m", f"{SIGMAS}, got [1.0, 2.0]"),
         ("start.sigma_m = [1.0, 2.0, -3.0]", "start.sigma_m[2]", f"{SIGMAS}, got -3.0"),
         ("start.sigma_m = 0.3", "start.sigma_m", f"{SIGMAS}, got 0.3"),
         ("start.sigma_attitude_deg = 5.0", "start.sigma_attitude_deg", "three numbers, each 0 to 30, got 5.0"),
@@ -87,7 +87,7 @@ def test_a_wrong_value_is_refused_in_one_line_with_file_and_key(scenario_file, t
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("start.sigma_m = []", f"start.sigma_m: expected {SIGMAS}, got ()"),
+        ("start.sigma_m = []", f"start.sigma_m: expected {SIGMAS}, got []"),
         ("faults = 3", "faults: expected "),
     ],
 )
