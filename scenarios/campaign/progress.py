@@ -15,9 +15,11 @@ from dockair.scenarios.campaign.row import flight_of, unflown
 from dockair.scenarios.commands.output import plain_console, print_whole
 from dockair.scenarios.report.groups import counted, groups_of
 from dockair.scenarios.statistics import wilson_interval
+from dockair.scenarios.tables.crew import OUR_NAVIGATOR, Guidance
 
 _LINE_INTERVAL_S = 30.0  # between two lines where stderr is no terminal
 _BAR = 20  # characters: the figures beside it fit on a terminal of 80
+_USUAL = {"controller": Guidance().controller, "navigator": OUR_NAVIGATOR}  # who flies where a plan says nothing of it
 _CELL = 48  # characters of settings that a table's cell can hold
 _TOO_NARROW = (
     "\N{DAGGER} a seed occurs twice: its flights share gusts and hardware, so that the intervals are too narrow"
@@ -157,9 +159,9 @@ def show_campaign(table: Mapping[str, Any]) -> None:
 
 
 def _crew_columns(groups: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Return what of a crew differs from group to group, perfect navigation apart, which stands under sensing."""
-    crews = {name: {group[name] for group in groups} - {"truth"} for name in ("controller", "navigator")}
-    return [name for name, found in crews.items() if len(found) > 1]
+    """Return what of a crew is unusual, or differs from group to group; perfect navigation stands under sensing."""
+    crews = {name: {group[name] for group in groups} - {"truth"} for name in _USUAL}
+    return [name for name, found in crews.items() if len(found) > 1 or not found <= {_USUAL[name]}]
 
 
 def _settings_cells(groups: Sequence[Mapping[str, Any]]) -> tuple[list[str], list[str]]:

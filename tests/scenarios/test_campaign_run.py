@@ -1008,6 +1008,26 @@ def test_none_unsafe_is_told_as_a_number(here, tmp_path, capsys):
     assert heading.split()[-2:] == ["unsafe", "errors"] and row.split()[-2:] == ["0", "0"]
 
 
+@pytest.mark.parametrize(
+    ("crews", "named"),
+    [
+        ([{"navigator": "mine:Mine"}], {"mine:Mine"}),
+        ([{"controller": "pid"}], {"pid"}),
+        ([{"controller": "pid"}, {}], {"pid", "predictive"}),
+        ([{}], set()),
+        ([{"navigator": "truth"}], set()),
+    ],
+)
+def test_who_flies_is_named_where_it_is_not_the_usual_crew_or_not_the_same_everywhere(
+    here, tmp_path, capsys, crews, named
+):
+    over = fly(plan(tmp_path, 2, "", '"default"'), tmp_path / "out").to_dict()
+    capsys.readouterr()
+    show_campaign(over | {"groups": [over["groups"][0] | crew for crew in crews]})
+    shown = set(capsys.readouterr().out.split())
+    assert shown & {"mine:Mine", "pid", "predictive", "dockair.nav.navigator:Navigator"} == named
+
+
 def test_a_report_made_while_a_campaign_runs_is_not_left_beside_the_rows_of_all_flights(here, tmp_path):
     page = tmp_path / "out/report.html"
     fly(plan(tmp_path), tmp_path / "out", watch=lambda jobs, entries: lambda row, wall_s: page.write_text("of fewer"))
