@@ -80,8 +80,13 @@ def test_the_basket_captures_inside_its_ring_and_misses_where_the_closed_form_sa
     for case in ("1.2 m/s, tip below", "1.2 m/s, tip above and aside", "2.6 m/s, tip below"):
         assert rows[case]["ours"] == {"captured": 1, "struck_the_rim": 1, "missed": 3, "captured_to_m": 0.15}
         assert rows[case]["reference"] == {"missed": 3}
-    for case in ("2.6 m/s, tip above and aside", "1.2 m/s, tip aside, nose +10 deg down"):
+    for case in ("2.6 m/s, tip above and aside", "1.2 m/s, tip aside, nose 10 deg down"):
         assert rows[case]["ours"] == {"captured": 0, "struck_the_rim": 2, "missed": 3}
+
+
+def test_a_raised_nose_is_called_up_and_a_lowered_one_down():
+    cases = [world_contact._nose_in_words(angle) for angle in (-10.0, 5.0)]
+    assert cases == ["nose 10 deg up", "nose 5 deg down"]
 
 
 @pytest.mark.parametrize(("direction_deg", "offset_m"), [(45.0, 0.15), (0.0, 0.2), (-45.0, 0.25)])

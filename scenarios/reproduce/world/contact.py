@@ -86,7 +86,7 @@ def reproduce(out: Path | None) -> dict[str, Any]:
             shots += line
     for nose_down in _NOSE_DOWN_DEG:
         line = [shoot(_USUAL_M_S, offset, 0.0, nose_down) for offset in _OFFSETS_M]
-        rows.append(_row(f"{_USUAL_M_S} m/s, tip aside, nose {nose_down:+.0f} deg down", line, straight=False))
+        rows.append(_row(f"{_USUAL_M_S} m/s, tip aside, {_nose_in_words(nose_down)}", line, straight=False))
     if out is not None:
         _draw(shots, out / picture_name(ID))
     return {"id": ID, "source": _SOURCE, "rows": rows}
@@ -96,6 +96,10 @@ def miss_from_m() -> float:
     """Offset of Eq. (1)."""
     drogue, coupling = load_parameters("drogue", DrogueParameters), load_parameters("coupling", CouplingParameters)
     return 0.5 * drogue.ring_diameter_m + drogue.rim_tube_radius_m + coupling.probe_tip_radius_m
+
+
+def _nose_in_words(nose_down_deg: float) -> str:
+    return f"nose {abs(nose_down_deg):.0f} deg {'down' if nose_down_deg > 0.0 else 'up'}"
 
 
 def _row(case: str, line: list[Shot], *, straight: bool) -> dict[str, Any]:
