@@ -84,11 +84,11 @@ def _plots() -> Any:
 
     return rrb.Horizontal(
         _plot("range", "Ring ahead of the tip [m]", top_right),
-        _plot("lateral", "Ring beside the tip's line [m]", top_right, (-OFFSET_SHOWN_M, OFFSET_SHOWN_M)),
+        _plot("lateral", "Ring beside the tip [m]", top_right, (-OFFSET_SHOWN_M, OFFSET_SHOWN_M)),
         _plot("closing", "Closing speed [m/s]", bottom_left),
         rrb.Tabs(
-            _plot("lateral_error", "Belief's error across [mm]", top_left, errors),
-            _plot("range_error", "Belief's error along [mm]", top_left, errors),
+            _plot("lateral_error", "Error across [mm]", top_left, errors),
+            _plot("range_error", "Error along [mm]", top_left, errors),
             active_tab=0,
         ),
         rrb.Tabs(

@@ -351,12 +351,17 @@ def test_before_the_first_frame_no_exposure_is_plotted_and_then_the_newest(hand_
     np.testing.assert_allclose(plot_series(log)["exposure/exposure"][2], [np.nan, 10.0, 10.0, 30.0, 30.0, 50.0])
 
 
-def _stored_plots(path) -> dict[str, list | None]:
-    """Origin of each plot of the stored blueprint -> the ends of its vertical axis, None where the data decide."""
+def _stored_layout(path) -> dict:
+    """Entity of the stored blueprint -> what it says."""
     from rerun.chunk import RrdReader
 
     reader = RrdReader(path)
-    batches = {c.entity_path: c.to_record_batch() for c in reader.stream(store=reader.blueprints()[0])}
+    return {c.entity_path: c.to_record_batch() for c in reader.stream(store=reader.blueprints()[0])}
+
+
+def _stored_plots(path) -> dict[str, list | None]:
+    """Origin of each plot of the stored blueprint -> the ends of its vertical axis, None where the data decide."""
+    batches = _stored_layout(path)
     origins = {
         path: batch["ViewBlueprint:space_origin"].to_pylist()[0][0]
         for path, batch in batches.items()
@@ -375,6 +380,15 @@ def test_every_series_has_a_plot_and_every_plot_a_series(flown, hand_made):
     plots = _stored_plots(_write(folder, log, hand_made.sheets))
     series = {f"plots/{entity.split('/')[0]}" for entity in plot_series(log)}
     assert set(plots) == series | {"plots/heading_error"}  # of navigators that keep a heading
+
+
+def test_no_plots_title_is_longer_than_a_window_of_1400_pixels_shows(flown, hand_made):
+    folder, log, _ = flown
+    entities = _stored_layout(_write(folder, log, hand_made.sheets)).values()
+    views = [view for view in entities if "ViewBlueprint:display_name" in view.schema.names]
+    titles = [view["ViewBlueprint:display_name"].to_pylist()[0][0] for view in views]
+    plots = [title for title in titles if title.endswith("]")]
+    assert "Ring ahead of the tip [m]" in plots and max(map(len, plots)) <= 25
 
 
 def test_errors_of_a_drogue_that_was_lost_do_not_flatten_those_of_the_docking(flown, hand_made):
