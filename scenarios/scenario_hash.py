@@ -40,6 +40,12 @@ def file_hash(file: str) -> str:
     return blake2b(json.dumps(table, sort_keys=True, default=str).encode(), digest_size=8).hexdigest()
 
 
+def sheets_of(scenario: Scenario) -> dict[str, str]:
+    """Return the keys of the sheets that a scenario names, each with a digest of what its sheet holds."""
+    contents = _sheets_by_content(scenario.hardware.model_dump())
+    return {f"hardware.{key}": contents[key] for key in SHEETS if contents[key] is not None}
+
+
 def _sheets_by_content(hardware: Mapping[str, Any]) -> dict[str, Any]:
     """Return the table with digests for the paths of sheets, which are written otherwise from another folder."""
     return {

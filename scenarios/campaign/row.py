@@ -13,6 +13,7 @@ from dockair.scenarios.campaign.jobs import Job
 from dockair.scenarios.campaign.worker import Answer
 from dockair.scenarios.judgement.metrics import HeadingFigures, NavigationFigures
 from dockair.scenarios.judgement.result import Result
+from dockair.scenarios.scenario_hash import sheets_of
 
 Row = dict[str, Any]
 
@@ -38,11 +39,12 @@ COLUMNS: dict[str, str] = (
     | dict.fromkeys(_HEADING, "float")
     | {"frames": "int", "duration_s": "float", "background": "text", "error": "text"}
     | dict.fromkeys(_LISTS, "text")
-    | {"scenario_hash": "text", "command": "text"}
+    | {"sheets": "text", "scenario_hash": "text", "command": "text"}
 )
 
 _NEVER_EMPTY = {"scenario", "seed", "sensing", "scenario_hash", "command", "attempt_log"}
-_ALWAYS = COLUMNS.keys() - {"nav_by_range", "timeline", "background", "rim_radius_m", *_HEADING}  # these came later
+_LATER = {"nav_by_range", "timeline", "background", "rim_radius_m", "sheets", *_HEADING}  # came after the others
+_ALWAYS = COLUMNS.keys() - _LATER
 _TYPES = {"text": (str,), "bool": (bool,), "int": (int,), "float": (float, int)}
 
 
@@ -85,6 +87,7 @@ def _asked(job: Job) -> Row:
     row["command"] = job.command
     row |= {"sensing": scenario.sensing, "navigator": scenario.navigation.navigator}
     row["controller"] = scenario.guidance.controller
+    row["sheets"] = json.dumps(sheets_of(scenario))
     sheet, own = read_sheet("drogue"), scenario.parameters.get("drogue", {})
     row["rim_radius_m"] = 0.5 * own.get("ring_diameter_m", sheet["ring_diameter_m"].value)
     return row | {f"{SET}{key}": value for key, value in job.drawn.items()}

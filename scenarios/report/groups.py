@@ -15,6 +15,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from hashlib import blake2b
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,7 @@ from dockair.scenarios.judgement.attempts import RefereeLimits
 from dockair.scenarios.judgement.no_attempt import cause_and_ending, ending
 from dockair.scenarios.statistics import wilson_interval
 from dockair.scenarios.tables.crew import OUR_NAVIGATOR
+from dockair.scenarios.toml_files import toml_value
 
 Row = Mapping[str, Any]
 
@@ -82,7 +84,7 @@ class Group:
     sensing: str
     navigator: str
     controller: str
-    settings: str  #: keys set over the scenario as in `--set` or "KEY drawn"; those that have a column are left out
+    settings: str  #: keys set over the scenario, by `conditions_of`, or "KEY drawn"; without those that have a column
     rows: tuple[Row, ...]
 
     @property
@@ -264,6 +266,20 @@ def file_and_settings(row: Row) -> tuple[str, list[str]]:
     return file, options[1::2]
 
 
+def conditions_of(row: Row) -> list[str]:
+    """Return what was set over the scenario; of a sheet its name and what it held: its path depends on where one stood.
+
+    Tables of before the column `sheets` do not say what one held.
+    """
+    contents = json.loads(row.get("sheets") or "{}")
+    return [_by_content(text, contents) for text in file_and_settings(row)[1]]
+
+
+def _by_content(text: str, contents: Mapping[str, str]) -> str:
+    key, _, value = text.partition("=")
+    return f'{key}="{Path(str(toml_value(value))).name}" ({contents[key]})' if key in contents else text
+
+
 def drawn_of(row: Row) -> list[str]:
     """Return what the plan has drawn for this flight: "key=value" each."""
     return [text for text in file_and_settings(row)[1] if row.get(SET + key_of(text)) is not None]
@@ -277,9 +293,10 @@ def _settings_of(row: Row) -> str:
 
 def _given_and_drawn(row: Row) -> tuple[list[str], list[str]]:
     """Return "key=value" of what was set, and the keys that were drawn; without those that have a column."""
-    drawn = drawn_of(row)
-    settings = [text for text in file_and_settings(row)[1] if key_of(text) not in _IN_COLUMNS]
-    return [text for text in settings if text not in drawn], [key_of(text) for text in settings if text in drawn]
+    drawn = set(map(key_of, drawn_of(row)))
+    settings = [text for text in conditions_of(row) if key_of(text) not in _IN_COLUMNS]
+    keys = map(key_of, settings)
+    return [text for text in settings if key_of(text) not in drawn], [key for key in keys if key in drawn]
 
 
 def key_of(text: str) -> str:

@@ -12,7 +12,7 @@ from itertools import combinations
 
 import numpy as np
 
-from dockair.scenarios.report.groups import Group, Row, file_and_settings, key_of
+from dockair.scenarios.report.groups import Group, Row, conditions_of, key_of
 from dockair.scenarios.statistics import sign_test
 
 _SEES = ("navigation.navigator", "camera.sensing")  # keys that say what the navigation sees, and nothing of the world
@@ -97,7 +97,6 @@ def _by_conditions(rows: Sequence[Row], apart: tuple[str, ...]) -> dict[tuple[st
     """Return the rows by what else decides the flight: seed, values set and drawn; a name has one content."""
     found: dict[tuple[str, ...], list[Row]] = {}
     for row in rows:
-        _, options = file_and_settings(row)
-        settings = [text for text in options if not key_of(text).startswith(apart)]
+        settings = [text for text in conditions_of(row) if not key_of(text).startswith(apart)]
         found.setdefault((str(row["seed"]), *sorted(settings)), []).append(row)
     return found

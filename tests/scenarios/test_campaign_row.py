@@ -16,6 +16,8 @@ from dockair.scenarios.judgement.attempts import Attempt
 from dockair.scenarios.judgement.metrics import HeadingFigures, NavigationFigures
 from dockair.scenarios.judgement.referee import Contact
 from dockair.scenarios.judgement.result import Result
+from dockair.scenarios.report.groups import groups_of
+from dockair.scenarios.report.pairs import paired
 
 
 @pytest.fixture
@@ -87,6 +89,31 @@ def test_a_row_says_the_rims_radius_of_its_scenarios_drogue_and_one_of_before_it
     assert (own["rim_radius_m"], other["rim_radius_m"]) == (0.25, 0.305)
     before = {name: value for name, value in other.items() if name != "rim_radius_m"}
     assert is_row(before)
+
+
+def test_flights_with_a_sheet_of_ones_own_are_pooled_by_what_it_holds_wherever_their_plan_was_begun(
+    tmp_path, monkeypatch
+):
+    own = '{ scenario = "default", set = { "hardware.ring" = "ring.toml" } }'
+    for folder, diameter_m in (("a", 0.5), ("b", 0.51)):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "ring.toml").write_text(f"diameter_m = {diameter_m}\ncount = 8\n")
+        (tmp_path / folder / "p.toml").write_text(PLAN.format(seeds=1, scenarios=own))
+
+    def begun(where, plan):
+        monkeypatch.chdir(where)
+        monkeypatch.setattr("dockair.scenarios.campaign.jobs.require_buildable", lambda scenario: None)
+        return [row_of(job, Answer(columns=columns_of(result()))) for job in jobs_of(PlanFile(plan))]
+
+    inside, outside = begun(tmp_path / "a", "p.toml"), begun(tmp_path, "a/p.toml")
+    assert inside[0]["command"] != outside[0]["command"]
+    (group,) = groups_of([*inside, *outside])
+    digest = json.loads(inside[0]["sheets"])["hardware.ring"]
+    assert group.settings == f'hardware.ring="ring.toml" ({digest})'
+    assert len(groups_of([*inside, *begun(tmp_path / "b", "p.toml")])) == 2
+    before = [{name: value for name, value in row.items() if name != "sheets"} for row in (*inside, *outside)]
+    assert all(map(is_row, before)) and len(groups_of(before)) == 2
+    assert paired(*groups_of(inside), *groups_of(outside), apart=()).flights == 1
 
 
 def test_a_row_of_before_is_said_as_the_plan_says_it_now_and_keeps_no_key_that_is_no_longer_drawn(job):
