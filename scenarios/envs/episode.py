@@ -115,7 +115,8 @@ class Episodes(gymnasium.Env[Obs, NDArray[np.float32]], Generic[Obs]):
             options: "scenario" (name, path or Scenario), "set" (dotted key -> value) and "seed" for this flight.
 
         Raises:
-            DockairError: a wrong seed or option, or a flight that cannot be begun or is over with this tick.
+            DockairError: a wrong seed or option, or a flight that cannot be begun or is over with this tick; in mode
+                "human", no viewer that can be opened.
         """
         options = {} if options is None else options
         scenario = self.chosen_scenario(options)
@@ -221,13 +222,14 @@ class Episodes(gymnasium.Env[Obs, NDArray[np.float32]], Generic[Obs]):
         return self._tick
 
     def _begun(self, scenario: Scenario, seed: int) -> tuple[Flight, AttemptJudge, Tick]:
-        """Return a new flight, its judge and its first control tick; one that is refused is closed."""
+        """Return a new flight, its judge and its first control tick, shown; one that is refused is closed."""
         flight, judge = self.new_flight(scenario, seed), AttemptJudge(self._attempts)
         try:
             tick, _, outcome = self._flown(flight, judge, ReceiverCommand())
             if outcome is not None:
                 expected = "a flight that goes on after its first control tick"
                 raise DockairError("reset", expected=expected, got=outcome.value)
+            self._show(flight, tick)
         except BaseException:
             flight.close()
             raise
@@ -238,6 +240,7 @@ class Episodes(gymnasium.Env[Obs, NDArray[np.float32]], Generic[Obs]):
         assert self._flight is not None
         tick, failed, self._outcome = self._flown(self._flight, self._judge, command)
         self._take(tick)
+        self._show(self._flight, tick, is_last=self._outcome is not None)
         return failed
 
     def _flown(self, flight: Flight, judge: AttemptJudge, command: ReceiverCommand) -> tuple[Tick, int, Outcome | None]:
@@ -258,10 +261,12 @@ class Episodes(gymnasium.Env[Obs, NDArray[np.float32]], Generic[Obs]):
         self._tick = tick
         self.imu = tick.imu[-1] if tick.imu else self.imu
         self.note(tick)
+
+    def _show(self, flight: Flight, tick: Tick, *, is_last: bool = False) -> None:
+        """Let the viewer follow, if there is to be one."""
         if self.render_mode == "human":
-            assert self._flight is not None
             self._viewer = self._viewer or LiveViewer()
-            self._viewer.show(self._flight, tick, is_last=self._outcome is not None)
+            self._viewer.show(flight, tick, is_last=is_last)
 
     def chosen_scenario(self, options: Mapping[str, Any]) -> Scenario:
         """Return the scenario that reset's options ask for, with the environment's own sensing, checked."""

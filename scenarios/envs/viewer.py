@@ -80,15 +80,15 @@ class LiveViewer:
         import rerun as rr  # 0.75 s, and only this needs it
         from rerun_bindings import flush_and_cleanup_orphaned_recordings
 
+        episode = self._episode + 1
+        recording = rr.RecordingStream("dockair", recording_id=uuid4(), send_properties=False)
+        recording.send_recording_name(f"{flight.scenario.name}, episode {episode}")
+        recording.set_log_time_enabled(False)  # the timelines are the flight's
+        is_new = self._sink(recording)  # what it raises leaves the last episode as it is
         self._next_s, self._frame = 0.0, None
         self._p_TE, self._path = hose_exit(flight.truth), []
-        episode = self._episode + 1
-        self._recording = None
+        self._recording = recording
         flush_and_cleanup_orphaned_recordings()  # the last episode's: rerun keeps its threads and memory otherwise
-        self._recording = rr.RecordingStream("dockair", recording_id=uuid4(), send_properties=False)
-        self._recording.send_recording_name(f"{flight.scenario.name}, episode {episode}")
-        self._recording.set_log_time_enabled(False)  # the timelines are the flight's
-        is_new = self._sink(self._recording)
         if is_new or episode == 1:  # the layout stays; rerun never frees what it took to send one
             self._recording.send_blueprint(blueprint(flight.sheets.camera))
         log_still(self._recording, flight.sheets, shapes_of(flight.world.model))

@@ -239,6 +239,35 @@ def test_a_refused_reset_leaves_the_picture(monkeypatch):
     assert not again["picture"].any()
 
 
+def test_a_reset_whose_viewer_cannot_be_opened_leaves_the_flight_before_it(flights, monkeypatch):
+    """Or none, at the first reset."""
+    is_open, shown = False, []
+
+    class Viewer:
+        def show(self, flight, tick, *, is_last=False):
+            if not is_open:
+                raise MachineError("render_mode", expected="the rerun viewer")
+            shown.append((flight, is_last))
+
+    monkeypatch.setattr(envs_episode, "require_viewer", lambda: None)
+    monkeypatch.setattr(envs_episode, "LiveViewer", Viewer)
+    made = DockEnv(QUICK, render_mode="human")
+    with pytest.raises(MachineError):
+        made.reset(seed=0)
+    assert flights == [] and made._flight is None
+    is_open = True
+    made.reset(seed=0)
+    before, time_s = made._flight, made.tick.truth.time_s
+    is_open = False
+    with pytest.raises(MachineError):
+        made.reset(seed=5)
+    assert flights == [before] and made._flight is before
+    is_open = True
+    made.step(STILL)
+    assert made.tick.truth.time_s > time_s and shown == [(before, False)] * 2
+    made.close()
+
+
 def test_a_view_that_cannot_be_closed_keeps_neither_flight_open_nor_seeds(env, flights):
     """Its context belongs to the thread that made it: another's reset fails, and the next one begins anew."""
 

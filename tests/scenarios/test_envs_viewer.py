@@ -143,6 +143,24 @@ def test_a_viewer_that_is_opened_by_hand_after_the_first_try_has_failed_gets_the
     assert (len(layouts), names[-1]) == (1, "hand made, episode 1")
 
 
+def test_an_episode_goes_on_in_its_own_recording_after_another_could_not_be_begun(hand_made, monkeypatch):
+    monkeypatch.setattr(envs_viewer, "shapes_of", lambda model: ())
+    sunk = []
+
+    def sink(recording) -> bool:
+        if sunk:
+            raise MachineError("render_mode", expected="a display")
+        sunk.append(recording)
+        return False
+
+    viewer, flight = LiveViewer(sink), _flight(hand_made)
+    _show(viewer, hand_made, flight, 1)
+    before = viewer._next_s
+    with pytest.raises(MachineError):
+        _show(viewer, hand_made, _flight(hand_made), 1)
+    assert (viewer._flight, viewer._recording, viewer._next_s, len(viewer._path)) == (flight, sunk[0], before, 1)
+
+
 @pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="counts threads where Linux lists them")
 def test_episodes_leave_no_threads_behind(hand_made, monkeypatch, tmp_path):
     monkeypatch.setattr(envs_viewer, "shapes_of", lambda model: ())
