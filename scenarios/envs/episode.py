@@ -236,7 +236,7 @@ class Episodes(gymnasium.Env[Obs, NDArray[np.float32]], Generic[Obs]):
         return flight, judge, tick
 
     def _fly(self, command: ReceiverCommand) -> int:
-        """Fly one control tick; return how many attempts failed in it that are not the last."""
+        """Fly one control tick; return how many attempts failed in it and did not end the episode."""
         assert self._flight is not None
         tick, failed, self._outcome = self._flown(self._flight, self._judge, command)
         self._take(tick)
@@ -244,7 +244,7 @@ class Episodes(gymnasium.Env[Obs, NDArray[np.float32]], Generic[Obs]):
         return failed
 
     def _flown(self, flight: Flight, judge: AttemptJudge, command: ReceiverCommand) -> tuple[Tick, int, Outcome | None]:
-        """Fly one control tick; return it, how many attempts failed in it that are not the last, and the outcome."""
+        """Fly one control tick; return it, how many attempts failed and did not end the episode, and the outcome."""
         attempt = flight.referee.attempt
         tick = flight.step(command)
         if self._until_clear:  # that another attempt begins says that the last one failed
@@ -254,7 +254,7 @@ class Episodes(gymnasium.Env[Obs, NDArray[np.float32]], Generic[Obs]):
             outcome = tick.outcome
         elif outcome is None and tick.truth.time_s >= flight.scenario.flight.duration_s:
             outcome = judge.unfinished or Outcome.TIMEOUT
-        return tick, int(failed and outcome is None), outcome
+        return tick, int(failed and outcome in (None, Outcome.TIMEOUT)), outcome
 
     def _take(self, tick: Tick) -> None:
         """Make a control tick the newest."""

@@ -79,7 +79,7 @@ OUTCOME_REWARD = {
 LOOSE_CONTACT_REWARD = 0.0  #: of a contact that is not good: better than a miss, and worth nothing
 #: At most, where anything was unsafe: no worse, so that who learns by trial dares to come near.
 UNSAFE_REWARD = OUTCOME_REWARD[Outcome.MISS]
-RETRY_REWARD = -1.0  #: for an attempt that failed and was not the last
+RETRY_REWARD = -1.0  #: for an attempt that failed and did not end the episode
 _ACTION_COST_1_S = 0.02  # of a full deflection of every axis; small beside the 1.2 of a second's approach at 1.2 m/s
 
 

@@ -507,6 +507,21 @@ def test_each_failed_attempt_but_the_last_costs_one_and_the_last_its_outcome_alo
     flown.close()
 
 
+@pytest.mark.parametrize(("attempts", "paid", "outcome"), [(2, -1.0 - 5.0, "timeout"), (1, -5.0, "rim_strike")])
+def test_an_attempt_that_fails_as_the_time_runs_out_is_charged_once(monkeypatch, attempts, paid, outcome):
+    """One that might have been tried again costs 1, as a tick earlier, the last its outcome; unsafe costs 5 in both."""
+    flown = DockEnv(QUICK, attempts=attempts, reward="sparse", ticks_per_step=4)
+    flown.reset(seed=0, options={"set": {"flight.duration_s": 0.03}})
+    step = flown._flight.world.step
+    touches = iter([True])  # four metres behind: over as soon as it has begun
+    monkeypatch.setattr(
+        flown._flight.world, "step", lambda command: replace(step(command), probe_touches_drogue=next(touches, False))
+    )
+    _, reward, *_, info = flown.step(np.zeros(6, np.float32))
+    flown.close()
+    assert (reward, info["outcome"]) == (paid, outcome)
+
+
 def test_until_clear_an_attempt_has_failed_when_the_next_begins(monkeypatch):
     flown = DockEnv(QUICK, until_clear=True, reward="sparse")
     flown.reset(seed=0)
