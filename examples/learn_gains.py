@@ -2,8 +2,9 @@
 
     python examples/learn_gains.py [GENERATIONS] [CANDIDATES] [EVALUATED]
 
-A generation draws candidates from a normal distribution, flies each on one new seed, and fits the distribution to the
-best. The gains before and after are then flown on seeds that no candidate has met (docs/environments.md#learning).
+A generation draws candidates from a log-normal distribution, flies each on the same new seeds, and fits the
+distribution to the best: a gain is positive, and nobody knows beforehand whether it is 0.5 or 5. The gains before and
+after are then flown on seeds that no candidate has met (docs/environments.md#learning).
 """
 
 import multiprocessing
@@ -22,11 +23,12 @@ from dockair.scenarios.schema import load_scenario
 
 INDEX = {entry.name: k for k, entry in enumerate(OBSERVATION)}
 TICKS, STEP_S = 5, 0.05  # of the control for which a command is held
-CONDITIONS = {"flight.duration_s": 8.0}  # a good approach is over after 6
-CLOSING_M_S, MOST_M_S, MOST_M_S2 = 1.2, 2.5, 1.0
-START, START_SIGMA = np.array([0.2, 0.2, 0.5]), np.array([0.5, 1.0, 0.5])
-SIGMA_MIN = 0.05  # of a gain: few elites look more alike than they are
+CONDITIONS = {"turbulence.sigma_m_s": 1.1, "flight.duration_s": 8.0}  # light gusts; a good approach is over after 6
+CLOSING_M_S, MOST_M_S, MOST_M_S2 = 1.2, 2.5, 3.0
+START, START_SIGMA = np.ones(3), 1.0  # of each gain; of its logarithm: a factor of 2.7 up or down
+SIGMA_MIN = 0.1  # likewise: few elites look more alike than they are
 ELITES = 0.35  # part of the candidates
+FLIGHTS = 3  # of each: in one flight's gusts a good policy fails and a bad one docks
 TRAINED_FROM, EVALUATED_FROM = 1000, 2000  # first seeds; the second are never trained on
 
 
@@ -77,7 +79,7 @@ def environment() -> gymnasium.Env:
 def episode(gains: np.ndarray, seed: int) -> tuple[float, bool]:
     """Fly a flight; return the sum of its rewards, and whether it ended in a good contact."""
     env, policy = environment(), LinearPolicy(gains)
-    observation, info = env.reset(seed=seed)
+    observation, info = env.reset(seed=int(seed))
     total, over = 0.0, False
     while not over:
         observation, reward, terminated, truncated, info = env.step(policy(observation))
@@ -89,7 +91,7 @@ def fitted(gains: np.ndarray, scores: np.ndarray) -> tuple[np.ndarray, np.ndarra
     """Return mean and standard deviation of the best.
 
     Args:
-        gains: (n, 3) of the candidates.
+        gains: (n, 3) logarithms of the candidates'.
         scores: (n,) of each.
     """
     count = max(2, round(ELITES * len(gains)))
@@ -100,15 +102,16 @@ def fitted(gains: np.ndarray, scores: np.ndarray) -> tuple[np.ndarray, np.ndarra
 def learned(pool: Executor, generations: int, candidates: int) -> np.ndarray:
     """(3,) gains after so many generations, a line printed of each."""
     rng = np.random.default_rng(0)
-    mean, sigma = START, START_SIGMA
+    mean, sigma = np.log(START), np.full(len(START), START_SIGMA)
     for generation in range(generations):
         gains = rng.normal(mean, sigma, (candidates, len(mean)))
-        flown = list(pool.map(partial(episode, seed=TRAINED_FROM + generation), gains))
-        scores = np.array([score for score, _ in flown])
-        mean, sigma = fitted(gains, scores)
-        docked = sum(good for _, good in flown)
-        print(f"generation {generation}: mean score {scores.mean():6.2f}, {docked} of {candidates} docked", flush=True)
-    return mean
+        seeds = TRAINED_FROM + FLIGHTS * generation + np.arange(FLIGHTS)
+        each = np.repeat(np.exp(gains), FLIGHTS, axis=0), np.tile(seeds, candidates)
+        scores, good = np.array(list(pool.map(episode, *each))).T
+        mean, sigma = fitted(gains, scores.reshape(candidates, FLIGHTS).mean(axis=1))
+        said = f"mean score {scores.mean():6.2f}, {good.sum():.0f} of {len(good)} flights docked"
+        print(f"generation {generation}: {said}", flush=True)
+    return np.exp(mean)
 
 
 def docked_of(pool: Executor, gains: np.ndarray, count: int) -> int:
@@ -117,7 +120,7 @@ def docked_of(pool: Executor, gains: np.ndarray, count: int) -> int:
     return sum(good for _, good in pool.map(partial(episode, gains), seeds))
 
 
-def main(generations: str = "4", candidates: str = "8", evaluated: str = "10") -> None:
+def main(generations: str = "6", candidates: str = "10", evaluated: str = "40") -> None:
     """Learn, and say what it was worth."""
     cores = len(os.sched_getaffinity(0))
     with ProcessPoolExecutor(cores, mp_context=multiprocessing.get_context("spawn")) as pool:

@@ -119,10 +119,18 @@ def test_the_navigator_of_ones_own_docks_soon(example):
 
 
 def test_the_search_for_gains_finds_those_that_score_best(example, monkeypatch):
-    module, best = example("learn_gains"), np.array([1.0, -0.5, 0.2])
-    monkeypatch.setattr(module, "episode", lambda gains, seed: (-float(np.sum((gains - best) ** 2)), False))
+    """Each seed likes other gains, their mean those of no single one."""
+    module, best, flown = example("learn_gains"), np.log([4.0, 0.5, 2.0]), []
+
+    def episode(gains, seed):
+        flown.append((tuple(gains), int(seed)))
+        return -float(np.sum((np.log(gains) - best - 0.5 * (seed % module.FLIGHTS - 1)) ** 2)), False
+
+    monkeypatch.setattr(module, "episode", episode)
     with ThreadPoolExecutor(1) as pool:
-        np.testing.assert_allclose(module.learned(pool, 12, 20), best, atol=0.1)
+        np.testing.assert_allclose(np.log(module.learned(pool, 12, 20)), best, atol=0.1)
+    assert len(set(flown)) == len(flown) == 12 * 20 * module.FLIGHTS
+    assert {seed for _, seed in flown} == set(range(module.TRAINED_FROM, module.TRAINED_FROM + 12 * module.FLIGHTS))
 
 
 def test_the_policy_whose_gains_are_searched_is_linear_in_the_belief_and_sums_to_its_velocity(example):
@@ -140,10 +148,10 @@ def test_the_policy_whose_gains_are_searched_is_linear_in_the_belief_and_sums_to
 
 def test_learning_runs_and_says_what_it_was_worth():
     done = subprocess.run(
-        [sys.executable, str(EXAMPLES / "learn_gains.py"), "1", "2", "1"], capture_output=True, text=True
+        [sys.executable, str(EXAMPLES / "learn_gains.py"), "1", "1", "1"], capture_output=True, text=True
     )
     assert done.returncode == 0, done.stderr
-    said = r"generation 0: mean score +\S+, \d of 2 docked\ngains: \S+, \S+, \S+\n"
+    said = r"generation 0: mean score +\S+, \d of 3 flights docked\ngains: \S+, \S+, \S+\n"
     said += "".join(rf"{when}: good contact in \d of 1 on new seeds\n" for when in ("before", "after"))
     assert re.fullmatch(said, done.stdout)
 
