@@ -81,7 +81,7 @@ def draw_as_built(
     The same numbers are drawn whatever the standard deviations are: setting one to zero leaves the others' draws.
 
     Raises:
-        DockairError: of `require_borne`.
+        DockairError: of `require_borne`; a lens that is drawn to distort so much that it shows no picture.
     """
     require_borne(ring, leds)
     camera_angle, imu_angle, camera_shift = rng.standard_normal((3, 3))
@@ -117,12 +117,19 @@ def _camera(nominal: Camera, parameters: AsBuiltParameters, lens: Array, distort
     )
     error = np.array([sigma_k1, sigma_k2, sigma_p, sigma_p]) * distortion
     k1, k2, p1, p2, k3 = (float(k) for k in np.append(error, 0.0) + _coefficients(nominal))
-    return replace(
-        nominal,
-        focal_length_m=nominal.focal_length_m * (1.0 + parameters.focal_length_sigma * float(lens[0])),
-        principal_point_px=(float(c_u), float(c_v)),
-        distortion=(k1, k2, p1, p2, k3) if error.any() else nominal.distortion,
-    )
+    try:
+        return replace(
+            nominal,
+            focal_length_m=nominal.focal_length_m * (1.0 + parameters.focal_length_sigma * float(lens[0])),
+            principal_point_px=(float(c_u), float(c_v)),
+            distortion=(k1, k2, p1, p2, k3) if error.any() else nominal.distortion,
+        )
+    except DockairError as refusal:
+        if refusal.where != "camera.distortion":
+            raise
+        found = f"every pixel's direction through a lens of {nominal.focal_length_m:g} m is found"
+        expected = f"deviations of the lens with which {found} (k1, k2, p1, p2, k3 as drawn)"
+        raise DockairError("parameters.as_built", expected=expected, got=refusal.got) from None
 
 
 def _differences(built: AsBuilt, camera: Camera, ring: LedRing, mounting: Mounting, intensity_w_sr: Array) -> Record:

@@ -140,6 +140,12 @@ def test_an_led_brighter_than_its_current_allows_is_refused() -> None:
         draw_as_built(Camera(), refused, MOUNTING, SHEET, LEDS, np.random.default_rng(0))
 
 
+def test_a_lens_too_short_for_the_distortion_that_is_drawn_is_refused_by_the_sheet_it_is_drawn_from() -> None:
+    """The distortion was said to be that of the camera's sheet, which has none."""
+    with pytest.raises(DockairError, match=r"^parameters.as_built: .* through a lens of 0.002 m is found .*, got \("):
+        draw_as_built(Camera(focal_length_m=0.002), LedRing(), MOUNTING, SHEET, LEDS, np.random.default_rng(0))
+
+
 def test_without_errors_the_hardware_is_the_sheets() -> None:
     exact = AsBuiltParameters(**{name: 0.0 for name in AsBuiltParameters.__slots__})
     built = draw_as_built(Camera(), LedRing(), MOUNTING, exact, replace(LEDS, bin_ratio=1.0), np.random.default_rng(0))
