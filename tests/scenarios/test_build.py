@@ -398,3 +398,12 @@ def test_a_probe_that_leaves_no_room_for_a_nose_is_refused_before_anything_is_bu
     """A campaign asks before it flies: what every flight would be refused for is said once."""
     with pytest.raises(DockairError, match=r"parameters.mounting.probe_tip_m: expected a tip more than 3.5 m ahead"):
         require_buildable(load_scenario("truth_navigation", {"parameters.mounting.probe_tip_m": [3.0, 0.0, 0.0]}))
+
+
+HEAVY = {"parameters.airframe.mass_kg": 13000.0, "flight.airspeed_m_s": 120.0, "tanker.manoeuvre": "racetrack"}
+
+
+def test_a_turn_that_the_receiver_cannot_fly_is_refused_before_it_flies():
+    """It was refused in flight, as the turn came in: 14 s of flight were lost, by an error that named an airspeed."""
+    with pytest.raises(DockairError, match=r"^tanker.bank_deg: expected a bank .* can turn at 120 m/s .*, got 40.0"):
+        build(load_scenario("truth_navigation", HEAVY | {"tanker.bank_deg": 40.0}), 0)
