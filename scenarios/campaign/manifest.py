@@ -13,6 +13,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from llvmlite.binding import get_host_cpu_name
+
 import dockair
 from dockair.errors import DockairError
 from dockair.scenarios.campaign.code import Code
@@ -58,7 +60,7 @@ def manifest_of(plan: Plan, jobs: Sequence[Job], flight: str, code: Code) -> dic
         "commit": commit,
         "uncommitted_changes": changed,
         "versions": versions(),
-        "machine": f"{platform.machine()}, {platform.system()} {platform.release()}, {os.cpu_count()} cores",
+        "machine": _machine(),
         "begun": datetime.now(UTC).isoformat(timespec="seconds"),
     }
 
@@ -140,6 +142,12 @@ def commit_of_the_code() -> tuple[str | None, bool | None]:
         return git("rev-parse", "HEAD"), bool(git("status", "--porcelain", ":/"))
     except (OSError, subprocess.SubprocessError):
         return None, None
+
+
+def _machine() -> str:
+    """Return what the machine is; its processor as LLVM calls it, which compiles for that one."""
+    processor = f"{platform.machine()} ({get_host_cpu_name()})"
+    return f"{processor}, {platform.system()} {platform.release()}, {os.cpu_count()} cores"
 
 
 def _background(jobs: Sequence[Job]) -> str:
