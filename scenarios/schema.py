@@ -98,6 +98,9 @@ class Scenario(Table):
             if sheet.startswith(("imu_", "filter_", *_OF_RECEIVER)) and sheet not in self.chosen_sheets:
                 expected = f"a sheet that this scenario uses ({', '.join(self.chosen_sheets)})"
                 raise DockairError(f"parameters.{sheet}", expected=expected, got=sheet)
+            if sheet == "turbulence" and "sigma_m_s" in overrides:  # gusts are not flown without one of the two
+                where, expected = "parameters.turbulence.sigma_m_s", "turbulence.sigma_m_s or turbulence.intensity"
+                raise DockairError(where, expected=f"{expected} in its place", got=overrides["sigma_m_s"])
         return self
 
     @property

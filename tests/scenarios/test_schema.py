@@ -457,3 +457,12 @@ def test_a_wrong_wake_or_gust_is_refused_by_its_key(scenario_file, text, key, ex
 def test_tanker_or_hose_that_cannot_be_is_refused_by_its_key(key, value, where):
     with pytest.raises(DockairError, match=where.replace(".", r"\.")):
         load_scenario("racetrack", {key: value})
+
+
+def test_a_strength_of_gusts_that_would_not_be_flown_is_refused_with_the_key_that_is():
+    """The sheet's was taken, and the scenario's own or still air was flown."""
+    with pytest.raises(
+        DockairError, match=r"parameters\.turbulence\.sigma_m_s: expected turbulence\.sigma_m_s or .*got 3"
+    ):
+        load_scenario("still_air", {"parameters.turbulence.sigma_m_s": 3.0})
+    assert load_scenario("still_air", {"parameters.turbulence.length_scale_m": 300.0}).parameters
