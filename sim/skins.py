@@ -22,6 +22,7 @@ from dockair.sim.outlines import TankerParameters, nose_x_m
 
 _FULL = 1.0
 _NEAREST = 4  # corners whose mean height is that of the part above
+_FARTHEST_M = 6.0  # and how far aside the nearest may be: on the fuselage they stand as much as 3.3 m off its middle
 
 
 class Skin(NamedTuple):
@@ -110,15 +111,11 @@ def _unit(part: Mapping[str, Any], tanker: TankerParameters, skins: list[Skin]) 
     return [pod, Skin("pod_pylon", surface(np.array([low, high]), part["pylon_points"]), part["shade"])]
 
 
-def _height_over(skins: list[Skin], x: float, y: float, z: float) -> float:
-    """Mean height of the corners above a place that are nearest to its vertical.
-
-    Raises:
-        DockairError: nothing there.
-    """
+def _height_over(skins: list[Skin], x: float, y: float, z: float) -> float | None:
+    """Mean height of the corners above a place that are nearest to its vertical, None where none is near it."""
     corners = np.vstack([skin.mesh.vertices_m for skin in skins])
     above = corners[corners[:, 2] > z]
-    if len(above) == 0:
-        raise DockairError("tanker.exit_m", expected="a place below the fuselage or a wing", got=(x, y, z))
     away = np.hypot(above[:, 0] - x, above[:, 1] - y)
+    if not np.any(away < _FARTHEST_M):
+        return None
     return float(above[np.argsort(away, kind="stable")[:_NEAREST], 2].mean())

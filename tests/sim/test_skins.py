@@ -49,6 +49,13 @@ def test_the_receivers_have_the_span_of_their_class_and_end_behind_the_probes_ti
     assert corners[:, 0].max() == pytest.approx(MOUNTING.p_BP[0] - 1.2, abs=1e-9)
 
 
+@pytest.mark.parametrize("exit_m", [(30.0, 0.0, -2.0), (-7.0, 30.0, -2.0), (-19.5, 0.0, 30.0)])
+def test_a_refuelling_unit_that_nothing_is_above_is_refused(exit_m: tuple[float, ...]) -> None:
+    with pytest.raises(DockairError, match="exit_m: expected a place below the fuselage or a wing, got") as refusal:
+        tanker_skins(replace(TANKER, exit_m=np.array(exit_m)))
+    assert refusal.value.got == list(exit_m)
+
+
 @pytest.mark.parametrize("exit_m", [(-19.5, 0.0, -1.9), (-7.0, -12.0, -2.2), (-7.0, 12.0, -2.2)])
 def test_the_refuelling_unit_ends_at_the_hoses_exit_and_hangs_from_what_is_above(exit_m: tuple[float, ...]) -> None:
     skins = tanker_skins(replace(TANKER, exit_m=np.array(exit_m)))
