@@ -43,12 +43,15 @@ class TankerParameters:
         """The same tanker with its hose at another unit.
 
         Raises:
-            DockairError: no such unit.
+            DockairError: no such unit; a wing pod's place that is not on the left.
         """
         if pod not in get_args(Pod):
             raise DockairError("tanker.pod", expected="a refuelling unit", got=pod, exists=list(get_args(Pod)))
         if pod == "centreline":
             return self
+        if not self.wing_exit_m[1] > 0.0:
+            expected = "a place left of the middle, y above 0: the right pod's is its mirror image"
+            raise DockairError("tanker.wing_exit_m", expected=expected, got=np.asarray(self.wing_exit_m).tolist())
         side = np.array([1.0, 1.0 if pod == "left_wing" else -1.0, 1.0])
         return replace(self, exit_m=self.wing_exit_m * side)
 

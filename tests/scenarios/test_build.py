@@ -379,6 +379,7 @@ UNMANNED = {"hardware.airframe": "unmanned", "flight.airspeed_m_s": 120.0, "flig
         (UNMANNED | {"parameters.airframe_unmanned.inertia_kg_m2": [9e3, 1e3, 1e3, 0]}, "parameters.airframe_unmanned"),
         (UNMANNED | {"parameters.mounting_unmanned.probe_tip_m": [3, 0, 0]}, "parameters.mounting_unmanned"),
         ({"parameters.tanker.wing_exit_m": [-7, 12, 30], "tanker.pod": "left_wing"}, "parameters.tanker.wing_exit_m"),
+        ({"parameters.tanker.wing_exit_m": [-7, -12, -2], "tanker.pod": "left_wing"}, "parameters.tanker.wing_exit_m"),
         (
             {"parameters.tanker_path.roll_rate_rad_s": 0.01, "tanker.manoeuvre": "racetrack", "tanker.bank_deg": 45.0},
             "parameters.tanker_path.roll_rate_rad_s",
