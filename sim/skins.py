@@ -104,6 +104,9 @@ def _unit(part: Mapping[str, Any], tanker: TankerParameters, skins: list[Skin]) 
     chord = part["pylon_chord"] * length
     middle_x = x + 0.5 * length
     top_z = _height_over(skins, middle_x, float(y), float(z))
+    if top_z is None:
+        expected = "a place below the fuselage or a wing"
+        raise DockairError("tanker.exit_m", expected=expected, got=np.asarray(tanker.exit_m).tolist())
     lead = middle_x + 0.5 * chord
     ratio = part["pylon_thickness"]
     low = [lead, y, z, chord, ratio, 0.0]
@@ -111,15 +114,11 @@ def _unit(part: Mapping[str, Any], tanker: TankerParameters, skins: list[Skin]) 
     return [pod, Skin("pod_pylon", surface(np.array([low, high]), part["pylon_points"]), part["shade"])]
 
 
-def _height_over(skins: list[Skin], x: float, y: float, z: float) -> float:
-    """Mean height of the corners above a place that are nearest to its vertical.
-
-    Raises:
-        DockairError: none is near it.
-    """
+def _height_over(skins: list[Skin], x: float, y: float, z: float) -> float | None:
+    """Mean height of the corners above a place that are nearest to its vertical, None where none is near it."""
     corners = np.vstack([skin.mesh.vertices_m for skin in skins])
     above = corners[corners[:, 2] > z]
     away = np.hypot(above[:, 0] - x, above[:, 1] - y)
     if not np.any(away < _FARTHEST_M):
-        raise DockairError("tanker.exit_m", expected="a place below the fuselage or a wing", got=[x, y, z])
+        return None
     return float(above[np.argsort(away, kind="stable")[:_NEAREST], 2].mean())
