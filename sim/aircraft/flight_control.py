@@ -167,7 +167,7 @@ class FlightControl:
         """
         path = self.path
         path.step(command.turn_rate_rad_s, command.climb_rad)
-        row = self.schedule.at(path.turn_rate_rad_s).memory
+        row = self.schedule.nearest(path.turn_rate_rad_s).memory
         own, model, motions, wrenches = self._memory, self.model.memory, self._motions, self._wrenches
         flown = (
             R_WB, velocity_W, w_WB_B, surfaces_rad, thrust_n, path.climb_rad, path.axes(), row, model, own, motions

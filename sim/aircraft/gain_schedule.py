@@ -3,7 +3,8 @@
 They are found where the bank of a level turn, tan(bank) = V r / g, is a multiple of `NODE_RAD`, when first needed, and
 are linear in that bank between; attitudes are roll, pitch and yaw (about z, y, x in turn). Between the last node that
 the airframe can fly and the next, which thrust or lift do not reach, the line of the cell before is carried on: a turn
-just below that limit still has trim and gains, and so has the little by which a path overshoots it.
+just below that limit still has trim and gains, and so has the little by which a path overshoots it. Farther on, where a
+receiver turns that has fallen behind, those of the last turn that had some are kept: what comes of it is the flight's.
 Slopes of the path turn the axes and add their part of the weight to the thrust; the gains are those of level flight.
 """
 
@@ -86,6 +87,7 @@ class GainSchedule:
         self._airspeed_m_s = trim.airspeed_m_s
         self._rows: dict[int, Array] = {}
         self._ends: dict[int, Array] = {}  # outer nodes of cells, flyable or carried on to
+        self._refused: dict[int, DockairError] = {}  # nodes that cannot be flown: asked for at every tick
         self.model, self.gains, self._rows[0] = self._designed(trim)  #: of straight flight
         self._at, self._row = 0.0, Row.of(self._rows[0])
 
@@ -108,6 +110,13 @@ class GainSchedule:
             self._at, self._row = turn_rate_rad_s, Row.of(flat)
         return self._row
 
+    def nearest(self, turn_rate_rad_s: float) -> Row:
+        """As `at`; of a turn that the airframe cannot fly, the row that was asked for before."""
+        try:
+            return self.at(turn_rate_rad_s)
+        except DockairError:
+            return self._row
+
     def _end(self, i: int) -> Array:
         """Node i, or where it cannot be flown the end of the line through the two before it."""
         if i not in self._ends:
@@ -121,9 +130,15 @@ class GainSchedule:
         return self._ends[i]
 
     def _node(self, i: int) -> Array:
+        if i in self._refused:
+            raise self._refused[i].with_traceback(None)  # which would grow from tick to tick
         if i not in self._rows:
             turn_rate = STANDARD_GRAVITY_M_S2 * float(np.tan(i * NODE_RAD)) / self._airspeed_m_s
-            trim = steady_trim(self._airframe, self._airspeed_m_s, self._air, turn_rate_rad_s=turn_rate)
+            try:
+                trim = steady_trim(self._airframe, self._airspeed_m_s, self._air, turn_rate_rad_s=turn_rate)
+            except DockairError as error:
+                self._refused[i] = error
+                raise
             self._rows[i] = self._designed(trim)[2]
         return self._rows[i]
 

@@ -86,6 +86,19 @@ def test_a_turn_that_can_be_flown_has_a_trim_though_the_next_node_has_none(bank_
         schedule.at(1.3 * rate)
 
 
+def test_in_flight_the_last_row_is_kept_in_a_turn_that_cannot_be_flown() -> None:
+    """A receiver that had fallen behind turned so: its flight was lost as invalid input, after a minute."""
+    thin, rate = standard_atmosphere(12000.0), STANDARD_GRAVITY_M_S2 * np.tan(np.radians(30.5)) / 200.0
+    schedule = _schedule(200.0, thin)
+    last = schedule.nearest(rate)
+    assert last is schedule.at(rate)
+    for beyond in (1.3 * rate, 1.4 * rate, 1.3 * rate):
+        assert schedule.nearest(beyond) is last
+    assert schedule.nearest(0.5 * rate) is not last
+    with pytest.raises(DockairError, match="turning at"):
+        schedule.at(1.3 * rate)
+
+
 @pytest.mark.parametrize("sense", [1.0, -1.0])
 def test_a_turn_is_refused_where_the_airframe_flies_straight_and_not_even_the_first_node(sense: float) -> None:
     """Military thrust a hundred-thousandth above that of level flight: no line leads on, for there is but one node."""
