@@ -26,6 +26,7 @@ FLIGHT_FILES = (
     "estimates.parquet",
     "navigator.json",
     "as_built.json",
+    "scenario.toml",
     _SAYS_WHOLE,
 )
 

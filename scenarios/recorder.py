@@ -15,12 +15,14 @@ from dockair.scenarios.judgement.referee import Outcome
 from dockair.scenarios.judgement.result import Result, held_to, summarise
 from dockair.scenarios.message_log import MessageLog, read_messages
 from dockair.scenarios.output_folder import FlightFolder, utf8_path_of
+from dockair.scenarios.scenario_file import text_from
 from dockair.scenarios.scenario_hash import scenario_hash
 
 if TYPE_CHECKING:  # the loop imports this module
     from dockair.scenarios.loop import Flight, Tick
 
 RECORD = ("full", "window", "none")
+SCENARIO = "scenario.toml"  #: what was flown, every key of it, and the seed
 AS_BUILT = "as_built.json"  #: how the hardware of the flight differed from its nominal sheets
 
 
@@ -75,7 +77,7 @@ class Recorder:
                 self._folder.forget()
 
     def finish(self, flight: "Flight", outcome: Outcome, seed: int, wall_time_s: float) -> Result:
-        """Return the result; with a folder, write result.json, flight.parquet, episode.rrd and flight.png there.
+        """Return the result; with a folder, write all but the messages there.
 
         The messages have to be settled. Where one of the last two cannot be made, the folder keeps the flight without
         it, and what is raised says so in a note.
@@ -112,6 +114,9 @@ class Recorder:
         from dockair.sim.shapes import shapes_of
 
         result.write(folder)
+        flown = flight.scenario.model_dump(mode="json", exclude_none=True) | {"seed": result.seed}
+        # a path need not be text, and nobody loses a flight by that
+        (folder / SCENARIO).write_text(text_from(flown), encoding="utf-8", errors="surrogateescape")
         (folder / AS_BUILT).write_text(json.dumps(flight.as_built.record(), indent=1) + "\n", encoding="utf-8")
         self._log.write_parquet(folder)
         with self._kept_without("episode.rrd"), utf8_path_of(folder) as place:  # Rerun takes no other

@@ -1,10 +1,11 @@
-"""Finds and reads a scenario's TOML and lays the settings of `--set` over it; what the keys mean is the schema's."""
+"""Reads a scenario's TOML, lays the settings of `--set` over it, and writes one; what the keys mean is the schema's."""
 
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import tomli_w
 
 from dockair.errors import DockairError
 from dockair.scenarios.dotted_key import is_within, parts_of
@@ -31,6 +32,18 @@ def scenario_text(name_or_path: str | Path) -> str:
         DockairError: no such scenario.
     """
     return SCENARIOS.find(name_or_path).read_text(encoding="utf-8-sig")
+
+
+def text_from(table: Mapping[str, Any]) -> str:
+    """Return a scenario's file, which read again from any folder says the same.
+
+    Args:
+        table: keys and values, each of a type that TOML has.
+    """
+    hardware = {
+        key: str(Path(value).absolute()) if key in _PATHS else value for key, value in table["hardware"].items()
+    }
+    return tomli_w.dumps({**table, "hardware": hardware})
 
 
 class ScenarioFile:

@@ -15,7 +15,7 @@ from dockair.scenarios.recorder import summary_of
 from dockair.scenarios.replay import replay
 from dockair.scenarios.schema import load_scenario
 
-ALWAYS = {"result.json", "as_built.json", "flight.parquet", "episode.rrd", "flight.png"}
+ALWAYS = {"result.json", "scenario.toml", "as_built.json", "flight.parquet", "episode.rrd", "flight.png"}
 REPLAY = {MESSAGES, ESTIMATES, NAVIGATOR}
 TIMES_OF_DAY = ("wall_time_s", "real_time_factor", "out_dir")
 
@@ -163,3 +163,20 @@ def test_record_none_keeps_no_frames_and_record_full_whole_ones(tmp_path):
     shapes = {tick.frame.pixels.shape for tick in read_messages(full) if tick.frame is not None}
     assert shapes == {(1088, 2048)}
     assert replay(full).identical
+
+
+def test_a_flights_folder_holds_the_scenario_that_was_flown_to_be_flown_again_from_anywhere(tmp_path, monkeypatch):
+    (tmp_path / "ring.toml").write_text("diameter_m = 0.5\ncount = 8\n")
+    (tmp_path / "own.toml").write_text(
+        'name = "own"\n[hardware]\nring = "ring.toml"\n[[faults]]\nkind = "led_off"\nleds = [1, 2]\n'
+    )
+    monkeypatch.chdir(tmp_path)
+    settings = {"navigation.navigator": "truth", "flight.duration_s": 0.2, "turbulence.intensity": "light"}
+    scenario = load_scenario("own.toml", settings | {"parameters.drogue.mass_kg": 30.0, "faults[0].stop_s": 9.5})
+    fly(scenario, 5, "flown")
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    again = load_scenario(tmp_path / "flown" / "scenario.toml")
+    ring = str(tmp_path / "ring.toml")
+    hardware = scenario.hardware.model_copy(update={"ring": ring})
+    assert again == scenario.model_copy(update={"seed": 5, "hardware": hardware})
