@@ -1,11 +1,11 @@
-"""Learn what to add to a linear policy with stable-baselines3's SAC: residual policy learning.
+"""Learn to dock with stable-baselines3's SAC: a velocity from where the ring is and how that changes.
 
     pip install stable-baselines3
-    python examples/learn_policy.py [STEPS] [EVALUATED]
+    python examples/learn_policy.py [STEPS] [SHOWN] [EVALUATED]
 
-Who begins with nothing comes to hover astern, where nothing is lost; this begins with a policy that docks now and then.
-What it begins with and what it has learned are then flown on seeds that neither has met, the latter by camera, too.
-What it was worth, and what else was tried: docs/environments.md#with-a-library.
+Some flights of a linear policy are shown first: its transitions are in the replay buffer before the first is its own.
+What was shown and what has been learned are then flown on seeds that neither has met, the latter by camera, too. What
+it was worth, and what else was tried: docs/environments.md#with-a-library.
 """
 
 import os
@@ -15,27 +15,29 @@ from typing import Any
 
 import gymnasium
 import numpy as np
-from learn_gains import EVALUATED_FROM, INDEX, MOST_M_S, MOST_M_S2, STEP_S, TICKS, linear, place_and_rate
+from learn_gains import EVALUATED_FROM, INDEX, STEP_S, TICKS, linear, place_and_rate
 from numpy.typing import NDArray
 
 from dockair.scenarios.schema import load_scenario
 
-CONDITIONS = {"flight.duration_s": 10.0}
-GAINS = 0.57, 1.38, 0.79  # those that examples/learn_gains.py finds
-ADDED_MOST_M_S2 = 0.5  # to what the linear policy accelerates by, on each axis
+CONDITIONS = {"flight.duration_s": 8.0}  # in the gusts of `default`, 0.5 m/s; a good approach is over after 6
+MOST_M_S = np.array([2.0, 1.0, 1.0])  # forward, left, up
+UNIT_M = np.array([2.0, 0.25, 0.25])  # of places, and per second of rates: what counts is of size 1 to the network
+GAINS = 2.50, 3.94, 0.82  # those that examples/learn_gains.py finds
+NOISE_M_S = 0.1  # beside what is shown, so that it is seen what comes of other velocities
 FAST, BY_CAMERA = "dockair/DockFast-v0", "dockair/Dock-v0"
 
 Seen = NDArray[np.float32]
 
 
-class Added(gymnasium.Wrapper[Seen, Seen, NDArray[np.float64], Seen]):
-    """Takes what to add to the linear policy's acceleration, of the most; sums that to the velocity.
+class Steered(gymnasium.Wrapper[Seen, Seen, NDArray[np.float64], Seen]):
+    """Takes a velocity, of the most on each axis, and asks for no acceleration beside it.
 
     | observed | what |
     |---|---|
-    | 0-2 | where the ring is, body axes [m] |
-    | 3-5 | how that changes, in axes that turn with the receiver [m/s] |
-    | 6-8 | the velocity that is commanded [m/s] |
+    | 0-2 | where the ring is, body axes, in units of `UNIT_M` |
+    | 3-5 | how that changes, in axes that turn with the receiver, likewise per second |
+    | 6-8 | the velocity that is commanded [m/s]: the receiver drifts by itself, and the next is to be near the last |
     | 9 | whether the belief may be flown on |
     """
 
@@ -44,7 +46,7 @@ class Added(gymnasium.Wrapper[Seen, Seen, NDArray[np.float64], Seen]):
         super().__init__(env)
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (3,), np.float32)
         self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (10,), np.float32)
-        self._velocity_m_s, self._now = np.zeros(3), np.zeros(10, np.float32)
+        self._velocity_m_s = np.zeros(3)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Seen, dict[str, Any]]:
         """Begin with no command."""
@@ -53,28 +55,45 @@ class Added(gymnasium.Wrapper[Seen, Seen, NDArray[np.float64], Seen]):
         return self._seen(observation), info
 
     def step(self, action: Seen) -> tuple[Seen, float, bool, bool, dict[str, Any]]:
-        """Accelerate by so much more."""
-        added = ADDED_MOST_M_S2 * np.clip(action, -1.0, 1.0)
-        acceleration = np.clip(begun_with(self._now) + added, -MOST_M_S2, MOST_M_S2)
-        self._velocity_m_s = np.clip(self._velocity_m_s + STEP_S * acceleration, -MOST_M_S, MOST_M_S)
-        command = np.concatenate([self._velocity_m_s, acceleration]).astype(np.float32)
+        """Fly at this velocity."""
+        self._velocity_m_s = MOST_M_S * np.clip(action, -1.0, 1.0)
+        command = np.concatenate([self._velocity_m_s, np.zeros(3)]).astype(np.float32)
         observation, reward, terminated, truncated, info = self.env.step(command)
         return self._seen(observation), float(reward), terminated, truncated, info
 
     def _seen(self, observation: NDArray[np.float64]) -> Seen:
-        seen = [*place_and_rate(observation), self._velocity_m_s, [observation[INDEX["valid"]]]]
-        self._now = np.concatenate(seen).astype(np.float32)
-        return self._now
+        place, rate = place_and_rate(observation)
+        seen = [place / UNIT_M, rate / UNIT_M, self._velocity_m_s, [observation[INDEX["valid"]]]]
+        return np.concatenate(seen).astype(np.float32)
 
 
-def made(name: str = FAST) -> Added:
+def made(name: str = FAST) -> Steered:
     """Return a new environment."""
-    return Added(gymnasium.make(name, scenario=load_scenario("default", CONDITIONS), ticks_per_step=TICKS))
+    return Steered(gymnasium.make(name, scenario=load_scenario("default", CONDITIONS), ticks_per_step=TICKS))
 
 
-def begun_with(seen: Seen) -> Seen:
-    """(3,) acceleration [m/s^2] of the linear policy, for (10,) of what is observed."""
-    return linear(GAINS, seen[0:3], seen[3:6]) * seen[9]
+def shown(seen: Seen) -> Seen:
+    """(..., 3) action of the linear policy, for (..., 10) of what is observed."""
+    actions = []
+    for one in seen.reshape(-1, 10):
+        acceleration = linear(GAINS, one[0:3] * UNIT_M, one[3:6] * UNIT_M) * one[9]
+        actions.append((one[6:9] + STEP_S * acceleration) / MOST_M_S)
+    return np.clip(np.reshape(actions, (*seen.shape[:-1], 3)), -1.0, 1.0).astype(np.float32)
+
+
+def show(model: Any, flights: int) -> None:
+    """Put so many flights of the linear policy into the replay buffer."""
+    envs, rng, over = model.get_env(), np.random.default_rng(0), 0
+    seen = envs.reset()
+    while over < flights:
+        noise = rng.normal(0.0, NOISE_M_S, (envs.num_envs, 3)) / MOST_M_S
+        actions = np.clip(shown(seen) + noise, -1.0, 1.0).astype(np.float32)
+        after, rewards, ends, infos = envs.step(actions)
+        last = after.copy()  # an environment that is over has begun anew
+        for k in np.flatnonzero(ends):
+            last[k] = infos[k]["terminal_observation"]
+        model.replay_buffer.add(seen, last, actions, rewards, ends, infos)
+        seen, over = after, over + int(np.sum(ends))
 
 
 def evaluated(policy: Callable[[Seen], Seen], name: str, flights: int) -> str:
@@ -90,7 +109,7 @@ def evaluated(policy: Callable[[Seen], Seen], name: str, flights: int) -> str:
     return f"{name}: good contact in {good} of {flights} on new seeds, {unsafe} unsafe"
 
 
-def main(steps: str = "40000", flights: str = "40") -> None:
+def main(steps: str = "20000", demonstrated: str = "60", flights: str = "40") -> None:
     """Learn, and say what it was worth."""
     import torch
     from stable_baselines3 import SAC
@@ -100,9 +119,10 @@ def main(steps: str = "40000", flights: str = "40") -> None:
     envs = VecMonitor(SubprocVecEnv([made] * len(os.sched_getaffinity(0)), start_method="spawn"))
     envs.seed(0)
     model = SAC(
-        "MlpPolicy", envs, seed=0, device="cpu", verbose=1, learning_rate=1e-3, learning_starts=1000, gradient_steps=4,
-        ent_coef="auto_0.01", policy_kwargs={"net_arch": [64, 64]},
+        "MlpPolicy", envs, seed=0, device="cpu", verbose=1, learning_rate=1e-3, gamma=0.98, learning_starts=0,
+        gradient_steps=4, ent_coef="auto_0.1", policy_kwargs={"net_arch": [64, 64]},
     )  # fmt: skip
+    show(model, int(demonstrated))
     model.learn(int(steps), log_interval=20)
     model.save("docking")
     envs.close()
@@ -111,9 +131,9 @@ def main(steps: str = "40000", flights: str = "40") -> None:
         action: Seen = model.predict(seen, deterministic=True)[0]
         return action
 
-    print("before:", evaluated(lambda seen: np.zeros(3, np.float32), FAST, int(flights)), flush=True)
+    print("shown:", evaluated(shown, FAST, int(flights)), flush=True)
     for name in (FAST, BY_CAMERA):
-        print("after:", evaluated(learned, name, int(flights)), flush=True)
+        print("learned:", evaluated(learned, name, int(flights)), flush=True)
 
 
 if __name__ == "__main__":

@@ -177,34 +177,53 @@ class _Belief(gymnasium.Env):
         return self.belief, 0.5, False, False, {}
 
 
-def test_what_is_learned_is_added_to_the_linear_policys_acceleration_and_the_velocity_is_the_sum(example):
+def test_the_policy_that_learns_asks_for_a_velocity_and_sees_the_ring_in_units_of_size_one(example):
     """Its rate is that in turning axes: a turn of 0.1 rad/s lifts a ring that is 2 m to the left by 0.2 m/s."""
     module = example("learn_policy")
     belief = _Belief(valid=1.0, p_PD_B_x=4.0, p_PD_B_y=0.5, v_PD_B_x=-1.0, v_PD_B_z=0.35, gyro_x=0.1)
-    env = module.Added(belief)
+    env = module.Steered(belief)
     seen, _ = env.reset(seed=0)
-    np.testing.assert_allclose(seen, [4.0, 0.5, 0.0, -1.0, 0.0, 0.3, 0.0, 0.0, 0.0, 1.0], atol=1e-6)
+    np.testing.assert_allclose(seen, [2.0, 2.0, 0.0, -0.5, 0.0, 1.2, 0.0, 0.0, 0.0, 1.0], atol=1e-6)
     assert env.observation_space.contains(seen)
-    linear = np.array([0.79 * 0.2, 0.57 * 0.5, 1.38 * 0.3])
-    np.testing.assert_allclose(module.begun_with(seen), linear, rtol=1e-6)
-    for count in (1, 2):
+    for _ in range(2):
         seen, reward, *_ = env.step(np.array([1.0, -0.5, 7.0], np.float32))
-        acceleration = linear + 0.5 * np.array([1.0, -0.5, 1.0])
-        np.testing.assert_allclose(belief.commands[-1], [*(0.05 * count * acceleration), *acceleration], rtol=1e-6)
-        np.testing.assert_allclose(seen[6:9], 0.05 * count * acceleration, rtol=1e-6)
+        np.testing.assert_allclose(belief.commands[-1], [2.0, -0.5, 1.0, 0.0, 0.0, 0.0])
+        np.testing.assert_allclose(seen[6:9], [2.0, -0.5, 1.0])
     assert reward == 0.5
     assert not env.reset()[0][6:9].any()
 
 
-def test_what_is_learned_accelerates_by_no_more_than_the_most_and_the_velocity_has_a_limit(example):
-    belief = _Belief(valid=1.0, p_PD_B_y=-4.0, v_PD_B_x=-0.2)
-    env = example("learn_policy").Added(belief)
-    env.reset(seed=0)
-    for _ in range(60):
-        seen, *_ = env.step(np.array([1.0, -1.0, 0.0], np.float32))
-    np.testing.assert_allclose(belief.commands[-1], [2.5, -2.5, 0.0, 1.0, -1.0, 0.0], rtol=1e-6)
-    np.testing.assert_allclose(seen[6:9], [2.5, -2.5, 0.0])
+def test_what_is_shown_is_the_linear_policys_velocity_in_shares_of_the_most(example):
+    module = example("learn_policy")
+    p, rate, velocity = [4.0, 0.1, 0.0], [-1.0, 0.0, 0.02], [1.0, 0.3, -0.9]
+    seen = np.array([*(p / module.UNIT_M), *(rate / module.UNIT_M), *velocity, 1.0], np.float32)
+    acceleration = np.array([0.82 * 0.2, 2.50 * 0.1, 3.94 * 0.02])
+    action = (velocity + 0.05 * acceleration) / [2.0, 1.0, 1.0]
+    np.testing.assert_allclose(module.shown(seen), action, rtol=1e-5)
+    blind, fast = np.array([*seen[:9], 0.0]), np.array([*seen[:7], 3.0, *seen[8:]])
+    np.testing.assert_allclose(
+        module.shown(np.array([blind, fast])), [[0.5, 0.3, -0.9], [action[0], 1.0, action[2]]], rtol=1e-5
+    )
 
 
-def test_the_linear_policy_does_nothing_while_nothing_may_be_flown_on(example):
-    assert not example("learn_policy").begun_with(np.array([4.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])).any()
+def test_the_policy_that_learns_is_told_while_nothing_may_be_flown_on(example):
+    assert example("learn_policy").Steered(_Belief(valid=0.0)).reset()[0][9] == 0.0
+
+
+def test_what_was_learned_is_evaluated_on_the_seeds_that_it_has_not_met(example, monkeypatch):
+    module, seeds = example("learn_policy"), []
+
+    class Flown(_Belief):
+        def reset(self, *, seed=None, options=None):
+            seeds.append(seed)
+            return super().reset(seed=seed)
+
+        def step(self, action):
+            observation, reward, *_ = super().step(action)
+            good = seeds[-1] % 2 == 0
+            return observation, reward, True, False, {"is_success": good, "unsafe": "" if good else "touch"}
+
+    monkeypatch.setattr(module, "made", lambda name: module.Steered(Flown()))
+    said = module.evaluated(lambda seen: np.zeros(3, np.float32), "fast", 5)
+    assert said == "fast: good contact in 3 of 5 on new seeds, 2 unsafe"
+    assert seeds == [2000, 2001, 2002, 2003, 2004]
