@@ -14,7 +14,7 @@ from dockair.scenarios.toml_files import PLANS, SCENARIOS, read_toml, toml_value
 #: Setting the one replaces the other, which the file may have given.
 _ALTERNATIVES = {"turbulence.sigma_m_s": "intensity", "turbulence.intensity": "sigma_m_s"}
 _MODEL = "turbulence.model"  # the file's goes with its strength: it would overrule one that is set in its place
-_PATHS = ("camera", "ring")  # keys of [hardware] that name a file
+SHEETS = ("camera", "ring")  #: of the keys of [hardware]: paths
 
 
 def scenario_names() -> list[str]:
@@ -41,7 +41,7 @@ def text_from(table: Mapping[str, Any]) -> str:
         table: keys and values, each of a type that TOML has.
     """
     hardware = {
-        key: str(Path(value).absolute()) if key in _PATHS else value for key, value in table["hardware"].items()
+        key: str(Path(value).absolute()) if key in SHEETS else value for key, value in table["hardware"].items()
     }
     return tomli_w.dumps({**table, "hardware": hardware})
 
@@ -85,7 +85,7 @@ def _resolve_hardware(table: dict[str, Any], folder: Path) -> None:
     """Take the file's paths from its own folder; those of `--set` are taken from where one stands."""
     hardware = table.get("hardware")
     if isinstance(hardware, dict):
-        paths = {key: hardware[key] for key in _PATHS if isinstance(hardware.get(key), str)}
+        paths = {key: hardware[key] for key in SHEETS if isinstance(hardware.get(key), str)}
         hardware.update({key: str(folder / path) for key, path in paths.items()})
 
 

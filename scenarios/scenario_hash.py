@@ -7,10 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from dockair.errors import DockairError
-from dockair.scenarios.scenario_file import ScenarioFile
+from dockair.scenarios.scenario_file import SHEETS, ScenarioFile
 from dockair.scenarios.schema import Scenario
 
-SHEETS = ("camera", "ring")  #: of the keys of [hardware]: paths
 SAYS_NOTHING_OF_THE_FLIGHT = {"seed", "claim", "accept"}  #: of a scenario's keys; the seed is told beside it
 
 

@@ -19,7 +19,8 @@ from dockair.scenarios.campaign.plan import Entry
 from dockair.scenarios.campaign.plan_file import PlanFile
 from dockair.scenarios.campaign.points import points_of, refuse_too_many, seeds_of
 from dockair.scenarios.dotted_key import is_within, parts_of
-from dockair.scenarios.scenario_hash import SHEETS, file_hash, require_decisive, scenario_hash
+from dockair.scenarios.scenario_file import SHEETS
+from dockair.scenarios.scenario_hash import file_hash, require_decisive, scenario_hash
 from dockair.scenarios.schema import Scenario, load_scenario
 from dockair.scenarios.toml_files import toml_text
 
