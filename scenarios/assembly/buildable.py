@@ -13,9 +13,13 @@ from dockair.parameters import load_parameters
 from dockair.scenarios.assembly.measured import require_measurable
 from dockair.scenarios.assembly.mounting_parameters import MountingParameters
 from dockair.scenarios.assembly.nominal_sheets import nominal_camera, nominal_ring
+from dockair.scenarios.assembly.receiver import airframe
 from dockair.scenarios.plug_in import navigator_class_of
 from dockair.scenarios.schema import Scenario
+from dockair.sim.air.atmosphere import STANDARD_GRAVITY_M_S2, standard_atmosphere
 from dockair.sim.air.turbulence import gust_sigma
+from dockair.sim.aircraft.flight_control import FlightControlParameters
+from dockair.sim.aircraft.trim import steady_trim
 from dockair.sim.as_built import require_borne
 from dockair.sim.basket import require_fit, require_leds
 from dockair.sim.camera.camera_noise import CameraNoise
@@ -42,6 +46,7 @@ def require_buildable(scenario: Scenario) -> None:
     drogue = load_parameters("drogue", DrogueParameters, own.get("drogue"))
     _check_ring(scenario, ring, drogue)
     _check_outlines(scenario)
+    _check_turn(scenario)
     require_fit(drogue, load_parameters("coupling", CouplingParameters, own.get("coupling")))
     faults = Faults([table.fault for table in scenario.faults], ring.count)
     camera = nominal_camera(scenario)  # which is built whoever navigates
@@ -113,6 +118,24 @@ def _check_outlines(scenario: Scenario) -> None:
     except DockairError as error:
         key, place = ("exit_m", tanker.exit_m) if pod == "centreline" else ("wing_exit_m", tanker.wing_exit_m)
         raise DockairError(f"parameters.tanker.{key}", expected=error.expected, got=place.tolist()) from None
+
+
+def _check_turn(scenario: Scenario) -> None:
+    """The receiver can fly its tanker's turn, as far as its flight control lets it bank."""
+    tanker, flight = scenario.tanker, scenario.flight
+    if tanker.manoeuvre != "racetrack" or not tanker.starts_s < flight.duration_s:
+        return
+    sheet, air = scenario.hardware.receiver_sheet("flight_control"), standard_atmosphere(flight.altitude_m)
+    control = load_parameters(sheet, FlightControlParameters, scenario.parameters.get(sheet))
+    bank_rad = min(float(np.radians(tanker.bank_deg)), control.bank_limit_rad)
+    turn_rate = STANDARD_GRAVITY_M_S2 * float(np.tan(bank_rad)) / flight.airspeed_m_s
+    try:
+        signed = turn_rate if tanker.turns == "left" else -turn_rate
+        steady_trim(airframe(scenario, scenario.parameters), flight.airspeed_m_s, air, turn_rate_rad_s=signed)
+    except DockairError:
+        flown = f"at {flight.airspeed_m_s:g} m/s in air of {air.density_kg_m3:.3f} kg/m^3"
+        expected = f"a bank at which the receiver can turn {flown}"
+        raise DockairError("tanker.bank_deg", expected=expected, got=tanker.bank_deg) from None
 
 
 def _check_camera_rate(camera_hz: int, camera: Camera, sheets: CameraSheets) -> None:

@@ -31,14 +31,12 @@ from dockair.scenarios.measured_leds import MeasuredLeds
 from dockair.scenarios.navigator_recipe import NavigatorRecipe
 from dockair.scenarios.schema import Scenario
 from dockair.scenarios.truth_navigation import TruthNavigator
-from dockair.sim.air.atmosphere import STANDARD_GRAVITY_M_S2, Air, standard_atmosphere
+from dockair.sim.air.atmosphere import Air, standard_atmosphere
 from dockair.sim.air.bow_wave import BowWaveParameters, bow_wave_coefficients
-from dockair.sim.aircraft.airframe import AirframeData
 from dockair.sim.aircraft.announcer import Announcer, TankerSheet
 from dockair.sim.aircraft.flight_control import FlightControlParameters
 from dockair.sim.aircraft.receiver import Receiver
 from dockair.sim.aircraft.tanker import TankerPath, TankerPathParameters
-from dockair.sim.aircraft.trim import steady_trim
 from dockair.sim.as_built import AsBuilt, AsBuiltParameters, draw_as_built
 from dockair.sim.basket import place_leds
 from dockair.sim.camera.camera import CameraNoise, NearInfraredCamera
@@ -126,7 +124,6 @@ def build(scenario: Scenario, seed: int) -> Parts:
         step_s=clock.step_s,
         rng=random_stream(seed, "inertial_velocity"),
     )
-    _check_turn(scenario, airframe, air)
     parameters = _world_parameters(scenario, air, mounting)
     sheets = nominal_sheets(scenario, parameters, _imu_parameters(scenario))
     faults = Faults([table.fault for table in scenario.faults], sheets.ring.count)
@@ -177,23 +174,6 @@ def build(scenario: Scenario, seed: int) -> Parts:
         announcer=announcer,
         pod_light=pod_light,
     )
-
-
-def _check_turn(scenario: Scenario, airframe: AirframeData, air: Air) -> None:
-    """The receiver can fly its tanker's turn, as far as its flight control lets it bank."""
-    tanker, flight = scenario.tanker, scenario.flight
-    if tanker.manoeuvre != "racetrack" or not tanker.starts_s < flight.duration_s:
-        return
-    control = _sheet(scenario, scenario.hardware.receiver_sheet("flight_control"), FlightControlParameters)
-    bank_rad = min(float(np.radians(tanker.bank_deg)), control.bank_limit_rad)
-    turn_rate = STANDARD_GRAVITY_M_S2 * float(np.tan(bank_rad)) / flight.airspeed_m_s
-    try:
-        signed = turn_rate if tanker.turns == "left" else -turn_rate
-        steady_trim(airframe, flight.airspeed_m_s, air, turn_rate_rad_s=signed)
-    except DockairError:
-        flown = f"at {flight.airspeed_m_s:g} m/s in air of {air.density_kg_m3:.3f} kg/m^3"
-        expected = f"a bank at which the receiver can turn {flown}"
-        raise DockairError("tanker.bank_deg", expected=expected, got=tanker.bank_deg) from None
 
 
 def guidance_settings(scenario: Scenario) -> GuidanceSettings:

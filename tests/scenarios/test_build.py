@@ -399,4 +399,4 @@ HEAVY = {"parameters.airframe.mass_kg": 13000.0, "flight.airspeed_m_s": 120.0, "
 def test_a_turn_that_the_receiver_cannot_fly_is_refused_before_it_flies(bank_deg):
     """It was refused in flight, as the turn came in: 14 s of flight were lost, by an error that named an airspeed."""
     with pytest.raises(DockairError, match=rf"^tanker.bank_deg: .* can turn at 120 m/s .*, got {bank_deg}"):
-        build(load_scenario("truth_navigation", HEAVY | {"tanker.bank_deg": bank_deg}), 0)
+        require_buildable(load_scenario("truth_navigation", HEAVY | {"tanker.bank_deg": bank_deg}))
