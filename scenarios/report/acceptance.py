@@ -8,7 +8,8 @@ summary says what it claims.
 
 from collections.abc import Sequence
 
-from dockair.scenarios.report.groups import Group, Row, file_and_settings
+from dockair.scenarios.report.groups import Group, Row
+from dockair.scenarios.report.settings import file_and_settings
 from dockair.scenarios.scenario_file import scenario_names
 from dockair.scenarios.scenario_hash import scenario_hash
 from dockair.scenarios.schema import Scenario, load_scenario

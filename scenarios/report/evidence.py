@@ -10,8 +10,9 @@ import numpy as np
 from dockair.rotations import Array
 from dockair.scenarios.report.acceptance import shortfalls_of
 from dockair.scenarios.report.folders import Campaign
-from dockair.scenarios.report.groups import Group, Share, drawn_of, groups_of
+from dockair.scenarios.report.groups import Group, Share, groups_of
 from dockair.scenarios.report.pairs import Paired, beside_perfect_navigation, side_by_side
+from dockair.scenarios.report.settings import drawn_of
 
 _MANIFEST = ("plan", "flights", "seeds", "commit", "uncommitted_changes", "code", "plug_ins", "versions", "begun")
 _OF_EACH = ("seed", "outcome", "first_attempt", "success", "unsafe", "attempts", "radial_offset_m", "closure_speed_m_s")

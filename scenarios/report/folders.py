@@ -10,7 +10,8 @@ from dockair.errors import DockairError
 from dockair.scenarios.campaign.folder import default_folder, rows_of
 from dockair.scenarios.campaign.manifest import FILE_NAME, read_manifest
 from dockair.scenarios.output_folder import FLIGHT_FILES
-from dockair.scenarios.report.groups import Row, drawn_of, groups_of
+from dockair.scenarios.report.groups import Row, groups_of
+from dockair.scenarios.report.settings import drawn_of
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -9,13 +9,11 @@ until both stand side by side (`pairs`).
 import json
 import math
 import re
-import shlex
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from hashlib import blake2b
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -23,12 +21,11 @@ import numpy as np
 from dockair.rotations import Array
 from dockair.scenarios.accept import has_refuelled
 from dockair.scenarios.campaign.points import runs_of
-from dockair.scenarios.campaign.row import SET
 from dockair.scenarios.judgement.attempts import RefereeLimits
 from dockair.scenarios.judgement.no_attempt import cause_and_ending, ending
+from dockair.scenarios.report.settings import given_and_drawn, settings_of
 from dockair.scenarios.statistics import wilson_interval
 from dockair.scenarios.tables.crew import OUR_NAVIGATOR
-from dockair.scenarios.toml_files import toml_value
 
 Row = Mapping[str, Any]
 
@@ -38,8 +35,6 @@ SENSING_IN_WORDS = {"camera": "camera", "measurements": "measurement model", "tr
 NOT_SAID = "not said"  # in place of a cause
 _SPELT_OUT = 3  # keys that a plan draws: of more a title says how many
 _NO_WORD = re.compile(r"[^\w.]+")
-#: Keys whose values have a column.
-_IN_COLUMNS = ("name", "navigation.navigator", "camera.sensing", "guidance.controller")
 
 
 def counted(count: int, noun: str) -> str:
@@ -118,7 +113,7 @@ class Group:
     @property
     def settings_in_short(self) -> str:
         """`settings`, but how many keys are drawn where these are more than a title can hold."""
-        given, drawn = _given_and_drawn(self.rows[0])
+        given, drawn = given_and_drawn(self.rows[0])
         if len(drawn) <= _SPELT_OUT:
             return self.settings
         return ", ".join([*sorted(given), f"{len(drawn)} keys drawn"])
@@ -256,52 +251,8 @@ def groups_of(rows: Sequence[Row]) -> list[Group]:
     kinds: dict[tuple[str, str, str, str, str], list[Row]] = {}
     for row in sorted(rows, key=lambda row: int(row["seed"])):
         crew = str(row["sensing"]), str(row["navigator"]), str(row["controller"])
-        kinds.setdefault((str(row["scenario"]), *crew, _settings_of(row)), []).append(row)
+        kinds.setdefault((str(row["scenario"]), *crew, settings_of(row)), []).append(row)
     return [Group(*kind, tuple(kinds[kind])) for kind in sorted(kinds)]
-
-
-def file_and_settings(row: Row) -> tuple[str, list[str]]:
-    """Return the scenario's name or path from the flight's command, and what was set over it: "key=value" each."""
-    _, _, file, _, _, *options = shlex.split(row["command"])
-    return file, options[1::2]
-
-
-def conditions_of(row: Row) -> list[str]:
-    """Return what was set over the scenario; of a sheet its name and what it held: its path depends on where one stood.
-
-    Tables of before the column `sheets` do not say what one held.
-    """
-    contents = json.loads(row.get("sheets") or "{}")
-    return [_by_content(text, contents) for text in file_and_settings(row)[1]]
-
-
-def _by_content(text: str, contents: Mapping[str, str]) -> str:
-    key, _, value = text.partition("=")
-    return f'{key}="{Path(str(toml_value(value))).name}" ({contents[key]})' if key in contents else text
-
-
-def drawn_of(row: Row) -> list[str]:
-    """Return what the plan has drawn for this flight: "key=value" each."""
-    return [text for text in file_and_settings(row)[1] if row.get(SET + key_of(text)) is not None]
-
-
-def _settings_of(row: Row) -> str:
-    """Return what was set over the scenario, of a draw the key alone; without keys that have a column of their own."""
-    given, drawn = _given_and_drawn(row)
-    return ", ".join(sorted([*given, *(f"{key} drawn" for key in drawn)]))
-
-
-def _given_and_drawn(row: Row) -> tuple[list[str], list[str]]:
-    """Return "key=value" of what was set, and the keys that were drawn; without those that have a column."""
-    drawn = set(map(key_of, drawn_of(row)))
-    settings = [text for text in conditions_of(row) if key_of(text) not in _IN_COLUMNS]
-    keys = map(key_of, settings)
-    return [text for text in settings if key_of(text) not in drawn], [key for key in keys if key in drawn]
-
-
-def key_of(text: str) -> str:
-    """Return the key of "key=value"."""
-    return text.partition("=")[0]
 
 
 def _is_good(attempt: Mapping[str, Any]) -> bool:

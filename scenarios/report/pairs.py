@@ -12,7 +12,8 @@ from itertools import combinations
 
 import numpy as np
 
-from dockair.scenarios.report.groups import Group, Row, conditions_of, key_of
+from dockair.scenarios.report.groups import Group, Row
+from dockair.scenarios.report.settings import conditions_of, key_of
 from dockair.scenarios.statistics import sign_test
 
 _SEES = ("navigation.navigator", "camera.sensing")  # keys that say what the navigation sees, and nothing of the world
