@@ -1,7 +1,7 @@
 """Learn to dock with stable-baselines3's SAC: a velocity from where the ring is and how that changes.
 
     pip install stable-baselines3
-    python examples/learn_policy.py [STEPS] [SHOWN] [EVALUATED]
+    python examples/learn_policy.py [STEPS] [SHOWN] [EVALUATED] [SEED]
 
 Some flights of a linear policy are shown first: its transitions are in the replay buffer before the first is its own.
 What was shown and what has been learned are then flown on seeds that neither has met, the latter by camera, too. What
@@ -109,7 +109,7 @@ def evaluated(policy: Callable[[Seen], Seen], name: str, flights: int) -> str:
     return f"{name}: good contact in {good} of {flights} on new seeds, {unsafe} unsafe"
 
 
-def main(steps: str = "20000", demonstrated: str = "60", flights: str = "40") -> None:
+def main(steps: str = "20000", demonstrated: str = "60", flights: str = "40", seed: str = "0") -> None:
     """Learn, and say what it was worth."""
     import torch
     from stable_baselines3 import SAC
@@ -117,9 +117,9 @@ def main(steps: str = "20000", demonstrated: str = "60", flights: str = "40") ->
 
     torch.set_num_threads(1)  # the flights need the cores
     envs = VecMonitor(SubprocVecEnv([made] * len(os.sched_getaffinity(0)), start_method="spawn"))
-    envs.seed(0)
+    envs.seed(100 * int(seed))  # of the first flights; later ones are drawn from these
     model = SAC(
-        "MlpPolicy", envs, seed=0, device="cpu", verbose=1, learning_rate=1e-3, gamma=0.98, learning_starts=0,
+        "MlpPolicy", envs, seed=int(seed), device="cpu", verbose=1, learning_rate=1e-3, gamma=0.98, learning_starts=0,
         gradient_steps=4, ent_coef="auto_0.1", policy_kwargs={"net_arch": [64, 64]},
     )  # fmt: skip
     show(model, int(demonstrated))
