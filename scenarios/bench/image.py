@@ -23,8 +23,9 @@ from dockair.nav.identify.ring import identify
 from dockair.nav.image.detect import DetectSettings, detect
 from dockair.nav.image.labelling import foreground_runs, label_contour_tracing, label_two_pass
 from dockair.rotations import Array, matrix_from_yaw_pitch_roll
-from dockair.scenarios.reproduce.frames import TrueFrame, matches, studio
+from dockair.scenarios.reproduce.frames import matches
 from dockair.scenarios.reproduce.sensor.contact_sheet import SHOTS
+from dockair.scenarios.studio import TrueFrame, studio
 
 TITLES = (
     "30 m",

@@ -25,7 +25,7 @@ _NOT_FLOWN = frozenset(
     # commands, pages, pictures; files that a flight of a campaign does not write, and how a file is written
     "allan_tool.py bench cli.py commands design_ring display.py doctor.py envs file_lock.py judgement/no_attempt.py "
     "library message_log.py output_folder.py parameters_page.py picture plans recording replay.py report reproduce "
-    "reproductions_page.py statistics.py std_streams.py whole_file.py "
+    "reproductions_page.py statistics.py std_streams.py studio.py whole_file.py "
     # of the campaign what plans before its flights, or keeps, counts and shows their rows as they are
     "campaign/code.py campaign/draws.py campaign/dry_run.py campaign/folder.py campaign/gate.py campaign/journal.py "
     "campaign/manifest.py campaign/plan.py campaign/plan_file.py campaign/points.py campaign/progress.py "

@@ -5,7 +5,7 @@ import pytest
 
 from dockair.messages import CameraFrame, Window
 from dockair.scenarios.exposures import ExposuresInTurn
-from dockair.scenarios.reproduce.frames import studio
+from dockair.scenarios.studio import studio
 
 SMALL = Window(500, 532, 900, 964)
 

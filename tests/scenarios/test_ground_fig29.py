@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from dockair.rotations import log, matrix_from_yaw_pitch_roll
-from dockair.scenarios.reproduce.frames import studio
 from dockair.scenarios.reproduce.ground.fig29 import PixelChain
+from dockair.scenarios.studio import studio
 
 UNEVEN = "angles_deg = [0, 45, 90, 135, 180, 225, 270, 327]\n"
 BRIGHT = "brightness = [4, 1, 1, 1, 1, 1, 1, 1]\n"

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from dockair.nav.image.labelling import label_contour_tracing
 from dockair.scenarios.reproduce import registry
-from dockair.scenarios.reproduce.frames import matches, studio
+from dockair.scenarios.reproduce.frames import matches
 from dockair.scenarios.reproduce.ground import fig29 as ground_fig29
 from dockair.scenarios.reproduce.image import contour as image_contour
 from dockair.scenarios.reproduce.image import ellipse as image_ellipse
@@ -21,6 +21,7 @@ from dockair.scenarios.reproduce.image import labels as image_labels
 from dockair.scenarios.reproduce.image import scene as image_scene
 from dockair.scenarios.reproduce.image.grid import mask_from_text
 from dockair.scenarios.reproduce.reference import picture_name
+from dockair.scenarios.studio import studio
 from dockair.sim.camera.sheets import CameraSheets
 
 DRAWN = ("image/fig4-5", "image/fig8", "image/fig9", "image/fig10", "image/fig11")

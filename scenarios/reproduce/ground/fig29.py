@@ -28,8 +28,8 @@ from dockair.nav.navigator import NavigatorSettings
 from dockair.nav.pose.estimate import PoseEstimate, PoseStatus, solve_pose
 from dockair.nav.track import RingTracker
 from dockair.rotations import Array, matrix_from_yaw_pitch_roll, yaw_pitch_roll_from_matrix
-from dockair.scenarios.reproduce.frames import Studio, TrueFrame, studio
 from dockair.scenarios.reproduce.reference import picture_name, read_figure
+from dockair.scenarios.studio import Studio, TrueFrame, studio
 
 ID = "ground/fig29"
 TITLE = "drogue carried from 15 m to 6 m in 16 s: range and attitude from pixels alone"

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from dockair.messages import CameraFrame
 from dockair.rotations import Array, quaternion_from_matrix
-from dockair.scenarios.reproduce.frames import Studio, studio
 from dockair.scenarios.reproduce.heading.formation import Formation
+from dockair.scenarios.studio import Studio, studio
 from dockair.sim.camera.obstacles import Obstacles
 from dockair.sim.camera.occlusion import first_hits
 

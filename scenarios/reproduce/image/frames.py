@@ -24,15 +24,9 @@ from dockair.calibration import Camera
 from dockair.nav.identify.ring import Identification, IdentificationStatus, identify
 from dockair.nav.image.detect import Blobs, detect
 from dockair.rotations import Array, exp
-from dockair.scenarios.reproduce.frames import (
-    Studio,
-    TrueFrame,
-    matches,
-    signal_to_noise,
-    studio,
-    studio_without_leds,
-)
+from dockair.scenarios.reproduce.frames import matches, signal_to_noise, studio_without_leds
 from dockair.scenarios.reproduce.reference import picture_name
+from dockair.scenarios.studio import Studio, TrueFrame, studio
 
 ID = "image/frames"
 TITLE = "the frame set: Sun, clouds, glints, ghosts, night, haze, dirt at 2 to 30 m; LEDs and rings found"

@@ -24,9 +24,10 @@ from dockair.nav.image.detect import Blobs, DetectSettings, detect
 from dockair.nav.image.labelling import Runs, foreground_runs
 from dockair.nav.image.morphology import open_components, structuring_element
 from dockair.rotations import Array
-from dockair.scenarios.reproduce.frames import TrueFrame, matches, studio
+from dockair.scenarios.reproduce.frames import matches
 from dockair.scenarios.reproduce.image.grid import COLOURS
 from dockair.scenarios.reproduce.reference import picture_name, read_figure
+from dockair.scenarios.studio import TrueFrame, studio
 
 ID = "image/fig28"
 TITLE = "grey, binary, labelled, identified: a rendered still at 25 m with reflections, f/8 to f/2"

@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 from dockair.messages import CameraFrame
 from dockair.nav.image.detect import detect
 from dockair.rotations import Array
-from dockair.scenarios.reproduce.frames import matches, studio
+from dockair.scenarios.reproduce.frames import matches
 from dockair.scenarios.reproduce.reference import picture_name
+from dockair.scenarios.studio import studio
 
 ID = "sensor/contact-sheet"
 TITLE = "sixteen frames: Sun, clouds, glints, night, haze, ranges, faults"
