@@ -8,6 +8,7 @@ Not modelled: gaps and jitter of the record's own stamps; temperature. What cann
 beside the bias's correlation time is said in `nav/heading/allan`.
 """
 
+import os
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -142,7 +143,7 @@ def read_record(path: Path, unit: str | None = None) -> Array:
         raise DockairError("--unit", expected="a unit of angular rate", got=unit, exists=tuple(UNITS))
     if path.suffix.lower() not in _SUFFIXES:
         raise DockairError(str(path), expected="a CSV or NumPy file", got=path.suffix or "no suffix", exists=_SUFFIXES)
-    if not path.is_file():
+    if not os.path.isfile(path):  # Path.is_file raises where a name is too long, until Python 3.14
         raise DockairError(str(path), expected="a record of gyro rates", got="no such file")
     names, rates = _read_npy(path) if path.suffix.lower() == ".npy" else _read_csv(path)
     kept = [k for k in range(rates.shape[1]) if not names or not names[k].lower().startswith(("time", "stamp"))]

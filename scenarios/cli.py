@@ -7,6 +7,7 @@ else; progress and errors go to stderr. Modules that are slow to import are impo
 
 import errno
 import json
+import os
 import sys
 from dataclasses import asdict
 from enum import Enum
@@ -146,7 +147,7 @@ def replay(
     """Feed a flight's recorded frames and IMU to the navigation, without a simulator; compare every bit."""
     from dockair.scenarios.replay import replay as replay_flight
 
-    if not out.is_dir():
+    if not os.path.isdir(out):  # Path.is_dir raises where a name is too long, until Python 3.14
         raise DockairError(str(out), expected="the folder of a recorded flight", got="no such folder")
     report = replay_flight(out)
     if as_json:

@@ -51,20 +51,12 @@ class _Outliving(io.FileIO):
 def outlive_readers() -> None:
     """Make this process's output go on without a reader, and without a stream where it was started with it closed.
 
-    Streams that somebody has put in their place stay as they are.
+    Streams that somebody has put in their place stay as they are. Closed descriptors lead nowhere already (`__main__`).
     """
-    _open_closed_ones()
     if sys.stdout is sys.__stdout__:
         sys.stdout = _outliving(sys.stdout, _STDOUT, errors=_ANY_TEXT)
     if sys.stderr is sys.__stderr__:
         sys.stderr = _outliving(sys.stderr, 2, errors="backslashreplace")
-
-
-def _open_closed_ones() -> None:
-    """Lead closed descriptors nowhere: the next file to be opened would get their numbers, and what is printed."""
-    while (file := os.open(os.devnull, os.O_RDWR)) <= 2:
-        pass
-    os.close(file)
 
 
 def _outliving(stream: TextIO | None, number: int, errors: str) -> TextIO:

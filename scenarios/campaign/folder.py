@@ -54,7 +54,7 @@ def check(folder: Path, *, fresh: bool = False) -> None:
     try:
         if folder.exists() and not folder.is_dir():
             raise DockairError(where, expected=expected, got="a file")
-        present = sorted(path.name for path in folder.iterdir()) if folder.exists() else []
+        present = _names_in(folder)
         if present and journal.FILE_NAME not in present:
             raise DockairError(where, expected=expected, got=f"a folder with {present[0]}")
         damaged = bool(present) and not journal.begins_like_one(folder / journal.FILE_NAME)
@@ -62,6 +62,18 @@ def check(folder: Path, *, fresh: bool = False) -> None:
             raise DockairError(where, expected=expected, got=f"a folder with another {journal.FILE_NAME}")
     except OSError as error:
         raise DockairError(where, expected="a folder that can be written", got=error.strerror) from None
+
+
+def _names_in(folder: Path) -> list[str]:
+    """What is in a folder; nothing where there is none.
+
+    Raises:
+        OSError: there cannot be one.
+    """
+    try:
+        return sorted(os.listdir(folder))
+    except FileNotFoundError:
+        return []
 
 
 def _has_manifest(folder: Path) -> bool:

@@ -12,6 +12,7 @@ Distortion is Brown-Conrady on (a, b) = (-y/x, -z/x), coefficients k1, k2, p1, p
 The simulator draws *as-built* values around these; they are other objects and never reach `nav`.
 """
 
+import os
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
@@ -31,7 +32,7 @@ _INVERSE_DISTORTION_ITERATIONS = 20  # fixed point; contracts by about 0.1 a ste
 
 def _from_toml(cls: type[Any], path: str | Path) -> Any:
     path = Path(path)
-    if not path.is_file():
+    if not os.path.isfile(path):  # Path.is_file raises where a name is too long, until Python 3.14
         raise DockairError(str(path), expected="a calibration file", got="no such file")
     try:
         table = tomllib.loads(path.read_text(encoding="utf-8-sig"))  # some editors begin a file with a byte order mark

@@ -147,14 +147,14 @@ def flights(monkeypatch, tmp_path):
         (("fly", "--sed", "1"), "No such option: --sed"),
         (("fyl",), "No such command 'fyl'"),
         (("replay", "nowhere"), "nowhere: expected the folder of a recorded flight, got 'no such folder'"),
-        (("replay", "n" * 300), f"{'n' * 300}: expected a file that may be used, got File name too long"),
+        (("replay", "n" * 300), f"{'n' * 300}: expected the folder of a recorded flight, got 'no such folder'"),
         (
             ("allan", "n" * 300 + ".csv", "--rate-hz", "100"),
-            f"{'n' * 300}.csv: expected a file that may be used, got File name too long",
+            f"{'n' * 300}.csv: expected a record of gyro rates, got 'no such file'",
         ),
         (
             ("design-ring", "--camera", "n" * 300, "--out", "."),
-            f"{'n' * 300}: expected a file that may be used, got File name too long",
+            f"{'n' * 300}: expected a calibration file, got 'no such file'",
         ),
         (("replay",), "Missing argument 'OUT'"),
         (("bench", "defualt"), "scenario: expected a scenario of the library"),
@@ -409,6 +409,21 @@ def test_a_stream_that_is_closed_is_no_traceback(arguments, status, closed):
     done = subprocess.run(["sh", "-c", command], capture_output=True, text=True)
     assert done.returncode == status
     assert "Traceback" not in done.stderr and "dockair: " not in done.stdout
+
+
+def test_a_file_that_a_library_keeps_open_does_not_take_a_closed_streams_place():
+    keeps = """import os, sys
+from dockair.__main__ import main
+class Library:
+    def find_spec(self, name, *_):
+        if name == "dockair.scenarios.cli":
+            self.kept = os.open(os.devnull, os.O_RDONLY)
+sys.meta_path.insert(0, Library())
+sys.argv = ["dockair", "scenarios"]
+main()"""
+    command = f'"{sys.executable}" -c "$KEEPS" >&-'
+    done = subprocess.run(["sh", "-c", command], capture_output=True, text=True, env=os.environ | {"KEEPS": keeps})
+    assert (done.returncode, done.stderr) == (0, "")
 
 
 @pytest.mark.parametrize("arguments", ["--version", "doctor", "fly nosuch"])
