@@ -16,6 +16,8 @@ import pytest
 from dockair.messages import LedObservation
 from dockair.nav.image.detect import detect
 from dockair.scenarios.envs.tables import ACTION, OBSERVATION, box
+from dockair.scenarios.loop import fly
+from dockair.scenarios.schema import load_scenario
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
@@ -46,7 +48,6 @@ def test_the_scripted_policy_is_the_flight_of_the_same_seed(example):
     import gymnasium
 
     from dockair.scenarios.loop import Flight
-    from dockair.scenarios.schema import load_scenario
 
     env = gymnasium.make("dockair/DockFast-v0", until_clear=True)
     observation, info = env.reset(seed=5)
@@ -268,3 +269,13 @@ def test_labelled_frames_of_one_seed_are_the_same_to_the_bit(labelled):
     first, again = labelled("first")[0], labelled("again")[0]
     for path in sorted(first.glob("0*.png")) + [first / "labels.jsonl", first / "sheets.json"]:
         assert path.read_bytes() == (again / path.name).read_bytes()
+
+
+def test_poses_are_judged_by_the_truth_of_a_flight(example, tmp_path, capsys):
+    fly(load_scenario("still_air", {"flight.duration_s": 1.0}), seed=1, out=tmp_path / "flown")
+    example("judge_poses").main(str(tmp_path / "flown"))
+    lines = capsys.readouterr().out.splitlines()[1:]
+    frames = [int(line.split()[3]) for line in lines]
+    errors_mm = np.array([[float(word) for word in line.split()[4:]] for line in lines])
+    assert 40 <= sum(frames) <= 51
+    assert (errors_mm > 0.0).all() and (errors_mm < 15.0).all()
