@@ -1,7 +1,8 @@
 """Frames with their truth: a scenario's camera, put where the ring is wanted.
 
-The hose hangs at rest and nothing moves but the receiver, which is put down, not flown. What the picture shows of
-a relative motion is the same whichever of the two moves; what lies behind it moves with the camera.
+The hose hangs as it does when the flight begins, in still air at rest, and nothing moves but the receiver, which is put
+down, not flown. What the picture shows of a relative motion is the same whichever of the two moves; what lies behind it
+moves with the camera.
 """
 
 from collections.abc import Iterator, Mapping
@@ -32,8 +33,7 @@ class TrueFrame:
 
     frame: CameraFrame
     leds_px: Array  #: (n, 2) where the lens puts the LEDs, seen or not
-    visible: NDArray[np.bool_]  #: (n,) on the window and hidden by nothing, lit or not
-    led_factors: Array  #: (n,) of each LED's light, by faults: 1 of a sound one, 0 of one that is off
+    visible: NDArray[np.bool_]  #: (n,) on the window and hidden by nothing
     R_CD: Array  #: (3, 3) drogue axes in camera axes
     p_CD: Array  #: (3,) ring centre in camera axes [m]
 
@@ -80,25 +80,38 @@ class Studio:
         drogue = data.body("drogue")
         return R_WC.T @ drogue.xmat.reshape(3, 3), (drogue.xpos - p_WC) @ R_WC
 
-    def take(self, data: mujoco.MjData, frames: int = SETTLING_FRAMES, window: Window | None = None) -> TrueFrame:
+    def take(
+        self,
+        data: mujoco.MjData,
+        frames: int = SETTLING_FRAMES,
+        window: Window | None = None,
+        time_s: float | None = None,
+    ) -> TrueFrame:
         """The last of a few frames of a world that stands still, or moves and is caught at one moment.
+
+        Args:
+            data: of this studio's world; its time becomes `time_s`, if given, and clouds are where they are then.
+            frames: how many, for the exposure control to settle.
+            window: what to read; None for the full frame.
+            time_s: of all of them, by which faults act; by default each is a frame's time after the one before.
 
         Raises:
             DockairError: the camera drops out.
         """
+        if time_s is not None:
+            data.time = time_s
         for _ in range(frames):
-            time_s = _FRAME_S * self._frame_number
-            frame = self.camera.expose(data, time_s, self._frame_number, window)
+            at_s = _FRAME_S * self._frame_number if time_s is None else time_s
+            frame = self.camera.expose(data, at_s, self._frame_number, window)
             self._frame_number += 1
         if frame is None:
-            raise DockairError("studio", expected="a camera that delivers the frame", got=f"none at {time_s:g} s")
+            raise DockairError("studio", expected="a camera that delivers the frame", got=f"none at {at_s:g} s")
         leds_px, seen = self.camera.led_pixels(data), frame.window
         first, stop = (seen.column_start, seen.row_start), (seen.column_stop, seen.row_stop)
         inside = ((leds_px > np.array(first) - 0.5) & (leds_px < np.array(stop) - 0.5)).all(axis=1)
         R_CD, p_CD = self.pose(data)
         visible = self.camera.visible_leds(data) & inside
-        factors = self.parts.faults.led_factors(time_s, frame.exposure_s)
-        return TrueFrame(frame=frame, leds_px=leds_px, visible=visible, led_factors=factors, R_CD=R_CD, p_CD=p_CD)
+        return TrueFrame(frame=frame, leds_px=leds_px, visible=visible, R_CD=R_CD, p_CD=p_CD)
 
     @property
     def _joint(self) -> int:
@@ -115,7 +128,7 @@ class Studio:
 def studio(
     settings: Mapping[str, Any] | None = None, seed: int = 3, scenario: str | Path = "still_air"
 ) -> Iterator[Studio]:
-    """The camera of a scenario, its hose as it hangs at the flight's start.
+    """The camera of a scenario.
 
     Args:
         settings: dotted key -> value instead of the scenario's.
@@ -123,12 +136,15 @@ def studio(
         scenario: a name in the library, or the path of a TOML file.
 
     Raises:
-        DockairError: no such scenario, one without frames, or hardware that cannot be.
+        DockairError: no such scenario, or one without frames.
     """
     loaded = load_scenario(scenario, {"seed": seed, **(settings or {})})
+    sensing, navigator = loaded.camera.sensing, loaded.navigation.navigator
+    if sensing != "frames" or loaded.navigation.is_truth:
+        expected = 'a scenario with frames: camera.sensing = "frames", navigation.navigator other than "truth"'
+        raise DockairError(f"scenario {loaded.name}", expected=expected, got=f"{sensing}, {navigator}")
     parts = build(loaded, seed)
-    if not isinstance(parts.camera, NearInfraredCamera):
-        raise DockairError(str(scenario), expected="a scenario that is flown by camera", got=loaded.sensing)
+    assert isinstance(parts.camera, NearInfraredCamera)
     try:
         yield Studio(parts, parts.camera, camera_sheets(loaded).sensor)
     finally:

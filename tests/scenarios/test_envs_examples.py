@@ -1,23 +1,18 @@
 """The examples run, and do what they say."""
 
 import importlib
-import json
 import re
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-import cv2
 import gymnasium
 import numpy as np
 import pytest
 
 from dockair.messages import LedObservation
-from dockair.nav.image.detect import detect
 from dockair.scenarios.envs.tables import ACTION, OBSERVATION, box
-from dockair.scenarios.loop import fly
-from dockair.scenarios.schema import load_scenario
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
@@ -48,6 +43,7 @@ def test_the_scripted_policy_is_the_flight_of_the_same_seed(example):
     import gymnasium
 
     from dockair.scenarios.loop import Flight
+    from dockair.scenarios.schema import load_scenario
 
     env = gymnasium.make("dockair/DockFast-v0", until_clear=True)
     observation, info = env.reset(seed=5)
@@ -231,51 +227,3 @@ def test_what_was_learned_is_evaluated_on_the_seeds_that_it_has_not_met(example,
     said = module.evaluated(lambda seen: np.zeros(3, np.float32), "fast", 5)
     assert said == "fast: good contact in 3 of 5 on new seeds, 2 unsafe"
     assert seeds == [2000, 2001, 2002, 2003, 2004]
-
-
-@pytest.fixture
-def labelled(example, tmp_path, monkeypatch):
-    """Make three frames of each of two scenarios; return the folder and its labels."""
-
-    def make(folder: str) -> tuple[Path, list[dict[str, object]]]:
-        monkeypatch.setattr(example("labelled_frames"), "EACH", 3)
-        example("labelled_frames").main("6", str(tmp_path / folder), "4", "default", "leds_out_2")
-        lines = (tmp_path / folder / "labels.jsonl").read_text(encoding="utf-8").splitlines()
-        return tmp_path / folder, [json.loads(line) for line in lines]
-
-    return make
-
-
-def test_labels_stand_on_the_leds_that_shine_and_pose_and_sheets_lead_there(labelled):
-    folder, labels = labelled("frames")
-    told, off_px, beside_px, dark = json.loads((folder / "sheets.json").read_text(encoding="utf-8")), [], [], 0
-    for row in labels:
-        blobs = detect(cv2.imread(str(folder / row["file"]), cv2.IMREAD_GRAYSCALE)).centroids_px
-        shines = np.array(row["led_visible"]) & (np.array(row["led_light"]) > 0.0)
-        nearest = np.array([np.linalg.norm(blobs - uv, axis=1).min() for uv in row["led_px"]])
-        off_px += nearest[shines].tolist()
-        dark += int((~shines).sum())
-        assert (nearest[~shines] > 1.0).all()
-        sheet = told[row["scenario"]]
-        x, y, z = (np.array(sheet["led_positions_D_m"]) @ np.array(row["R_CD"]).T + row["p_CD_m"]).T
-        by_sheet = np.column_stack([-y / x, -z / x]) * sheet["focal_length_px"] + sheet["principal_point_px"]
-        beside_px.append(np.linalg.norm(by_sheet - row["led_px"], axis=1).max())
-    assert len(off_px) >= 30 and dark >= 6
-    assert np.median(off_px) < 0.03 and np.quantile(off_px, 0.9) < 0.2
-    assert 0.0 < max(beside_px) < 10.0  # the hardware is not quite what its sheets say
-
-
-def test_labelled_frames_of_one_seed_are_the_same_to_the_bit(labelled):
-    first, again = labelled("first")[0], labelled("again")[0]
-    for path in sorted(first.glob("0*.png")) + [first / "labels.jsonl", first / "sheets.json"]:
-        assert path.read_bytes() == (again / path.name).read_bytes()
-
-
-def test_poses_are_judged_by_the_truth_of_a_flight(example, tmp_path, capsys):
-    fly(load_scenario("still_air", {"flight.duration_s": 1.0}), seed=1, out=tmp_path / "flown")
-    example("judge_poses").main(str(tmp_path / "flown"))
-    lines = capsys.readouterr().out.splitlines()[1:]
-    frames = [int(line.split()[3]) for line in lines]
-    errors_mm = np.array([[float(word) for word in line.split()[4:]] for line in lines])
-    assert 40 <= sum(frames) <= 51
-    assert (errors_mm > 0.0).all() and (errors_mm < 15.0).all()
