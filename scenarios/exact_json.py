@@ -10,9 +10,7 @@ lacks is an object with one key:
 Reading imports the classes that the file names, and refuses anything that is neither a dataclass nor an enumeration.
 """
 
-import importlib
 import math
-import traceback
 from dataclasses import fields, is_dataclass
 from enum import Enum
 from typing import Any
@@ -20,56 +18,7 @@ from typing import Any
 import numpy as np
 
 from dockair.errors import DockairError
-
-
-def name_of(cls: type[Any]) -> str:
-    """Return "module:Class"."""
-    return f"{cls.__module__}:{cls.__qualname__}"
-
-
-def import_by_name(name: str) -> Any:
-    """Return the class called "module:Class".
-
-    Raises:
-        DockairError: there is none, or its module raises an exception.
-    """
-    module, _, path = name.partition(":")
-    expected = 'an importable "module:Class"'
-    try:
-        found: Any = importlib.import_module(module)
-    except (Exception, SystemExit) as error:  # somebody's own module may raise anything, and may end the process
-        if _is_no_module(module, error):
-            raise DockairError(name, expected=expected, got=str(error)) from None
-        raise DockairError(name, expected=expected, got=said_by(error, module.partition(".")[0])) from error
-    try:
-        for part in path.split("."):
-            found = getattr(found, part)
-    except AttributeError as error:
-        raise DockairError(name, expected=expected, got=str(error)) from None
-    return found
-
-
-def _is_no_module(module: str, error: BaseException) -> bool:
-    """Whether there is no module of this name, rather than one that fails."""
-    if isinstance(error, ModuleNotFoundError):
-        return error.name is not None and f"{module}.".startswith(f"{error.name}.")
-    return module in ("", ".") or module.startswith(".")
-
-
-def said_by(error: BaseException, package: str = "") -> str:
-    """Return what an exception says, and where it was raised, in one line.
-
-    Args:
-        error: that was raised.
-        package: whose deepest line is named if it had a part in it, rather than that of the library it called.
-    """
-    said = " ".join(f"{type(error).__name__}: {error}".split())
-    if isinstance(error, SyntaxError):  # it names the place itself
-        return said
-    calls = list(traceback.walk_tb(error.__traceback__))
-    own = [call for call in calls if str(call[0].f_globals.get("__name__")).partition(".")[0] == package]
-    frame, line = (own or calls)[-1]
-    return f"{said} ({frame.f_code.co_filename}, line {line})"
+from dockair.scenarios.class_by_name import import_by_name, name_of
 
 
 def encode(value: Any) -> Any:

@@ -17,6 +17,7 @@ import dockair
 from dockair.calibration import NavigationSheets
 from dockair.errors import DockairError
 from dockair.messages import Navigates
+from dockair.scenarios.class_by_name import by_module
 from dockair.scenarios.exact_json import decode, encode
 from dockair.scenarios.plug_in import make_navigator, navigator_class_of
 
@@ -27,7 +28,7 @@ NAVIGATOR = "navigator.json"
 class NavigatorRecipe:
     """How to make the navigator that flew."""
 
-    class_name: str  #: "module:Class"
+    class_name: str  #: "module:Class", or "file.py:Class"
     sheets: NavigationSheets
     settings: Any = None  #: second argument of the constructor; None leaves it to the class
 
@@ -69,9 +70,9 @@ def code_fingerprint(class_name: str) -> str:
     The sources are those of `nav`, of the leaves that it stands on, and the file of the navigator's own module.
 
     Args:
-        class_name: "module:Class", which has been imported.
+        class_name: "module:Class" or "file.py:Class", which has been imported.
     """
-    package, module = Path(dockair.__file__).parent, class_name.partition(":")[0]
+    package, module = Path(dockair.__file__).parent, by_module(class_name).partition(":")[0]
     digest = blake2b(digest_size=16)
     for path in sorted([*package.glob("*.py"), *package.joinpath("nav").rglob("*.py")]):
         digest.update(path.relative_to(package).as_posix().encode() + path.read_bytes())

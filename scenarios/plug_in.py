@@ -24,13 +24,13 @@ from dockair.messages import (
     TankerAnnouncement,
 )
 from dockair.scenarios.answer import check_answer
-from dockair.scenarios.exact_json import import_by_name, name_of, said_by
+from dockair.scenarios.class_by_name import import_by_name, name_of, said_by
 
 T = TypeVar("T")
 
 
 def navigator_class_of(name: str) -> Callable[..., Navigates]:
-    """Return a navigator's class by its name.
+    """Return a navigator's class by its name, or by its file's.
 
     Raises:
         DockairError: there is none, or it is no navigator: no class, without `step`, or not made of the sheets.

@@ -9,12 +9,12 @@ import tomli_w
 
 from dockair.errors import DockairError
 from dockair.scenarios.dotted_key import is_within, parts_of
+from dockair.scenarios.path_keys import taken_from
 from dockair.scenarios.toml_files import PLANS, SCENARIOS, read_toml, toml_value
 
 #: Setting the one replaces the other, which the file may have given.
 _ALTERNATIVES = {"turbulence.sigma_m_s": "intensity", "turbulence.intensity": "sigma_m_s"}
 _MODEL = "turbulence.model"  # the file's goes with its strength: it would overrule one that is set in its place
-SHEETS = ("camera", "ring")  #: of the keys of [hardware]: paths
 
 
 def scenario_names() -> list[str]:
@@ -40,10 +40,7 @@ def text_from(table: Mapping[str, Any]) -> str:
     Args:
         table: keys and values, each of a type that TOML has.
     """
-    hardware = {
-        key: str(Path(value).absolute()) if key in SHEETS else value for key, value in table["hardware"].items()
-    }
-    return tomli_w.dumps({**table, "hardware": hardware})
+    return tomli_w.dumps(taken_from(Path.cwd(), table))
 
 
 class ScenarioFile:
@@ -64,10 +61,9 @@ class ScenarioFile:
         path = SCENARIOS.find(name_or_path)
         self._shown = SCENARIOS.shown(path)
         self._settings = tuple(settings)
-        self.table = read_toml(path)
+        self.table = taken_from(path.parent, read_toml(path))  # those of `--set` from where one stands
         if "scenarios" in self.table:
             raise PLANS.misplaced(self._shown, SCENARIOS.kind, name_or_path)
-        _resolve_hardware(self.table, path.parent)
         if any(key in _ALTERNATIVES for key in settings):
             _drop(self.table, _MODEL)
         for key, value in settings.items():
@@ -79,14 +75,6 @@ class ScenarioFile:
             if is_within(where, key) or is_within(key, where):
                 return f"--set {where}"
         return f"{self._shown}: {where}"
-
-
-def _resolve_hardware(table: dict[str, Any], folder: Path) -> None:
-    """Take the file's paths from its own folder; those of `--set` are taken from where one stands."""
-    hardware = table.get("hardware")
-    if isinstance(hardware, dict):
-        paths = {key: hardware[key] for key in SHEETS if isinstance(hardware.get(key), str)}
-        hardware.update({key: str(folder / path) for key, path in paths.items()})
 
 
 def _plain(value: Any) -> Any:

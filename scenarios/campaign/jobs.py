@@ -19,7 +19,7 @@ from dockair.scenarios.campaign.plan import Entry
 from dockair.scenarios.campaign.plan_file import PlanFile
 from dockair.scenarios.campaign.points import points_of, refuse_too_many, seeds_of
 from dockair.scenarios.dotted_key import is_within, parts_of
-from dockair.scenarios.scenario_file import SHEETS
+from dockair.scenarios.path_keys import from_folder
 from dockair.scenarios.scenario_hash import file_hash, require_decisive, scenario_hash
 from dockair.scenarios.schema import Scenario, load_scenario
 from dockair.scenarios.toml_files import toml_text
@@ -65,7 +65,7 @@ class Job:
     def plug_in(self) -> str:
         """Module of the navigator where that is one's own, "" where Dockair navigates, or the truth."""
         navigation = self.scenario.navigation
-        module = navigation.navigator.partition(":")[0]
+        module = navigation.name.partition(":")[0]
         return "" if navigation.is_truth or module.partition(".")[0] == "dockair" else module
 
 
@@ -96,10 +96,10 @@ def jobs_of(source: PlanFile) -> list[Job]:
                 for k, seed in enumerate(seeds)
             ]
         _require_listed(source, index, entry, [point for point, _ in points])
+    for job in {(job.scenario_hash, job.scenario.navigation.navigator): job for job in jobs}.values():
+        _require_buildable(source, job)
     _refuse_twins(source, jobs)
     _refuse_namesakes(source, jobs)
-    for job in {job.scenario_hash: job for job in jobs}.values():
-        _require_buildable(source, job)
     names = sorted({job.scenario.name for job in jobs})
     for name in source.plan.gate.scenarios:
         if name not in names:
@@ -144,12 +144,8 @@ def _layers(source: PlanFile, index: int, entry: Entry, point: Point) -> Layers:
 
 
 def _from_folder(settings: Mapping[str, Any], folder: Path) -> dict[str, Any]:
-    """Return settings with the paths of sheets taken from the plan's folder, as those of scenarios are."""
-    sheets = {f"hardware.{key}" for key in SHEETS}
-    return {
-        key: str(folder / value) if key in sheets and isinstance(value, str) else value
-        for key, value in settings.items()
-    }
+    """Return settings with their paths taken from the plan's folder, as those of scenarios are from theirs."""
+    return {key: from_folder(folder, key, value) for key, value in settings.items()}
 
 
 def _merged(layers: Layers) -> dict[str, Any]:

@@ -13,6 +13,7 @@ from dockair.scenarios.campaign.jobs import Job
 from dockair.scenarios.campaign.worker import Answer
 from dockair.scenarios.judgement.metrics import HeadingFigures, NavigationFigures
 from dockair.scenarios.judgement.result import Result
+from dockair.scenarios.path_keys import NAVIGATOR
 from dockair.scenarios.scenario_hash import sheets_of
 
 Row = dict[str, Any]
@@ -85,12 +86,13 @@ def _asked(job: Job) -> Row:
     scenario = job.scenario
     row: Row = {"scenario": scenario.name, "seed": job.seed, "scenario_hash": job.scenario_hash}
     row["command"] = job.command
-    row |= {"sensing": scenario.sensing, "navigator": scenario.navigation.navigator}
+    row |= {"sensing": scenario.sensing, "navigator": scenario.navigation.name}
     row["controller"] = scenario.guidance.controller
     row["sheets"] = json.dumps(sheets_of(scenario))
     sheet, own = read_sheet("drogue"), scenario.parameters.get("drogue", {})
     row["rim_radius_m"] = 0.5 * own.get("ring_diameter_m", sheet["ring_diameter_m"].value)
-    return row | {f"{SET}{key}": value for key, value in job.drawn.items()}
+    drawn = {key: scenario.navigation.name if key == NAVIGATOR else value for key, value in job.drawn.items()}
+    return row | {f"{SET}{key}": value for key, value in drawn.items()}
 
 
 def is_row(value: Any) -> TypeGuard[Row]:

@@ -12,7 +12,7 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.process import parent_process
 from typing import TYPE_CHECKING, Any
 
-from dockair.scenarios.exact_json import import_by_name
+from dockair.scenarios.class_by_name import import_by_name
 
 if TYPE_CHECKING:  # unpickling a job imports what makes scenarios; only who flies it waits for that
     from dockair.scenarios.campaign.jobs import Job

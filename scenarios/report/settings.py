@@ -7,10 +7,12 @@ from pathlib import Path
 from typing import Any
 
 from dockair.scenarios.campaign.row import SET
+from dockair.scenarios.class_by_name import by_module
+from dockair.scenarios.path_keys import NAVIGATOR
 from dockair.scenarios.toml_files import toml_value
 
 #: Keys whose values have a column.
-_IN_COLUMNS = ("name", "navigation.navigator", "camera.sensing", "guidance.controller")
+_IN_COLUMNS = ("name", NAVIGATOR, "camera.sensing", "guidance.controller")
 
 
 def file_and_settings(row: Mapping[str, Any]) -> tuple[str, list[str]]:
@@ -20,8 +22,9 @@ def file_and_settings(row: Mapping[str, Any]) -> tuple[str, list[str]]:
 
 
 def conditions_of(row: Mapping[str, Any]) -> list[str]:
-    """Return what was set over the scenario; of a sheet its name and what it held: its path depends on where one stood.
+    """Return what was set over the scenario, its paths apart, which depend on where one stood.
 
+    Of a sheet its name and what it held stand there, of a navigator that was named by its file the module.
     Tables of before the column `sheets` do not say what one held.
     """
     contents = json.loads(row.get("sheets") or "{}")
@@ -30,6 +33,8 @@ def conditions_of(row: Mapping[str, Any]) -> list[str]:
 
 def _by_content(text: str, contents: Mapping[str, str]) -> str:
     key, _, value = text.partition("=")
+    if key == NAVIGATOR:
+        return f'{key}="{by_module(str(toml_value(value)))}"'
     return f'{key}="{Path(str(toml_value(value))).name}" ({contents[key]})' if key in contents else text
 
 

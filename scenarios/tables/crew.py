@@ -5,6 +5,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from dockair.errors import DockairError
+from dockair.scenarios.class_by_name import by_module, file_and_class, require_importable
 from dockair.scenarios.refusal import Expected
 from dockair.scenarios.tables.table import Table
 
@@ -14,11 +15,13 @@ OUR_NAVIGATOR = "dockair.nav.navigator:Navigator"
 class Navigation(Table):
     """Who navigates: a class with `messages.Navigates`' method, or "truth" for perfect navigation."""
 
+    #: a class of a module, from where one stands or installed, or in a file, from the scenario's; "truth" is perfect
+    #: navigation
     navigator: Annotated[
         str,
-        Field(pattern=r"^(truth|[A-Za-z_][\w.]*:[A-Za-z_]\w*)$"),
-        Expected('"truth" or "module:Class"'),
-    ] = OUR_NAVIGATOR  #: a class, from where one stands or installed; "truth" is perfect navigation
+        Field(pattern=r"^(truth|[A-Za-z_][\w.]*:[A-Za-z_]\w*|.*\.py:[A-Za-z_]\w*)$"),
+        Expected('"truth", "module:Class" or "file.py:Class"'),
+    ] = OUR_NAVIGATOR
     heading: bool = False  #: it keeps the receiver's heading, too, by frames that it asks for (docs/heading.md)
     heading_every_s: float = Field(default=2.0, ge=0.5, le=5.0)  #: between two such frames
 
@@ -28,6 +31,21 @@ class Navigation(Table):
             expected = f"false but with {OUR_NAVIGATOR}, which alone keeps a heading"
             raise DockairError("navigation.heading", expected=expected, got=self.heading)
         return self
+
+    @model_validator(mode="after")
+    def _may_be_imported(self) -> Self:
+        file, _ = file_and_class(self.navigator)
+        if file:
+            try:
+                require_importable(file)
+            except DockairError as error:
+                raise error.at("navigation.navigator") from None
+        return self
+
+    @property
+    def name(self) -> str:
+        """The navigator's class as it is shown and counted: by its module, wherever the file is."""
+        return by_module(self.navigator)
 
     @property
     def is_truth(self) -> bool:

@@ -26,7 +26,7 @@ def run(folder, *arguments):
 def test_the_navigator_of_ones_own_flies_from_the_folder_one_stands_in_and_replays(tmp_path):
     (tmp_path / "own_command.py").write_text(python_blocks("docs/navigation.md")[0], encoding="utf-8")
     short = ("--set", "flight.duration_s=1", "--out", "flown")
-    flown = run(tmp_path, "-m", "dockair", "fly", "--set", "navigation.navigator=own_command:OwnCommand", *short)
+    flown = run(tmp_path, "-m", "dockair", "fly", "--set", "navigation.navigator=own_command.py:OwnCommand", *short)
     assert flown.returncode == 0, flown.stderr
     assert flown.stdout.startswith("timeout")
     replayed = run(tmp_path, "-m", "dockair", "replay", "flown")
