@@ -20,7 +20,7 @@ PROGRAM = typer.main.get_command(app)
 SHOWN = re.compile(r"^(?: {4}| +- run: )?(?:\$ )?dockair ([a-z][^`\n]*)$|`dockair ([a-z][^`]*)`", re.MULTILINE)
 REFUSED = "fly evening.toml --set turbulence.sigma=0.8"  # shown with the error it makes
 SPOKEN_OF = {"replay", "report", "report --evidence"}  # without what they are given
-OF_THE_READER = """hardware.ring="coded.toml\""""
+OF_THE_READER = re.compile(r"hardware\.ring=\"coded\.toml\"|navigation\.navigator=\w+\.py:\w+")  # files
 STANDS_FOR = {"SCENARIO": "default", "NAME": "default", "N": "1", "n": "1"}  # in the text
 
 
@@ -47,7 +47,7 @@ def check(command):
     own = {key for key in ("scenario", "name", "plan") if str(given.get(key)).endswith(".toml")}
     own -= {"plan"} if (ROOT / str(given.get("plan"))).exists() else set()
     if name in ("fly", "bench"):
-        settings = [setting for setting in given["settings"] or [] if setting != OF_THE_READER]
+        settings = [setting for setting in given["settings"] or [] if not OF_THE_READER.fullmatch(setting)]
         load_scenario("default" if own else given["scenario"], overrides(settings))
     elif name == "scenarios" and given["name"] and not given["keys"] and not own:
         load_scenario(given["name"])
