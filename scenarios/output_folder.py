@@ -26,6 +26,8 @@ FLIGHT_FILES = (
     "estimates.parquet",
     "navigator.json",
     "as_built.json",
+    "scenario_camera.toml",
+    "scenario_ring.toml",
     "scenario.toml",
     _SAYS_WHOLE,
 )

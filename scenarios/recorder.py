@@ -15,8 +15,10 @@ from dockair.scenarios.judgement.referee import Outcome
 from dockair.scenarios.judgement.result import Result, held_to, summarise
 from dockair.scenarios.message_log import MessageLog, read_messages
 from dockair.scenarios.output_folder import FlightFolder, utf8_path_of
+from dockair.scenarios.path_keys import SHEETS
 from dockair.scenarios.scenario_file import text_from
-from dockair.scenarios.scenario_hash import scenario_hash
+from dockair.scenarios.scenario_hash import scenario_hash, sheet_paths
+from dockair.scenarios.schema import Scenario
 
 if TYPE_CHECKING:  # the loop imports this module
     from dockair.scenarios.loop import Flight, Tick
@@ -24,6 +26,7 @@ if TYPE_CHECKING:  # the loop imports this module
 RECORD = ("full", "window", "none")
 SCENARIO = "scenario.toml"  #: what was flown, every key of it, and the seed
 AS_BUILT = "as_built.json"  #: how the hardware of the flight differed from its nominal sheets
+_COPIES = {key: f"scenario_{key.partition('.')[2]}.toml" for key in SHEETS}  # key -> copy of a sheet of one's own
 
 
 class Recorder:
@@ -45,9 +48,11 @@ class Recorder:
         self._log = FlightLog()
         self._messages: MessageLog | None = None
         self._folder = None if self._path is None else FlightFolder(self._path)
-        if self._folder is not None and record != "none" and flight.recipe is not None:
+        if self._folder is not None:
             try:
-                self._messages = MessageLog(self._folder.under_way, flight.recipe)
+                _copy_sheets(flight.scenario, self._folder.under_way)  # they may be edited meanwhile
+                if record != "none" and flight.recipe is not None:
+                    self._messages = MessageLog(self._folder.under_way, flight.recipe)
             except BaseException:
                 self._folder.forget()
                 raise
@@ -116,7 +121,7 @@ class Recorder:
         result.write(folder)
         flown = flight.scenario.model_dump(mode="json", exclude_none=True) | {"seed": result.seed}
         # a path need not be text, and nobody loses a flight by that
-        (folder / SCENARIO).write_text(text_from(flown), encoding="utf-8", errors="surrogateescape")
+        (folder / SCENARIO).write_text(text_from(flown, _COPIES), encoding="utf-8", errors="surrogateescape")
         (folder / AS_BUILT).write_text(json.dumps(flight.as_built.record(), indent=1) + "\n", encoding="utf-8")
         self._log.write_parquet(folder)
         with self._kept_without("episode.rrd"), utf8_path_of(folder) as place:  # Rerun takes no other
@@ -143,6 +148,12 @@ class Recorder:
             self._folder.keep()
             error.add_note(f"{self._path} holds the flight, without {name}")
             raise
+
+
+def _copy_sheets(scenario: Scenario, folder: Path) -> None:
+    """Copy the sheets that a scenario names: `scenario.toml` names the copies, and can be moved with them."""
+    for key, path in sheet_paths(scenario).items():
+        (folder / _COPIES[key]).write_bytes(Path(path).read_bytes())
 
 
 def summary_of(result: Result) -> str:

@@ -9,7 +9,7 @@ import tomli_w
 
 from dockair.errors import DockairError
 from dockair.scenarios.dotted_key import is_within, parts_of
-from dockair.scenarios.path_keys import taken_from
+from dockair.scenarios.path_keys import from_folder, taken_from, with_changed
 from dockair.scenarios.toml_files import PLANS, SCENARIOS, read_toml, toml_value
 
 #: Setting the one replaces the other, which the file may have given.
@@ -34,13 +34,18 @@ def scenario_text(name_or_path: str | Path) -> str:
     return SCENARIOS.find(name_or_path).read_text(encoding="utf-8-sig")
 
 
-def text_from(table: Mapping[str, Any]) -> str:
+def text_from(table: Mapping[str, Any], beside: Mapping[str, str]) -> str:
     """Return a scenario's file, which read again from any folder says the same.
 
     Args:
         table: keys and values, each of a type that TOML has.
+        beside: dotted key -> name of a copy that lies beside the file, in place of the path of what was copied.
     """
-    return tomli_w.dumps(taken_from(Path.cwd(), table))
+
+    def path(key: str, value: str) -> str:
+        return beside.get(key) or str(from_folder(Path.cwd(), key, value))
+
+    return tomli_w.dumps(with_changed(table, path))
 
 
 class ScenarioFile:

@@ -39,8 +39,13 @@ def file_hash(file: str) -> str:
 
 def sheets_of(scenario: Scenario) -> dict[str, str]:
     """Return the keys of the sheets that a scenario names, each with a digest of what its sheet holds."""
+    return {key: _without_path(key, path) for key, path in sheet_paths(scenario).items()}
+
+
+def sheet_paths(scenario: Scenario) -> dict[str, str]:
+    """Return the keys of the sheets that a scenario names, each with the sheet's path."""
     paths = {f"hardware.{key}": path for key, path in scenario.hardware.model_dump().items()}
-    return {key: _without_path(key, paths[key]) for key in SHEETS if paths[key] is not None}
+    return {key: paths[key] for key in SHEETS if paths[key] is not None}
 
 
 def _without_path(key: str, value: str) -> str:

@@ -123,7 +123,7 @@ def test_a_scenario_flies_the_navigator_beside_it_and_says_so_alike_from_everywh
     assert scenario_hash(here) == scenario_hash(there)
     assert file_hash("mine.toml") == file_hash(f"{beside}/mine.toml")
     kept = tmp_path / "kept.toml"
-    kept.write_text(text_from(here.model_dump(mode="json", exclude_none=True)))
+    kept.write_text(text_from(here.model_dump(mode="json", exclude_none=True), {}))
     assert load_scenario(kept).navigation.navigator == there.navigation.navigator
     with pytest.raises(DockairError, match=r"--set navigation.navigator: .* got 'gone.py, where no file is'"):
         load_scenario("default", {KEY: "gone.py:Own"})

@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
@@ -11,8 +12,10 @@ from dockair.scenarios.judgement.referee import Contact
 from dockair.scenarios.loop import fly
 from dockair.scenarios.message_log import ESTIMATES, MESSAGES
 from dockair.scenarios.navigator_recipe import NAVIGATOR
+from dockair.scenarios.output_folder import FLIGHT_FILES
 from dockair.scenarios.recorder import summary_of
 from dockair.scenarios.replay import replay
+from dockair.scenarios.scenario_hash import scenario_hash
 from dockair.scenarios.schema import load_scenario
 
 ALWAYS = {"result.json", "scenario.toml", "as_built.json", "flight.parquet", "episode.rrd", "flight.png"}
@@ -173,10 +176,27 @@ def test_a_flights_folder_holds_the_scenario_that_was_flown_to_be_flown_again_fr
     monkeypatch.chdir(tmp_path)
     settings = {"navigation.navigator": "truth", "flight.duration_s": 0.2, "turbulence.intensity": "light"}
     scenario = load_scenario("own.toml", settings | {"parameters.drogue.mass_kg": 30.0, "faults[0].stop_s": 9.5})
+    digest = scenario_hash(scenario)
     fly(scenario, 5, "flown")
+    logged = (tmp_path / "flown" / "flight.parquet").read_bytes()
     (tmp_path / "elsewhere").mkdir()
     monkeypatch.chdir(tmp_path / "elsewhere")
-    again = load_scenario(tmp_path / "flown" / "scenario.toml")
-    ring = str(tmp_path / "ring.toml")
-    hardware = scenario.hardware.model_copy(update={"ring": ring})
+    (tmp_path / "flown").rename("moved")
+    (tmp_path / "ring.toml").unlink()
+    again = load_scenario("moved/scenario.toml")
+    hardware = scenario.hardware.model_copy(update={"ring": "moved/scenario_ring.toml"})
     assert again == scenario.model_copy(update={"seed": 5, "hardware": hardware})
+    assert scenario_hash(again) == digest
+    fly(again, out="moved")  # over itself
+    assert Path("moved/flight.parquet").read_bytes() == logged
+    assert scenario_hash(load_scenario("moved/scenario.toml")) == digest
+
+
+def test_copies_of_sheets_are_a_flights_own_and_go_with_it(tmp_path):
+    sheets = {f"scenario_{name}.toml" for name in ("camera", "ring")}
+    assert sheets < set(FLIGHT_FILES)
+    (tmp_path / "camera.toml").write_text("mine")  # nobody's copy
+    for name in ("scenario_camera.toml", "result.json"):
+        (tmp_path / name).write_text("of an earlier flight")
+    fly(_short("truth_navigation", 0.05), 0, tmp_path)
+    assert {path.name for path in tmp_path.iterdir()} == ALWAYS | {"camera.toml"}

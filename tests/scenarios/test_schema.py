@@ -57,7 +57,11 @@ SIGMAS = "three numbers, each 0 to 20"
         ("rates.camera_hz = 125", "rates.camera_hz", "a rate up to the control rate 100 Hz"),
         ("rates.gyro_hz = 50", "rates.gyro_hz", "a rate from the control rate 100 Hz on"),
         ("rates.physics_hz = 0", "rates.physics_hz", "an integer from 1 to 100000, got 0"),
-        ('navigation.navigator = "x"', "navigation.navigator", """"truth", "module:Class" or "file.py:Class", got 'x'"""),
+        (
+            'navigation.navigator = "x"',
+            "navigation.navigator",
+            """"truth", "module:Class" or "file.py:Class", got 'x'""",
+        ),
         ('hardware.ring = "."', "hardware.ring", "the path of a calibration sheet, got '/"),
         ('hardware.camera = "none.toml"', "hardware.camera", "the path of a calibration sheet, got '/"),
         ("guidance.closure_speed_m_s = 0.49", "guidance.closure_speed_m_s", "a number from 0.5 to 1.5, got 0.49"),
