@@ -225,7 +225,7 @@ def test_a_folder_whose_name_is_no_utf8_takes_a_flight(tmp_path):
     folder = tmp_path / os.fsdecode(b"\xff")
     fly(load_scenario("truth_navigation", {"flight.duration_s": 0.1}), out=folder)
     assert {path.name for path in folder.iterdir()} == {*FLIGHT_FILES} - {
-        "messages.parquet", "estimates.parquet", "navigator.json"
+        "messages.parquet", "estimates.parquet", "navigator.json", "scenario_camera.toml", "scenario_ring.toml"
     }  # fmt: skip
 
 
