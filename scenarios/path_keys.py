@@ -40,7 +40,14 @@ def with_changed(table: Mapping[str, Any], change: Callable[[str, str], Any]) ->
     changed = dict(table)
     for key in (*SHEETS, NAVIGATOR):
         owner, _, name = key.partition(".")
-        inner = changed.get(owner)
-        if isinstance(inner, dict) and isinstance(inner.get(name), str):
-            changed[owner] = {**inner, name: change(key, inner[name])}
+        value = value_in(changed, key)
+        if value is not None:
+            changed[owner] = {**changed[owner], name: change(key, value)}
     return changed
+
+
+def value_in(table: Mapping[str, Any], key: str) -> str | None:
+    """Return the text that a scenario's table, not checked, has for one of these keys; None where it has none."""
+    owner, _, name = key.partition(".")
+    value = table[owner].get(name) if isinstance(table.get(owner), dict) else None
+    return value if isinstance(value, str) else None

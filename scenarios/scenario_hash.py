@@ -55,4 +55,9 @@ def _without_path(key: str, value: str) -> str:
     """
     if key not in SHEETS:
         return by_module(value)
-    return blake2b(Path(value).read_bytes(), digest_size=8).hexdigest() if Path(value).is_file() else value
+    return content_hash(value) if Path(value).is_file() else value
+
+
+def content_hash(path: str) -> str:
+    """Return a digest of what a sheet holds."""
+    return blake2b(Path(path).read_bytes(), digest_size=8).hexdigest()

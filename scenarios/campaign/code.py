@@ -27,9 +27,9 @@ _NOT_FLOWN = frozenset(
     "library message_log.py output_folder.py parameters_page.py picture plans recording replay.py report reproduce "
     "reproductions_page.py statistics.py std_streams.py studio.py whole_file.py "
     # of the campaign what plans before its flights, or keeps, counts and shows their rows as they are
-    "campaign/code.py campaign/draws.py campaign/dry_run.py campaign/folder.py campaign/gate.py campaign/journal.py "
-    "campaign/manifest.py campaign/plan.py campaign/plan_file.py campaign/points.py campaign/progress.py "
-    "campaign/summary.py campaign/table.py".split()
+    "campaign/code.py campaign/copies.py campaign/draws.py campaign/dry_run.py campaign/folder.py campaign/gate.py "
+    "campaign/journal.py campaign/manifest.py campaign/plan.py campaign/plan_file.py campaign/points.py "
+    "campaign/progress.py campaign/summary.py campaign/table.py".split()
 )
 _OF_ALL = f"library/{FITTED_IN}.toml"  # its light, against which `assembly.measured` holds a scenario's own
 _NO_SOURCES = (".pyc", ".nbi", ".nbc", ".md", "~", "#")  # ends of names: caches, documents, what editors leave

@@ -50,6 +50,11 @@ class Job:
         return not self.settings
 
     @property
+    def is_of_own_file(self) -> bool:
+        """Whether the scenario is a file of one's own, and none of the library."""
+        return _is_path(self.file)
+
+    @property
     def command(self) -> str:
         """What flies this flight again."""
         changes = [f"--set {shlex.quote(f'{key}={as_toml(value, key)}')}" for key, value in self.settings.items()]
@@ -164,13 +169,17 @@ def _merged(layers: Layers) -> dict[str, Any]:
 def _scenario(
     source: PlanFile, index: int, entry: Entry, layers: Layers, settings: Mapping[str, Any]
 ) -> tuple[str, Scenario]:
-    own_file = entry.scenario.lower().endswith(".toml") or os.sep in entry.scenario
-    name = str(source.folder / entry.scenario) if own_file else entry.scenario
+    name = str(source.folder / entry.scenario) if _is_path(entry.scenario) else entry.scenario
     try:
         return name, load_scenario(name, {key: as_toml(value, f"--set {key}") for key, value in settings.items()})
     except DockairError as error:
         where = _blamed(error.where, layers, source.place(f"scenarios[{index}]"))
         raise error.at(where) from None
+
+
+def _is_path(scenario: str) -> bool:
+    """Whether a scenario is named by its path: by its name it is the library's."""
+    return scenario.lower().endswith(".toml") or os.sep in scenario
 
 
 def _require_listed(source: PlanFile, index: int, entry: Entry, points: Sequence[Point]) -> None:

@@ -11,6 +11,7 @@ from typing import Any
 from dockair.errors import DockairError
 from dockair.scenarios.campaign import folder as campaign_folder
 from dockair.scenarios.campaign.code import code_of
+from dockair.scenarios.campaign.copies import keep_copies
 from dockair.scenarios.campaign.gate import Verdict, judge, require_power
 from dockair.scenarios.campaign.jobs import Job, jobs_of, with_background
 from dockair.scenarios.campaign.journal import Journal
@@ -96,6 +97,7 @@ def run(
         left = _seed_by_seed([with_background(job, now["background"]) for job in jobs if job.key not in done])
         if left:
             campaign_folder.remove_results(out)  # they are of fewer flights than the manifest will say
+        keep_copies(jobs, out)
         write_json(now, out / FILE_NAME)
         told = watch(jobs, {key: journal.entries[key] for key in done}) if watch is not None else _silent
         begun = time.perf_counter()

@@ -6,6 +6,7 @@ import io
 import json
 import os
 import random
+import shutil
 import signal
 import subprocess
 import sys
@@ -25,7 +26,7 @@ from dockair.scenarios import cli
 from dockair.scenarios.campaign import manifest
 from dockair.scenarios.campaign import pool as pool_module
 from dockair.scenarios.campaign import run as run_module
-from dockair.scenarios.campaign.code import _NOT_FLOWN, Code, dockair_files, plug_in_files
+from dockair.scenarios.campaign.code import _NOT_FLOWN, Code, code_of, dockair_files, plug_in_files
 from dockair.scenarios.campaign.dry_run import dry_run
 from dockair.scenarios.campaign.folder import rows_of
 from dockair.scenarios.campaign.jobs import jobs_of
@@ -38,6 +39,8 @@ from dockair.scenarios.campaign.run import run
 from dockair.scenarios.campaign.table import read_table
 from dockair.scenarios.campaign.worker import Answer, one_line
 from dockair.scenarios.commands import campaign as campaign_command
+from dockair.scenarios.scenario_hash import scenario_hash
+from dockair.scenarios.schema import load_scenario
 from dockair.scenarios.whole_file import write_whole
 from dockair.sim.opengl import Trial
 
@@ -432,6 +435,63 @@ def test_what_a_flight_imports_counts_but_for_what_names_and_keeps_flights(tmp_p
     assert len(imported & counted) > 100
     names = {f"campaign/{name}.py" for name in ("draws", "plan", "plan_file", "points")}  # the jobs' keys have that
     assert not_counted == names | {"file_lock.py", "message_log.py", "output_folder.py"}  # a row's flight has no folder
+
+
+RING = "diameter_m = 0.5\ncount = 8\n"
+
+
+@pytest.fixture
+def own_files(tmp_path):
+    """A scenario with a ring of its own, and another ring; returns what a plan says of both."""
+    files = tmp_path / "files"
+    files.mkdir()
+    (files / "own.toml").write_text('name = "own"\nclaim = "mine"\n[hardware]\nring = "ring.toml"\n')
+    (files / "ring.toml").write_text(RING)
+    (files / "other.toml").write_text(RING + "# another\n")
+    return '"files/own.toml", { scenario = "files/own.toml", set.hardware.ring = "files/other.toml" }, "still_air"'
+
+
+def test_a_row_is_flown_again_from_the_copies_when_ones_own_files_have_gone(here, own_files, tmp_path):
+    rows = fly(plan(tmp_path, 1, scenarios=own_files), tmp_path / "out").rows
+    shutil.rmtree(tmp_path / "files")
+    folder = (tmp_path / "out").rename(tmp_path / "moved") / "scenario_files"
+    ring, other = (json.loads(row["sheets"])["hardware.ring"] for row in rows[:2])
+    assert {path.name for path in folder.iterdir()} == {"own.toml", f"{ring}.toml", f"{other}.toml"}
+    as_written = load_scenario(folder / "own.toml")
+    assert as_written.claim == "mine" and scenario_hash(as_written) == rows[0]["scenario_hash"]
+    changed = load_scenario(folder / "own.toml", {"hardware.ring": str(folder / f"{other}.toml")})
+    assert scenario_hash(changed) == rows[1]["scenario_hash"]
+
+
+def test_copies_are_of_the_plan_that_is_flown_whatever_was_half_written_before(here, own_files, tmp_path):
+    fly(plan(tmp_path, 1, scenarios='"still_air"'), tmp_path / "out")
+    folder = tmp_path / "out/scenario_files"
+    assert not folder.exists()
+    fly(plan(tmp_path, 2, scenarios=own_files), tmp_path / "out")  # it has grown
+    before = {path.name: path.read_bytes() for path in folder.iterdir()}
+    (folder / "own.toml").unlink()
+    (folder / "own.toml.part").write_text("name =")  # killed, and the same command given again
+    fly(plan(tmp_path, 3, scenarios=own_files), tmp_path / "out")
+    assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
+    (tmp_path / "files/own.toml").write_text('name = "own"\n')
+    with pytest.raises(DockairError, match="another plan"):
+        fly(plan(tmp_path, 3, scenarios=own_files), tmp_path / "out")
+    assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
+    fly(plan(tmp_path, 1, scenarios='"files/own.toml"'), tmp_path / "out", fresh=True)
+    assert {path.name: path.read_text() for path in folder.iterdir()} == {"own.toml": 'name = "own"\n'}
+
+
+def test_a_scenarios_file_that_changes_while_the_campaign_begins_is_refused_before_a_flight(
+    here, own_files, tmp_path, monkeypatch
+):
+    def edited(jobs):
+        (tmp_path / "files/own.toml").write_text('name = "own"\n')
+        return code_of(jobs)
+
+    monkeypatch.setattr(run_module, "code_of", edited)
+    with pytest.raises(DockairError, match=r"own\.toml: expected a scenario's file that stays as it is"):
+        fly(plan(tmp_path, 1, scenarios=own_files), tmp_path / "out")
+    assert not lines(here)
 
 
 #: Never flown: all flights here are made up.
