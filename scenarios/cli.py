@@ -103,7 +103,8 @@ def scenarios(
     name: Annotated[
         str | None,
         typer.Argument(
-            metavar="NAME", help="What to show whole; without, the list. With --keys a part of their names."
+            metavar="NAME",
+            help="What to show whole; without, the list. With --keys a part of names, sheets' too.",
         ),
     ] = None,
     keys: Annotated[bool, typer.Option("--keys", help="Show the keys that a scenario may set, and --set.")] = False,

@@ -59,9 +59,14 @@ def _introduction(sheet: str) -> str:
 
 
 def _row(key: str, parameter: Parameter) -> str:
-    span = f"{_number(parameter.low)} to {_number(parameter.high)}"
-    cells = (f"`{key}`", _value(parameter.value), parameter.unit, span, parameter.status, parameter.source)
+    value, span = in_words(parameter)
+    cells = (f"`{key}`", value, parameter.unit, span, parameter.status, parameter.source)
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
+
+
+def in_words(parameter: Parameter) -> tuple[str, str]:
+    """Return a parameter's value and its range."""
+    return _value(parameter.value), f"{_number(parameter.low)} to {_number(parameter.high)}"
 
 
 def _value(value: Any) -> str:

@@ -18,6 +18,8 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from dockair.errors import DockairError
+from dockair.parameters import read_sheet, sheet_names
+from dockair.scenarios.parameters_page import in_words
 from dockair.scenarios.refusal import Expected, inner_model
 from dockair.scenarios.schema import Scenario
 
@@ -46,7 +48,8 @@ Every key that a scenario's file may have and that `--set KEY=VALUE` may change.
 
     python -m dockair.scenarios.commands.keys > docs/scenario_keys.md
 
-`dockair scenarios --keys` shows the same on the screen, `dockair scenarios --keys sun` the keys with "sun" in them.
+`dockair scenarios --keys` shows the same on the screen, `dockair scenarios --keys sun` the keys with "sun" in them,
+those of the [parameter sheets](parameters.md) among them.
 
 {defaults}
 
@@ -73,7 +76,7 @@ class Key:
 
 
 def scenario_keys(part: str = "") -> list[Key]:
-    """Return the keys in the order of the tables.
+    """Return the keys in the order of the tables; where a part is asked for, those of the parameter sheets, too.
 
     Args:
         part: what the dotted name must contain.
@@ -81,7 +84,8 @@ def scenario_keys(part: str = "") -> list[Key]:
     Raises:
         DockairError: no key contains it.
     """
-    keys = [key for key in _keys_of(Scenario, "", "") if part in key.name]
+    sheets = [key for sheet in sheet_names() for key in _keys_of_sheet(sheet)] if part else []
+    keys = [key for key in [*_keys_of(Scenario, "", ""), *sheets] if part in key.name]
     if not keys:
         exists = sorted({key.table or key.name for key in _keys_of(Scenario, "", "")})
         raise DockairError("--keys", expected="a part of a key's name", got=part, exists=exists)
@@ -146,6 +150,17 @@ def _keys_of(table: type[BaseModel], prefix: str, outermost: str) -> list[Key]:
             keys.append(Key(name, f"{where}.<sheet>.<key>", "", own, own, "in place of the sheet's value"))
         else:
             keys.append(Key(outermost, where, _unit(name), _range(field), _default(field), meanings.get(name, "")))
+    return keys
+
+
+def _keys_of_sheet(sheet: str) -> list[Key]:
+    """The keys of a parameter sheet, where their values come from in the place of a meaning."""
+    keys = []
+    for name, parameter in read_sheet(sheet).items():
+        value, span = in_words(parameter)
+        unit = "" if parameter.unit == "1" else parameter.unit
+        told = f"{parameter.status}: {parameter.source}"
+        keys.append(Key("parameters", f"parameters.{sheet}.{name}", unit, span, value, told))
     return keys
 
 

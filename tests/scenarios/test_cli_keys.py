@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from dockair.errors import DockairError
+from dockair.parameters import read_sheet
 from dockair.scenarios.commands.keys import keys_page, scenario_keys
 from dockair.scenarios.commands.library_output import show_keys
 from dockair.scenarios.scenario_file import scenario_names, scenario_text
@@ -73,6 +74,19 @@ def test_a_part_of_a_name_chooses_keys_and_one_that_is_nowhere_is_refused():
         DockairError, match=r"--keys: expected a part of a key's name, got 'sunn'; exists: accept, .*sun"
     ):
         scenario_keys("sunn")
+
+
+def test_a_part_of_a_name_finds_keys_of_parameter_sheets_with_unit_range_and_default():
+    start, hose = scenario_keys("hose.length")[0], scenario_keys("parameters.hose.length_m")
+    assert [start] == hose and hose[0].table == "parameters"
+    sheet = read_sheet("hose")["length_m"]
+    told = hose[0].unit, hose[0].range, hose[0].default
+    assert told == ("m", f"{sheet.low:g} to {sheet.high:g}", f"{sheet.value:g}") and sheet.source in hose[0].meaning
+    camera, both = scenario_keys("camera_position_m")[0], [key.name for key in scenario_keys("capture_")]
+    assert camera.default.count(",") == 2  # three numbers
+    assert both == ["guidance.capture_radius_m", "parameters.coupling.capture_distance_m"]
+    for key in scenario_keys("parameters.reel."):
+        load_scenario("default", {key.name: key.default})
 
 
 def test_keys_are_shown_a_line_each_brackets_included(capsys, monkeypatch):
