@@ -25,6 +25,7 @@ from dockair.sim.shapes import shapes_of
 
 _PORT = 9876  # of rerun's viewer
 _SHOWN_HZ = 20.0  # a viewer needs no more, and each costs a few milliseconds
+_FLUSH_S = 2.0  # a viewer that is later than this gets its layout again, and loses nothing
 _ROUNDING_S = 1e-6  # of the times of ticks: one that is due is not put off to the next for it
 
 Sink = Callable[[Any], bool]
@@ -85,11 +86,12 @@ class LiveViewer:
         recording.send_recording_name(f"{flight.scenario.name}, episode {episode}")
         recording.set_log_time_enabled(False)  # the timelines are the flight's
         is_new = self._sink(recording)  # what it raises leaves the last episode as it is
+        is_new = is_new or self._recording is None or _is_cut_off(self._recording)
         self._next_s, self._frame = 0.0, None
         self._p_TE, self._path = hose_exit(flight.truth), []
         self._recording = recording
         flush_and_cleanup_orphaned_recordings()  # the last episode's: rerun keeps its threads and memory otherwise
-        if is_new or episode == 1:  # the layout stays; rerun never frees what it took to send one
+        if is_new:  # the layout stays; rerun never frees what it took to send one
             self._recording.send_blueprint(blueprint(flight.sheets.camera))
         log_still(self._recording, flight.sheets, shapes_of(flight.world.model))
         log_overlay_looks(self._recording, flight.sheets)
@@ -101,6 +103,15 @@ class LiveViewer:
         shift = rr.Transform3D(translation=[frame.window.column_start, frame.window.row_start, 0])
         self._recording.log("camera/window", shift)
         self._recording.log("camera/window/pixels", rr.Image(shown_pixels(np.asarray(frame.pixels)), "L"))
+
+
+def _is_cut_off(recording: Any) -> bool:
+    """Whether the viewer that a recording was sent to has been closed; one that is open then is another."""
+    try:
+        recording.flush(timeout_sec=_FLUSH_S)
+    except RuntimeError:
+        return True
+    return False
 
 
 def require_viewer() -> None:
@@ -126,7 +137,18 @@ def _is_open() -> bool:
 def _spawned(recording: Any) -> bool:
     """Send a recording to the viewer that is open, or open one; return whether it was opened.
 
-    Its program stands beside this Python.
+    Raises:
+        MachineError: none is open, and none can be opened.
+    """
+    is_open = _is_open()
+    if not is_open:
+        _open(recording)
+    recording.connect_grpc(f"rerun+http://127.0.0.1:{_PORT}/proxy")
+    return not is_open
+
+
+def _open(recording: Any) -> None:
+    """Open a viewer that a recording can be sent to; its program stands beside this Python.
 
     Raises:
         MachineError: there is no such program, or no display that it could open on.
@@ -136,8 +158,8 @@ def _spawned(recording: Any) -> bool:
     beside = shutil.which("rerun", path=str(Path(sys.executable).parent)) or shutil.which("rerun")
     if beside is None:
         raise MachineError("render_mode", expected="the rerun viewer", remedy="install rerun-sdk")
-    is_open = _is_open()
-    if not is_open:
-        require_viewer()  # the one before may have been closed; without a display rerun waits for another in vain
-    rr.spawn(executable_path=beside, recording=recording)
-    return not is_open
+    require_viewer()  # the one before may have been closed; without a display rerun waits for another in vain
+    rr.spawn(executable_path=beside, connect=False, recording=recording)  # without one rerun does nothing
+    if not _is_open():  # rerun has waited for it for some seconds, and says no more than a warning
+        remedy = 'begin `rerun --bind 127.0.0.1` first and see what it says, or use "rgb_array"'
+        raise MachineError("render_mode", expected="a rerun viewer that opens on this display", remedy=remedy)

@@ -88,6 +88,7 @@ def test_each_episode_is_a_recording_with_truth_and_belief_at_the_viewers_rate(s
 
 
 def test_without_the_viewers_program_the_machine_is_said_to_lack_it(hand_made, monkeypatch):
+    monkeypatch.setattr(envs_viewer, "_is_open", lambda: False)
     monkeypatch.setattr(envs_viewer.shutil, "which", lambda *args, **kwargs: None)
     with pytest.raises(MachineError, match="render_mode: expected the rerun viewer"):
         _show(LiveViewer(), hand_made, _flight(hand_made), 1)
@@ -115,6 +116,24 @@ def test_the_layout_is_sent_once_to_each_viewer(hand_made, monkeypatch, new, sen
     viewer = LiveViewer(lambda recording: recording.memory_recording() and next(answers))
     for _ in new:
         _show(viewer, hand_made, _flight(hand_made), 2)
+    assert len(layouts) == sent
+
+
+@pytest.mark.parametrize(("is_cut_off", "sent"), [(False, 1), (True, 2)])
+def test_a_viewer_that_was_closed_and_opened_again_by_hand_gets_the_layout(hand_made, monkeypatch, is_cut_off, sent):
+    import rerun as rr
+
+    def flush(recording, *, timeout_sec=0.0):
+        if is_cut_off:
+            raise RuntimeError("gRPC connection severed")
+
+    monkeypatch.setattr(envs_viewer, "shapes_of", lambda model: ())
+    layouts = []
+    monkeypatch.setattr(envs_viewer, "blueprint", lambda camera: layouts.append(1) or blueprint(camera))
+    viewer = LiveViewer(lambda recording: recording.memory_recording() and False)
+    _show(viewer, hand_made, _flight(hand_made), 2)
+    monkeypatch.setattr(rr.RecordingStream, "flush", flush)
+    _show(viewer, hand_made, _flight(hand_made), 2)
     assert len(layouts) == sent
 
 
@@ -238,18 +257,39 @@ def test_a_windows_pixels_lie_where_the_window_lies_on_the_sensor():
     assert logged["camera/window/pixels"].format.as_arrow_array().to_pylist()[0]["width"] == 8
 
 
-@pytest.mark.parametrize("is_open", [True, False])
-def test_of_a_viewer_that_was_opened_it_is_said_that_it_is_new(monkeypatch, is_open):
-    """By the program beside this Python."""
+def _programs(monkeypatch, answers):
+    """Note what is opened and connected where a viewer listens as these say, one after the other."""
     import rerun as rr
 
-    spawned = []
+    done, next_answer = [], iter(answers)
+    recording = SimpleNamespace(connect_grpc=done.append)
     monkeypatch.setattr(envs_viewer.shutil, "which", lambda name, path=None: f"{path}/rerun" if path else "another")
-    monkeypatch.setattr(envs_viewer, "_is_open", lambda: is_open)
+    monkeypatch.setattr(envs_viewer, "_is_open", lambda: next(next_answer))
     monkeypatch.setattr(envs_viewer, "has_display", lambda: True)
-    monkeypatch.setattr(rr, "spawn", lambda executable_path, recording: spawned.append((executable_path, recording)))
-    assert envs_viewer._spawned("recording") is not is_open
-    assert spawned == [(f"{Path(sys.executable).parent}/rerun", "recording")]
+    monkeypatch.setattr(rr, "spawn", lambda **given: done.append(given))
+    return done, recording
+
+
+def test_a_viewer_that_is_opened_is_the_program_beside_this_python_and_is_said_to_be_new(monkeypatch):
+    done, recording = _programs(monkeypatch, (False, True))
+    assert envs_viewer._spawned(recording)
+    spawned = {"executable_path": f"{Path(sys.executable).parent}/rerun", "connect": False, "recording": recording}
+    assert done == [spawned, "rerun+http://127.0.0.1:9876/proxy"]
+
+
+def test_a_viewer_that_is_open_is_used_and_needs_no_program_on_this_machine(monkeypatch):
+    done, recording = _programs(monkeypatch, (True,))
+    monkeypatch.setattr(envs_viewer.shutil, "which", lambda name, path=None: None)
+    assert not envs_viewer._spawned(recording)
+    assert done == ["rerun+http://127.0.0.1:9876/proxy"]
+
+
+def test_a_viewer_that_does_not_open_is_said_to_be_missing_before_anything_is_sent(monkeypatch):
+    """DISPLAY may name one that does not answer; rerun itself warns, and fails where the first episode is sent."""
+    done, recording = _programs(monkeypatch, (False, False))
+    with pytest.raises(MachineError, match="render_mode: expected a rerun viewer that opens on this display; begin"):
+        envs_viewer._spawned(recording)
+    assert len(done) == 1
 
 
 def _episode(hand_made, monkeypatch, path, ticks):
