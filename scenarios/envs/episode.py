@@ -223,13 +223,13 @@ class Episodes(gymnasium.Env[Obs, NDArray[np.float32]], Generic[Obs]):
 
     def _begun(self, scenario: Scenario, seed: int) -> tuple[Flight, AttemptJudge, Tick]:
         """Return a new flight, its judge and its first control tick, shown; one that is refused is closed."""
-        flight, judge = self.new_flight(scenario, seed), AttemptJudge(self._attempts)
+        flight, judge, command = self.new_flight(scenario, seed), AttemptJudge(self._attempts), ReceiverCommand()
         try:
-            tick, _, outcome = self._flown(flight, judge, ReceiverCommand())
+            tick, _, outcome = self._flown(flight, judge, command)
             if outcome is not None:
                 expected = "a flight that goes on after its first control tick"
                 raise DockairError("reset", expected=expected, got=outcome.value)
-            self._show(flight, tick)
+            self._show(flight, tick, command)
         except BaseException:
             flight.close()
             raise
@@ -240,7 +240,7 @@ class Episodes(gymnasium.Env[Obs, NDArray[np.float32]], Generic[Obs]):
         assert self._flight is not None
         tick, failed, self._outcome = self._flown(self._flight, self._judge, command)
         self._take(tick)
-        self._show(self._flight, tick, is_last=self._outcome is not None)
+        self._show(self._flight, tick, command, is_last=self._outcome is not None)
         return failed
 
     def _flown(self, flight: Flight, judge: AttemptJudge, command: ReceiverCommand) -> tuple[Tick, int, Outcome | None]:
@@ -262,11 +262,12 @@ class Episodes(gymnasium.Env[Obs, NDArray[np.float32]], Generic[Obs]):
         self.imu = tick.imu[-1] if tick.imu else self.imu
         self.note(tick)
 
-    def _show(self, flight: Flight, tick: Tick, *, is_last: bool = False) -> None:
-        """Let the viewer follow, if there is to be one."""
+    def _show(self, flight: Flight, tick: Tick, command: ReceiverCommand, *, is_last: bool = False) -> None:
+        """Let the viewer follow, if there is to be one; what is commanded is the policy's, not the guidance's."""
         if self.render_mode == "human":
             self._viewer = self._viewer or LiveViewer()
-            self._viewer.show(flight, tick, is_last=is_last)
+            flown = replace(tick, solution=replace(tick.solution, command=command))
+            self._viewer.show(flight, flown, is_last=is_last)
 
     def chosen_scenario(self, options: Mapping[str, Any]) -> Scenario:
         """Return the scenario that reset's options ask for, with the environment's own sensing, checked."""

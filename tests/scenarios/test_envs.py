@@ -593,6 +593,24 @@ def test_the_view_is_640_by_480_of_the_middle_between_tip_and_ring_and_closed_wi
         made.render()
 
 
+def test_the_viewer_draws_the_command_that_is_flown_not_the_one_that_the_guidance_would_have_given(monkeypatch):
+    drawn = []
+
+    class Viewer:
+        def show(self, flight, tick, *, is_last=False):
+            drawn.append(tick.solution.command.velocity_m_s)
+
+    monkeypatch.setattr(envs_episode, "require_viewer", lambda: None)
+    monkeypatch.setattr(envs_episode, "LiveViewer", Viewer)
+    made = DockEnv(QUICK, render_mode="human")
+    made.reset(seed=0)
+    observation, *_ = made.step(np.array([0.5, -0.25, 0.0, 0.0, 0.0, 0.0], np.float32))
+    np.testing.assert_array_equal(drawn, [[0.0, 0.0, 0.0], [0.5, -0.25, 0.0]])
+    first = [entry.name for entry in OBSERVATION].index("navigator_command_velocity_x")
+    assert np.any(observation[first : first + 3] != drawn[-1])  # what is observed stays the guidance's
+    made.close()
+
+
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:.*ERROR")  # gymnasium tells of the error itself, too
 def test_what_a_vector_environments_process_raises_comes_back_as_one_line():
