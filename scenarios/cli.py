@@ -307,6 +307,8 @@ def _noted(said: str, error: BaseException) -> str:
 def main() -> None:
     """Run a command; what a person did wrong ends in one line on stderr, not in a traceback."""
     outlive_readers()
+    if os.environ.get("MPLBACKEND", "").startswith("module://"):  # a notebook's; its module need not be installed
+        del os.environ["MPLBACKEND"]
     try:
         sys.path.append(_working_folder())  # where one's own navigator lies; last, so that it hides nothing
         status = app(standalone_mode=False)

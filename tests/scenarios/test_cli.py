@@ -394,6 +394,14 @@ def test_without_a_reader_the_status_still_says_what_came_of_it():
         assert subprocess.run([sys.executable, "-c", differs], stdout=writing, stderr=writing).returncode == 1
 
 
+def test_a_notebooks_own_backend_is_none_of_a_command_that_is_begun_there():
+    """Matplotlib refuses to be imported where the module is not installed, as where the kernel lies elsewhere."""
+    draws = STANDING_IN.format(does="import matplotlib; return SimpleNamespace(identical=False)")
+    environment = {**os.environ, "MPLBACKEND": "module://matplotlib_inline.backend_inline"}
+    done = subprocess.run([sys.executable, "-c", draws], capture_output=True, text=True, env=environment)
+    assert done.returncode == 1 and "Traceback" not in done.stderr
+
+
 def test_a_pipe_that_breaks_within_is_no_quiet_failure():
     breaks = STANDING_IN.format(does="raise BrokenPipeError(32, 'a pipe of our own')")
     done = subprocess.run([sys.executable, "-c", breaks], capture_output=True, text=True)
