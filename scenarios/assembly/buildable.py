@@ -9,6 +9,7 @@ import numpy as np
 
 from dockair.calibration import Camera, LedRing
 from dockair.errors import DockairError
+from dockair.nav.guidance.field_of_view import FieldOfView
 from dockair.parameters import load_parameters
 from dockair.scenarios.assembly.measured import require_measurable
 from dockair.scenarios.assembly.mounting_parameters import MountingParameters
@@ -16,6 +17,7 @@ from dockair.scenarios.assembly.nominal_sheets import nominal_camera, nominal_ri
 from dockair.scenarios.assembly.receiver import airframe
 from dockair.scenarios.plug_in import navigator_class_of
 from dockair.scenarios.schema import Scenario
+from dockair.scenarios.tables.crew import OUR_NAVIGATOR
 from dockair.sim.air.atmosphere import STANDARD_GRAVITY_M_S2, standard_atmosphere
 from dockair.sim.air.turbulence import gust_sigma
 from dockair.sim.aircraft.flight_control import FlightControlParameters
@@ -30,12 +32,15 @@ from dockair.sim.camera.sheets import CameraSheets, LedParameters, SensorParamet
 from dockair.sim.faults import Faults
 from dockair.sim.hose.chain import DrogueParameters
 from dockair.sim.hose.coupling import CouplingParameters
+from dockair.sim.hose.reel import ReelParameters
 from dockair.sim.outlines import TankerParameters, nose_x_m
 from dockair.sim.skins import tanker_skins
 
+_RANGES_M = np.linspace(0.0, 40.0, 81)  # as far off as a flight may begin
+
 
 def require_buildable(scenario: Scenario) -> None:
-    """Refuse a flight into the ground, gusts, a camera rate, sheets and faults that do not fit, and no navigator.
+    """Refuse a flight into the ground, gusts, rates, sheets, faults and places that do not fit, and no navigator.
 
     Raises:
         DockairError: one of them does not, or the navigator's class is none.
@@ -47,12 +52,14 @@ def require_buildable(scenario: Scenario) -> None:
     _check_ring(scenario, ring, drogue)
     _check_outlines(scenario)
     _check_turn(scenario)
+    _check_take_in(scenario)
     require_fit(drogue, load_parameters("coupling", CouplingParameters, own.get("coupling")))
     faults = Faults([table.fault for table in scenario.faults], ring.count)
     camera = nominal_camera(scenario)  # which is built whoever navigates
     if scenario.navigation.is_truth:
         return
     _check_navigator(scenario.navigation.navigator)
+    _check_view(scenario, camera)
     sheets = CameraSheets.load(scenario.camera.filter, scenario.parameters)
     _check_camera_rate(scenario.rates.camera_hz, camera, sheets)
     _check_full_scale(sheets.sensor)
@@ -136,6 +143,32 @@ def _check_turn(scenario: Scenario) -> None:
         flown = f"at {flight.airspeed_m_s:g} m/s in air of {air.density_kg_m3:.3f} kg/m^3"
         expected = f"a bank at which the receiver can turn {flown}"
         raise DockairError("tanker.bank_deg", expected=expected, got=tanker.bank_deg) from None
+
+
+def _check_take_in(scenario: Scenario) -> None:
+    """As much hose as Dockair's guidance is to push in, the reel can wind in; nobody else is told of it."""
+    if scenario.navigation.navigator not in ("truth", OUR_NAVIGATOR):
+        return
+    range_m = load_parameters("reel", ReelParameters, scenario.parameters.get("reel")).range_m
+    if scenario.guidance.take_in_m > range_m:
+        expected = f"at most parameters.reel.range_m = {range_m}, all that the reel winds in"
+        raise DockairError("guidance.take_in_m", expected=expected, got=scenario.guidance.take_in_m)
+
+
+def _check_view(scenario: Scenario, camera: Camera) -> None:
+    """The camera is behind the probe's tip, and sees a ring ahead of that at some range."""
+    sheet = scenario.hardware.receiver_sheet("mounting")
+    mounting = load_parameters(sheet, MountingParameters, scenario.parameters.get(sheet)).mounting()
+    where, got = f"parameters.{sheet}.camera_position_m", mounting.p_BC.tolist()
+    if not mounting.p_BC[0] < mounting.p_BP[0]:
+        expected = f"a place behind the probe's tip, of less than {mounting.p_BP[0]} m forward"
+        raise DockairError(where, expected=expected, got=got)
+    view, ahead = FieldOfView(camera, mounting), [np.array([range_m, 0.0, 0.0]) for range_m in _RANGES_M]
+    if not any(view.out_m(p_PD_B, 0).any() for p_PD_B in [*ahead, scenario.start.p_PD_B]):
+        expected = (
+            f"a place from which the camera has a ring ahead of the probe in view, {_RANGES_M[-1]:g} m away at most"
+        )
+        raise DockairError(where, expected=expected, got=got)
 
 
 def _check_camera_rate(camera_hz: int, camera: Camera, sheets: CameraSheets) -> None:

@@ -17,6 +17,7 @@ Not modelled: the toggles' friction, wear, a coupling that fails to let go.
 Source of the limits: assets/parameters/coupling.toml.
 """
 
+import math
 from dataclasses import dataclass
 from enum import Enum
 
@@ -32,7 +33,7 @@ class CouplingParameters:
     """assets/parameters/coupling.toml.
 
     Raises:
-        DockairError: a probe that does not fit the bore.
+        DockairError: a probe that does not fit the bore, or that the latches never take.
     """
 
     depth_m: float
@@ -53,13 +54,21 @@ class CouplingParameters:
     probe_reflectance: float
 
     def __post_init__(self) -> None:
-        """Refuse a probe whose tip is not its foremost point, or too thick for the bore."""
+        """Refuse a probe whose tip is not its foremost point or too thick for the bore, and latches that take none."""
         if not self.probe_boom_radius_m <= self.probe_tip_radius_m:
             expected = f"at most coupling.probe_tip_radius_m = {self.probe_tip_radius_m}"
             raise DockairError("coupling.probe_boom_radius_m", expected=expected, got=self.probe_boom_radius_m)
         if not self.probe_tip_radius_m < self.socket_radius_m:
             expected = f"less than coupling.socket_radius_m = {self.socket_radius_m}, or no tip gets in"
             raise DockairError("coupling.probe_tip_radius_m", expected=expected, got=self.probe_tip_radius_m)
+        if not self.closing_speed_min_m_s < self.closing_speed_max_m_s:
+            expected = f"more than coupling.closing_speed_min_m_s = {self.closing_speed_min_m_s}, or no probe is taken"
+            raise DockairError("coupling.closing_speed_max_m_s", expected=expected, got=self.closing_speed_max_m_s)
+        resting_m = math.hypot(self.socket_radius_m - self.probe_tip_radius_m, self.stop_gap_m)
+        if not resting_m <= self.capture_distance_m:
+            at_rest = "as far off as a nozzle may rest on the bore's bottom (socket_radius_m, stop_gap_m)"
+            expected = f"at least {math.ceil(1e4 * resting_m) / 1e4} m, {at_rest}"
+            raise DockairError("coupling.capture_distance_m", expected=expected, got=self.capture_distance_m)
 
 
 class CouplingState(Enum):

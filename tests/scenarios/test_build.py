@@ -12,6 +12,7 @@ from dockair.errors import DockairError
 from dockair.messages import Window
 from dockair.nav.guidance.approach import GuidanceSettings
 from dockair.nav.guidance.bow_wave_push import BowWavePush
+from dockair.nav.navigator import Navigator
 from dockair.parameters import load_parameters
 from dockair.scenarios.assembly import parts as build_module
 from dockair.scenarios.assembly.buildable import require_buildable
@@ -400,3 +401,32 @@ def test_a_turn_that_the_receiver_cannot_fly_is_refused_before_it_flies(bank_deg
     """It was refused in flight, as the turn came in: 14 s of flight were lost, by an error that named an airspeed."""
     with pytest.raises(DockairError, match=rf"^tanker.bank_deg: .* can turn at 120 m/s .*, got {bank_deg}"):
         require_buildable(load_scenario("truth_navigation", HEAVY | {"tanker.bank_deg": bank_deg}))
+
+
+class OwnNavigator(Navigator):
+    """To which the scenario's guidance is not told."""
+
+
+def test_hose_to_be_pushed_in_that_the_reel_does_not_wind_in_is_refused_of_dockairs_guidance():
+    short = {"parameters.reel.range_m": 2.0, "parameters.reel.inner_limit_m": 2.0}
+    for name in ("still_air", "truth_navigation"):
+        with pytest.raises(
+            DockairError, match=r"^guidance.take_in_m: expected at most parameters.reel.range_m = 2.0, "
+        ):
+            require_buildable(load_scenario(name, short))
+        require_buildable(load_scenario(name, short | {"guidance.take_in_m": 2.0}))
+    require_buildable(load_scenario("still_air", short | {"navigation.navigator": f"{__name__}:OwnNavigator"}))
+
+
+@pytest.mark.parametrize(
+    ("place_m", "said"),
+    [
+        ([6.0, -0.45, 0.75], "a place behind the probe's tip, of less than 6.0 m forward"),
+        ([3.3, -0.45, 10.0], "a place from which the camera has a ring ahead of the probe in view"),
+    ],
+)
+def test_a_camera_that_never_sees_the_ring_is_refused_where_something_looks_through_it(place_m, said):
+    mounted = {"parameters.mounting.camera_position_m": place_m}
+    with pytest.raises(DockairError, match=f"^parameters.mounting.camera_position_m: expected {said}"):
+        require_buildable(load_scenario("still_air", mounted))
+    require_buildable(load_scenario("truth_navigation", mounted))

@@ -45,7 +45,7 @@ def test_tip_anywhere_at_the_bottom_of_the_bore_is_near_enough_to_latch():
         ),
         ({"throat_x_m": 0.3}, {}, "parameters.coupling.depth_m: expected more than drogue.throat_x_m = 0.3"),
         ({}, {"depth_m": 0.6}, "parameters.coupling.depth_m: expected less than drogue.hose_joint_x_m = 0.55"),
-        ({}, {"depth_m": 0.47, "stop_gap_m": 0.1}, "parameters.coupling.depth_m: expected less than"),
+        ({}, {"depth_m": 0.53, "stop_gap_m": 0.025}, "parameters.coupling.depth_m: expected less than"),
         (
             {},
             {"probe_tip_radius_m": 0.05},
@@ -56,6 +56,13 @@ def test_tip_anywhere_at_the_bottom_of_the_bore_is_near_enough_to_latch():
             {"probe_boom_radius_m": 0.04},
             "parameters.coupling.probe_boom_radius_m: expected at most coupling.probe",
         ),
+        (
+            {},
+            {"closing_speed_min_m_s": 1.0, "closing_speed_max_m_s": 1.0},
+            "parameters.coupling.closing_speed_max_m_s: expected more than coupling.closing_speed_min_m_s = 1.0, or no",
+        ),
+        ({}, {"capture_distance_m": 0.023}, "parameters.coupling.capture_distance_m: expected at least 0.0234 m, as"),
+        ({}, {"stop_gap_m": 0.03}, "parameters.coupling.capture_distance_m: expected at least 0.0324 m"),
         ({"inertia_kg_m2": [1.5, 0.5, 0.5]}, {}, "parameters.drogue.inertia_kg_m2: expected the inertia of a body"),
     ],
 )
