@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 
+from dockair.scenarios.reproduce.heading import oval as heading_oval
 from dockair.scenarios.reproduce.heading import straight as heading_straight
 from dockair.scenarios.reproduce.heading.tracks import lap_places, oval_true_rates_rad_s
 from dockair.scenarios.reproduce.heading.vision import calibration, seen_lap
@@ -36,6 +37,19 @@ def test_the_straight_s_figures_are_json_and_drawn(tmp_path, monkeypatch):
     assert len(printed) == len(heading_straight.NOISES_DEG_S) > 0
     for row in printed:
         assert row["ours"]["most_left_deg"] <= row["reference"]["most_left_deg"]
+
+
+def test_a_heading_of_the_oval_has_one_colour_in_both_panels(tmp_path, monkeypatch):
+    from matplotlib.figure import Figure
+
+    drawn = []
+    monkeypatch.setattr(Figure, "savefig", lambda figure, *_, **__: drawn.append(figure))
+    headings = {name: np.linspace(0.0, end, 100) for name, end in (("true", 12.0), ("raw", 13.0), ("hdr", 11.0))}
+    monkeypatch.setattr(heading_oval, "walk", lambda *_: headings | {"vdr": headings["true"] + 0.01})
+    heading_oval._draw(tmp_path / "oval.png")
+    above, below = ({line.get_label(): line.get_color() for line in panel.lines} for panel in drawn[0].axes)
+    assert below == {name: above[name] for name in ("raw gyro", "HDR", "VDR")}
+    assert len(set(above.values())) == 4
 
 
 @pytest.mark.slow

@@ -47,6 +47,18 @@ def test_each_has_the_printed_form_is_json_and_draws_a_picture(module, tmp_path,
     assert cv2.imread(str(tmp_path / picture_name(module.ID))).std() > 10.0
 
 
+def test_the_legend_of_the_descents_hides_none_of_their_bars(tmp_path, monkeypatch):
+    from matplotlib.figure import Figure
+
+    drawn = []
+    monkeypatch.setattr(Figure, "savefig", lambda figure, *_: drawn.append(figure))
+    shares = {name: [np.array([3, 1, 0, 1])] * len(pose_divergence.BINS_DEG) for name in pose_divergence.METHODS}
+    pose_divergence._draw(shares, tmp_path / "divergence.png")
+    (figure,) = drawn
+    assert all(panel.get_legend() is None for panel in figure.axes)
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == list(pose_divergence.ENDS)
+
+
 @pytest.mark.parametrize("name", ["iterative", "ippe_refined", "iterative_refined", "sqpnp", "sqpnp_refined"])
 @pytest.mark.parametrize("distortion", [None, (-0.12, 0.06, 8e-4, -5e-4, -0.01)])
 def test_opencvs_solvers_find_the_exact_pose_in_our_frames(name, distortion):

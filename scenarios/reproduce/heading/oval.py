@@ -21,6 +21,12 @@ NOISES_DEG_S = (0.05, 0.1, 0.2, 0.5)
 _SOURCE = "[Kyung et al. 2015, figs 9-11]"
 _SEEDS, _SHOWN_DEG_S = 5, 0.1
 _SIZE_IN, _DPI = (9.5, 7.5), 110
+_LINES = (
+    ("true", "true", "black"),
+    ("raw", "raw gyro", "0.6"),
+    ("hdr", "HDR", "tab:green"),
+    ("vdr", "VDR", "tab:blue"),
+)  # one colour a line in both panels, those of heading/racetrack
 
 
 def reproduce(out: Path | None) -> dict[str, Any]:
@@ -82,10 +88,11 @@ def _draw(path: Path) -> None:
     headings = walk(0, _SHOWN_DEG_S)
     figure, axes = plt.subplots(2, 1, figsize=_SIZE_IN, sharex=True, layout="constrained")
     time_s = (np.arange(headings["true"].size) + 1) / RATE_HZ
-    for name, label in {"true": "true", "raw": "raw gyro", "hdr": "HDR", "vdr": "VDR"}.items():
-        axes[0].plot(time_s, np.degrees(headings[name]), label=label)
+    for name, label, colour in _LINES:
+        axes[0].plot(time_s, np.degrees(headings[name]), color=colour, label=label)
         if name != "true":
-            axes[1].plot(time_s, np.abs(np.degrees(headings[name] - headings["true"])) + 1e-3, label=label)
+            error_deg = np.abs(np.degrees(headings[name] - headings["true"]))
+            axes[1].plot(time_s, error_deg + 1e-3, color=colour, label=label)
     axes[0].set_ylabel("heading [deg]")
     axes[0].set_title(f"Two laps, 720 degrees, drift 16 degrees in 85 s, noise {_SHOWN_DEG_S} deg/s")
     axes[1].set(yscale="log", ylim=(1e-2, 2e2), ylabel="error [deg]", xlabel="time [s]")

@@ -144,5 +144,6 @@ def _draw(shares: dict[str, list[Any]], path: Path) -> None:
         axes.set_title(name, fontsize=9)
         axes.set_xlabel("start turned by")
     panels[0].set_ylabel("starts [%]")
-    panels[-1].legend(fontsize=8, loc="lower right")
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(handles, labels, frameon=False, fontsize=8, loc="outside upper center", ncols=len(ENDS))
     figure.savefig(path)

@@ -80,7 +80,8 @@ def _draw_table(rows: list[dict[str, Any]], path: Path) -> None:
         panel.set_xticks(ranges, [f"{r:g}" for r in ranges])
         panel.minorticks_off()
         panel.grid(alpha=0.3)
-    figure.axes[0].legend(frameon=False, fontsize=7)
+    handles, labels = figure.axes[0].get_legend_handles_labels()
+    figure.legend(handles, labels, frameon=False, fontsize=8, loc="outside upper center", ncols=len(labels))
     figure.savefig(path)
 
 
