@@ -17,12 +17,21 @@ NAVIGATOR = "navigation.navigator"  #: a path in "file.py:Class" alone
 
 def from_folder(folder: Path, key: str, value: Any) -> Any:
     """Return a dotted key's value with its path taken from a folder; one without a path as it is."""
+    return _with_path(key, value, lambda path: folder / path)
+
+
+def absolute(key: str, value: Any) -> Any:
+    """Return a dotted key's value with its path from where one stands made absolute; one without a path as it is."""
+    return _with_path(key, value, lambda path: Path(path).absolute())
+
+
+def _with_path(key: str, value: Any, change: Callable[[str], Path]) -> Any:
     if not isinstance(value, str):
         return value
     if key in SHEETS:
-        return str(folder / value)
+        return str(change(value))
     file, name = file_and_class(value) if key == NAVIGATOR else ("", "")
-    return f"{folder / file}:{name}" if file else value
+    return f"{change(file)}:{name}" if file else value
 
 
 def taken_from(folder: Path, table: Mapping[str, Any]) -> dict[str, Any]:

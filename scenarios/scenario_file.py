@@ -9,7 +9,7 @@ import tomli_w
 
 from dockair.errors import DockairError
 from dockair.scenarios.dotted_key import is_within, parts_of
-from dockair.scenarios.path_keys import from_folder, taken_from, with_changed
+from dockair.scenarios.path_keys import absolute, taken_from, with_changed
 from dockair.scenarios.toml_files import PLANS, SCENARIOS, read_toml, toml_value
 
 #: Setting the one replaces the other, which the file may have given.
@@ -43,7 +43,7 @@ def text_from(table: Mapping[str, Any], beside: Mapping[str, str]) -> str:
     """
 
     def path(key: str, value: str) -> str:
-        return beside.get(key) or str(from_folder(Path.cwd(), key, value))
+        return beside.get(key) or str(absolute(key, value))
 
     return tomli_w.dumps(with_changed(table, path))
 

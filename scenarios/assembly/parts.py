@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass, replace
 from functools import partial
-from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
@@ -30,7 +29,7 @@ from dockair.scenarios.assembly.nominal_sheets import nominal_ring, nominal_shee
 from dockair.scenarios.class_by_name import name_of
 from dockair.scenarios.measured_leds import MeasuredLeds
 from dockair.scenarios.navigator_recipe import NavigatorRecipe
-from dockair.scenarios.path_keys import NAVIGATOR, from_folder
+from dockair.scenarios.path_keys import NAVIGATOR, absolute
 from dockair.scenarios.schema import Scenario
 from dockair.scenarios.truth_navigation import TruthNavigator
 from dockair.sim.air.atmosphere import Air, standard_atmosphere
@@ -309,7 +308,7 @@ def camera_sheets(scenario: Scenario) -> CameraSheets:
 
 def _recipe(scenario: Scenario, sheets: NavigationSheets) -> NavigatorRecipe:
     """Our own navigator takes settings; anybody else's is made of its sheets alone."""
-    name = from_folder(Path.cwd(), NAVIGATOR, scenario.navigation.navigator)  # a replay may begin elsewhere
+    name = absolute(NAVIGATOR, scenario.navigation.navigator)  # a replay may begin elsewhere
     ours = name == name_of(Navigator)
     settings = NavigatorSettings(guidance=guidance_settings(scenario), heading=_heading(scenario)) if ours else None
     return NavigatorRecipe(class_name=name, sheets=sheets, settings=settings)

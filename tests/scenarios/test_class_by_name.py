@@ -184,3 +184,14 @@ def test_a_spawned_process_finds_it_too(beside):
     command = [sys.executable, "-c", code.replace("{}", "navigator_of_mine.py:Own")]
     done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=beside.parent)
     assert done.stdout == "<class 'navigator_of_mine.Own'>\n"
+
+
+def test_a_flight_without_a_path_needs_no_folder_to_stand_in(tmp_path, monkeypatch):
+    gone = tmp_path / "gone"
+    gone.mkdir()
+    monkeypatch.chdir(gone)
+    gone.rmdir()
+    assert fly(load_scenario("truth_navigation", {"flight.duration_s": 0.1}), out=tmp_path / "out").duration_s == 0.1
+    measured = {"camera.sensing": "measurements", "flight.duration_s": 0.1}
+    assert fly(load_scenario("still_air", measured), out=tmp_path / "measured").duration_s == 0.1
+    monkeypatch.chdir(tmp_path)
