@@ -69,8 +69,9 @@ def label_of(place: Studio, taken: TrueFrame, clear: Array) -> dict[str, Any]:
 def hardware_of(place: Studio) -> dict[str, Any]:
     """Lens and ring, as their sheets say and as they were built."""
     sheets, built = place.parts.sheets, place.parts.as_built
-    return {"nominal": _lens_and_ring(sheets.camera, sheets.ring.positions_D)} | {
-        "as_built": _lens_and_ring(built.camera, built.ring_positions_D)
+    return {
+        "nominal": _lens_and_ring(sheets.camera, sheets.ring.positions_D),
+        "as_built": _lens_and_ring(built.camera, built.ring_positions_D),
     }
 
 

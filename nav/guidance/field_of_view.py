@@ -33,6 +33,10 @@ class FieldOfView:
         """Number of the edge that a ring's centre (3,) is nearest to, or farthest beyond."""
         return int(np.argmin(self._inside_m(p_PD_B)))
 
+    def holds(self, p_PD_B: Array) -> bool:
+        """Whether a ring's centre (3,) is within the field."""
+        return bool(self._inside_m(p_PD_B).min() > 0.0)
+
     def out_m(self, p_PD_B: Array, edge: int) -> Array:
         """(3,) shortest way of a ring's centre (3,) out of the field over an edge, body axes; none from outside."""
         inside_m = self._inside_m(p_PD_B)

@@ -164,7 +164,7 @@ def _check_view(scenario: Scenario, camera: Camera) -> None:
         expected = f"a place behind the probe's tip, of less than {mounting.p_BP[0]} m forward"
         raise DockairError(where, expected=expected, got=got)
     view, ahead = FieldOfView(camera, mounting), [np.array([range_m, 0.0, 0.0]) for range_m in _RANGES_M]
-    if not any(view.out_m(p_PD_B, 0).any() for p_PD_B in [*ahead, scenario.start.p_PD_B]):
+    if not any(view.holds(p_PD_B) for p_PD_B in [*ahead, scenario.start.p_PD_B]):
         expected = (
             f"a place from which the camera has a ring ahead of the probe in view, {_RANGES_M[-1]:g} m away at most"
         )

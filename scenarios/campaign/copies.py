@@ -6,8 +6,9 @@ of. They are there before the first flight, each whole or not at all.
 """
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from dockair.errors import DockairError
 from dockair.scenarios.campaign.jobs import Job
@@ -31,9 +32,10 @@ def keep_copies(jobs: Sequence[Job], out: Path) -> None:
         MachineError: there is no room.
     """
     folder, own = out / FOLDER, {job.scenario.name: job for job in jobs if job.is_of_own_file}
-    texts = {f"{name}.toml": _text_of(job) for name, job in own.items()}
+    tables = {name: ScenarioFile(job.file, {}).table for name, job in own.items()}
+    texts = {f"{name}.toml": _text_of(table) for name, table in tables.items()}
     paths = {path for job in jobs for path in (job.scenario.hardware.camera, job.scenario.hardware.ring) if path}
-    paths |= {path for job in own.values() for path in _sheets_in(job).values()}
+    paths |= {path for table in tables.values() for path in _sheets_in(table).values()}
     contents = {_name_of(path): Path(path).read_bytes() for path in paths}
     contents |= {name: text.encode(errors="surrogateescape") for name, text in texts.items()}
     try:
@@ -54,15 +56,13 @@ def keep_copies(jobs: Sequence[Job], out: Path) -> None:
             raise DockairError(job.file, expected=expected, got="a change")
 
 
-def _text_of(job: Job) -> str:
+def _text_of(table: Mapping[str, Any]) -> str:
     """Return a scenario's file, its sheets named by their copies."""
-    beside = {key: _name_of(path) for key, path in _sheets_in(job).items()}
-    return text_from(ScenarioFile(job.file, {}).table, beside)
+    return text_from(table, {key: _name_of(path) for key, path in _sheets_in(table).items()})
 
 
-def _sheets_in(job: Job) -> dict[str, str]:
+def _sheets_in(table: Mapping[str, Any]) -> dict[str, str]:
     """Return the keys of the sheets that a scenario's file names, each with its path, where there is such a sheet."""
-    table = ScenarioFile(job.file, {}).table
     return {key: path for key in SHEETS if (path := value_in(table, key)) and os.path.isfile(path)}
 
 
